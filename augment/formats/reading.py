@@ -64,12 +64,14 @@ class Reading:
         recording: None for a source that is no recording.
         notes: A sentence on every loss and assumption.
         moment: What was taken.
+        names: What the source calls the agents, by their ids; empty where these are the same.
     """
 
     scene: Scene
     recording: Recording | None
     notes: tuple[str, ...] = ()
     moment: Moment = Moment()
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,7 +149,7 @@ class Log:
         origin = self._ego_pose(frame)
         city, map_notes = complete_map(self.map_at(frame))
         road = road_around(city, origin)
-        tracks = _tracks(self, frame, origin)
+        tracks, names = _tracks(self, frame, origin)
         scene = Scene(
             name=name,
             ego=_ego(self, frame),
@@ -176,7 +178,7 @@ class Log:
         if not self.is_free:
             notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(
-            scene=_on_lanes(scene),
+            scene=place_on_lanes(scene),
             recording=Recording(
                 times_s=np.round(self.times_s[frame:] - self.times_s[frame], 6),
                 ego=_local(self.ego[frame:], origin),
@@ -184,6 +186,7 @@ class Log:
             ),
             notes=tuple(notes),
             moment=Moment(item=self.item, frame=frame),
+            names=names,
         )
 
     def _ego_pose(self, frame: int) -> Pose:
@@ -331,13 +334,27 @@ def tracks_of(
     return tracks
 
 
+def place_on_lanes(scene: Scene) -> Scene:
+    """Return the scene, everyone with the lane under them.
+
+    The heading counts only of what drives.
+    """
+    graph = LaneGraph(scene)
+
+    def place(agent: TrafficAgent, heading_rad: float | None) -> TrafficAgent:
+        return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
+
+    agents = [place(one, one.heading_rad if one.type in _HEADED else None) for one in scene.agents]
+    return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))
+
+
 # Private
 
 
-def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
-    """The tracks near the ego from t0 on: who is there at t0 first, then by time.
+def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict[str, str]]:
+    """The tracks near the ego from t0 on, and their names in the source by id.
 
-    Within one step the nearest comes first.
+    Who is there at t0 comes first, then by time; within one step the nearest.
     """
     for states in (log.ego, *(track.states for track in log.tracks)):
         if (np.abs(states) > FURTHEST).any():
@@ -367,7 +384,8 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
                 states=_local(track.states[frame:], origin),
             )
         )
-    return tuple(tracks)
+    names = {track.agent_id: one[2] for track, one in zip(tracks, met, strict=True)}
+    return tuple(tracks), names
 
 
 def _local(states: FloatArray, origin: Pose) -> FloatArray:
@@ -397,14 +415,3 @@ def _ego(log: Log, frame: int) -> TrafficAgent:
 def _agent(track: Track) -> TrafficAgent:
     agent = agent_of(track, track.states[0])
     return replace(agent, speed_mps=0.0) if track.type in _STANDING else agent
-
-
-def _on_lanes(scene: Scene) -> Scene:
-    """Everyone with the lane under them; only of what drives does the heading count."""
-    graph = LaneGraph(scene)
-
-    def place(agent: TrafficAgent, heading_rad: float | None) -> TrafficAgent:
-        return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
-
-    agents = [place(one, one.heading_rad if one.type in _HEADED else None) for one in scene.agents]
-    return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))

@@ -21,7 +21,7 @@ HEAVY = {
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
-    "scipy.optimize": ("augment.metrics", "arena.pairing"),
+    "scipy.optimize": ("augment.benchmark", "augment.metrics", "arena.pairing"),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
     "scipy.spatial": ("augment.formats", "augment.simulation"),

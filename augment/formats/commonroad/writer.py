@@ -53,6 +53,7 @@ _COLOURS = {
     TrafficLight.RED: "red",
     TrafficLight.UNKNOWN: "inactive",
 }
+_NAMES = "Our names and the ids here:"
 Ids = Mapping[str, int]
 """Whole numbers from 1 on, a new one for each name that is asked for."""
 
@@ -60,6 +61,13 @@ Ids = Mapping[str, int]
 def write(cells: Sequence[Cell]) -> writing.Written:
     """One XML file for each cell."""
     return writing.write_each(cells, _write_one)
+
+
+def names_in(text: str) -> dict[str, str]:
+    """Return our names by the ids of a file that `write` made; none without its comment."""
+    _, _, after = text.partition(f"<!-- {_NAMES} ")
+    pairs = (pair.rpartition(" is ") for pair in after.partition(" -->")[0].split(", "))
+    return {number: name for name, _, number in pairs if name}
 
 
 # Private
@@ -120,7 +128,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     _report(cell, report)
     ET.indent(root)
     names = ", ".join(f"{name} is {number}" for name, number in ids.items())
-    comment = escape_controls(f"Our names and the ids here: {names}").replace("--", "- -")
+    comment = escape_controls(f"{_NAMES} {names}").replace("--", "- -")
     body = ET.tostring(root, encoding="unicode")
     text = f"<?xml version='1.0' encoding='UTF-8'?>\n<!-- {comment} -->\n{body}\n"
     return {f"{cell.stem}.xml": text.encode()}

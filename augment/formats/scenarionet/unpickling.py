@@ -81,6 +81,13 @@ def _build_dictionary(*_: Any) -> dict[Any, Any]:
     return {}
 
 
+def _number_of(value: Any) -> Any:
+    """Return the number of an enumeration's member, which stands for it."""
+    if not isinstance(value, int):
+        raise TypeError("a member of an enumeration needs its number")
+    return value
+
+
 def _encode(text: str, coding: str = "latin1") -> bytes:
     """Encode bytes, which older protocols write as text."""
     if coding not in ("latin1", "latin-1"):
@@ -99,6 +106,10 @@ _ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
     "__builtin__.long": None,
     "__builtin__.set": set,
     "_codecs.encode": _encode,
+    **{
+        f"trafficgen.utils.typedef.{kind}": _number_of  # in LCTGen's pickles
+        for kind in ("AgentType", "RoadLineType", "RoadEdgeType")
+    },
     "numpy.core.multiarray._reconstruct": _Array,
     "numpy.core.multiarray.scalar": _build_scalar,
     "numpy.core.numeric._frombuffer": _build_from_buffer,

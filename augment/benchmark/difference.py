@@ -1,0 +1,250 @@
+"""From a scene and a changed one to what was changed.
+
+Agents are matched by identity first: by their ids in our own JSON, and in formats of others by the
+names that their writers here gave. Whoever is left is matched within its class and box so that the
+sum of the distances is smallest. Formats can't say everything, so a changed scene is held against
+the source as its own format shows it (`SourceView`): what a format loses of both is no change.
+Frame: the ego frame of the source. Notation: S agents of the source, C of the changed scene.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+import numpy as np
+
+from augment.formats.reading import place_on_lanes
+from augment.geometry import frames
+from augment.geometry.polyline import FloatArray
+from augment.metrics.displacement import CLASS_OF
+from augment.scene.entities import Modification, Origin, Scene, TrafficAgent
+
+NEAR_M, NEAR_RAD, NEAR_MPS = 0.02, 0.005, 0.05
+"""What a format's rounding may change."""
+_EXACT = 1e-6
+"""How much of that our own JSON may change."""
+REACH_M = 10.0
+"""How far somebody without an identity may have been moved and still be the same."""
+SAME_BOX_M = 0.05
+"""Up to how much length and width of the same agent differ."""
+CLOSE_CALL_M = 1.0
+"""A matching is named as ambiguous where another one is no more than this much further."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceView:
+    """The source as a format shows it.
+
+    Attributes:
+        agents: By their ids in the source; who is not in it can't be said in the format.
+        origin: Where its ego stands in the format's file.
+        names: Ids of the changed scene to those of the source, as far as the file says them.
+        is_certain: Whether the names identify; else they count for boxes of one class and size.
+    """
+
+    agents: Mapping[str, TrafficAgent]
+    origin: Origin
+    names: Mapping[str, str] = field(default_factory=dict)
+    is_certain: bool = False
+
+
+def find_difference(
+    before: Scene, after: Scene, view: SourceView | None = None
+) -> tuple[Modification, tuple[str, ...]]:
+    """Return what turns a scene into another, and notes on what was assumed.
+
+    Args:
+        before: The source.
+        after: The changed scene; of its map nothing counts.
+        view: The source as the changed scene's format shows it; None for our own JSON, where ids
+            identify and nothing is lost.
+    """
+    here = {agent.id: agent for agent in before.agents}
+    is_own = view is None
+    if view is None:
+        names = {agent.id: agent.id for agent in after.agents}
+        view = SourceView(agents=here, origin=before.origin, names=names, is_certain=True)
+    agents, notes = _align(before, after, view)
+    pairs, doubts = _pair(view, agents)
+    lost = [name for name in here if name not in view.agents]
+    if lost:
+        notes.append(f"{', '.join(lost)}: not said in this format, taken to stay.")
+    taken = set(pairs.values())
+    fresh = _free_ids({*here, before.ego.id, *(agent.id for agent in agents)})
+    added, moved = [], []
+    for agent in agents:
+        name = pairs.get(agent.id)
+        if name is None:
+            is_taken = agent.id in here or agent.id == before.ego.id
+            added.append(replace(agent, id=next(fresh)) if is_taken else agent)
+        else:
+            rounding = _EXACT if is_own else 1.0
+            state = _changed_state(here[name], view.agents[name], agent, rounding)
+            if state is not here[name]:
+                moved.append(replace(agent, id=name) if is_own else state)
+    return Modification(
+        added=_on_lanes(before, added, is_own),
+        moved=_on_lanes(before, moved, is_own),
+        removed=tuple(name for name in view.agents if name not in taken),
+    ), (*notes, *doubts)
+
+
+def number_added(scene: Scene, modification: Modification) -> Modification:
+    """Return the modification, its new agents called by the next free numbers of the scene.
+
+    Names that a submission gives may tell who made it, and pictures show them.
+    """
+    fresh = _free_ids({agent.id for agent in scene.everyone})
+    added = (replace(agent, id=next(fresh)) for agent in modification.added)
+    return replace(modification, added=tuple(added))
+
+
+# Private
+
+
+def _align(before: Scene, after: Scene, view: SourceView) -> tuple[list[TrafficAgent], list[str]]:
+    """The changed scene's agents in the frame of the source, and notes on either ego."""
+    notes = []
+    agents, frame = list(after.agents), after.origin.frame
+    origins = [one for one in (before.origin, view.origin) if one.frame == frame]
+    if origins:
+        seen = origins[0].pose.pose_to_local(after.origin.pose)
+        away_m = float(np.hypot(seen.x_m, seen.y_m))
+        if away_m > NEAR_M or abs(seen.heading_rad) > NEAR_RAD:
+            agents = [_seen_from(agent, seen) for agent in agents]
+            notes.append(
+                f"Its ego stands {away_m:.2f} m from the source's; all others were brought into "
+                "the source's frame, and the ego stays."
+            )
+    elif not _is_zero(after.origin.pose):
+        notes.append(f"Its frame, {frame!a}, is not known here: its ego is taken for the source's")
+    if abs(after.ego.speed_mps - before.ego.speed_mps) > NEAR_MPS:
+        notes.append("Its ego has another speed; the ego stays as it is.")
+    return agents, notes
+
+
+def _is_zero(pose: frames.Pose) -> bool:
+    return max(abs(pose.x_m), abs(pose.y_m)) <= NEAR_M and abs(pose.heading_rad) <= NEAR_RAD
+
+
+def _seen_from(agent: TrafficAgent, seen: frames.Pose) -> TrafficAgent:
+    """An agent told from the pose, in the frame that the pose is told in."""
+    points = [(agent.x_m, agent.y_m), *([agent.walk_to_m] if agent.walk_to_m else [])]
+    (x_m, y_m), *walk = seen.to_parent(np.array(points)).tolist()
+    heading_rad = frames.wrap(agent.heading_rad + seen.heading_rad)
+    walk_to_m = (walk[0][0], walk[0][1]) if walk else None
+    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk_to_m)
+
+
+def _pair(view: SourceView, agents: list[TrafficAgent]) -> tuple[dict[str, str], list[str]]:
+    """Ids of the changed scene to those of the source, and what was ambiguous."""
+    pairs: dict[str, str] = {}
+    unsure: list[str] = []
+
+    def match_rest(reach_m: float) -> None:
+        rest = [agent for agent in agents if agent.id not in pairs]
+        taken = set(pairs.values())
+        left = [agent for name, agent in view.agents.items() if name not in taken]
+        names = [name for name in view.agents if name not in taken]
+        for row, column, is_ambiguous in _match(left, rest, reach_m):
+            pairs[rest[column].id] = names[row]
+            if is_ambiguous and reach_m > NEAR_M:
+                unsure.append(names[row])
+
+    if not view.is_certain:
+        match_rest(NEAR_M)
+    taken = set(pairs.values())
+    for agent in agents:
+        name = view.names.get(agent.id)
+        if name is None or name not in view.agents or name in taken or agent.id in pairs:
+            continue
+        if view.is_certain or _is_like(view.agents[name], agent):
+            pairs[agent.id] = name
+            taken.add(name)
+    match_rest(NEAR_M if view.is_certain else REACH_M)
+    text = "several agents of this size are about as near; the nearest are taken for the same."
+    return pairs, [f"{', '.join(unsure)}: {text}"] if unsure else []
+
+
+def _is_like(one: TrafficAgent, other: TrafficAgent) -> bool:
+    """Whether class and box are those of one agent."""
+    sizes_m = (one.length_m - other.length_m, one.width_m - other.width_m)
+    is_same_size = max(map(abs, sizes_m)) <= SAME_BOX_M
+    return is_same_size and CLASS_OF[one.type] is CLASS_OF[other.type]
+
+
+def _match(
+    left: list[TrafficAgent], rest: list[TrafficAgent], reach_m: float
+) -> Iterator[tuple[int, int, bool]]:
+    """Rows of S and columns of C that belong together, and whether others might."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not left or not rest:
+        return
+    apart_m = np.hypot(*_difference(left, rest, lambda one: (one.x_m, one.y_m)))
+    sizes_m = np.abs(_difference(left, rest, lambda one: (one.length_m, one.width_m)))
+    classes = np.array([CLASS_OF[one.type] for one in left])[:, None] == np.array(
+        [CLASS_OF[one.type] for one in rest]
+    )
+    fits = (apart_m <= reach_m) & (sizes_m <= SAME_BOX_M).all(axis=0) & classes
+    cost = np.where(fits, apart_m, 1e6)
+    for row, column in zip(*linear_sum_assignment(cost), strict=True):
+        if fits[row, column]:
+            within = cost[row, column] + CLOSE_CALL_M
+            others = (cost[row] <= within).sum() + (cost[:, column] <= within).sum() - 2
+            yield int(row), int(column), bool(others)
+
+
+def _difference(
+    left: list[TrafficAgent],
+    rest: list[TrafficAgent],
+    values: Callable[[TrafficAgent], tuple[float, float]],
+) -> FloatArray:
+    """Of two values of each agent, (2, S, C)."""
+    ours, theirs = (np.array([values(one) for one in some]) for some in (left, rest))
+    return np.asarray((ours[:, None] - theirs[None]).transpose(2, 0, 1))
+
+
+def _changed_state(
+    source: TrafficAgent, shown: TrafficAgent, agent: TrafficAgent, rounding: float
+) -> TrafficAgent:
+    """The source's agent with what differs from how its format shows it, itself for nothing."""
+    near_m, turn_rad = NEAR_M * rounding, frames.difference(agent.heading_rad, shown.heading_rad)
+    changes: dict[str, object] = {}
+    if np.hypot(agent.x_m - shown.x_m, agent.y_m - shown.y_m) > near_m:
+        changes |= {"x_m": agent.x_m, "y_m": agent.y_m}
+    if abs(turn_rad) > NEAR_RAD * rounding:
+        changes["heading_rad"] = agent.heading_rad
+    if abs(agent.speed_mps - shown.speed_mps) > NEAR_MPS * rounding:
+        changes["speed_mps"] = agent.speed_mps
+    for name in ("length_m", "width_m"):
+        if abs(getattr(agent, name) - getattr(shown, name)) > near_m:
+            changes[name] = getattr(agent, name)
+    if agent.type is not shown.type:
+        changes["type"] = agent.type
+    ends = agent.walk_to_m, shown.walk_to_m
+    if (None in ends and ends != (None, None)) or _apart_m(*ends) > near_m:
+        changes["walk_to_m"] = agent.walk_to_m
+    if not changes:
+        return source
+    return replace(source, **changes, lane_id=agent.lane_id)  # type: ignore[arg-type]
+
+
+def _apart_m(one: tuple[float, float] | None, other: tuple[float, float] | None) -> float:
+    return float(np.hypot(*np.subtract(one, other))) if one and other else 0.0
+
+
+def _free_ids(taken: set[str]) -> Iterator[str]:
+    return (name for number in count(1) if (name := f"Agent{number}") not in taken)
+
+
+def _on_lanes(
+    before: Scene, agents: list[TrafficAgent], keeps_lanes: bool
+) -> tuple[TrafficAgent, ...]:
+    """The agents with the source's lanes under them; lanes that they name already may stay."""
+    known = {lane.id for lane in before.lanes} | {way.id for way in before.connectors}
+    placed = place_on_lanes(replace(before, agents=tuple(agents))).agents if agents else ()
+    return tuple(
+        agent if keeps_lanes and (agent.lane_id is None or agent.lane_id in known) else found
+        for agent, found in zip(agents, placed, strict=True)
+    )

@@ -1,0 +1,197 @@
+"""From a submission, a folder or zip from outside, to the report on it.
+
+In: a benchmark set and a path with `card.json` and one file a task and sample, `<task>.<ext>` or
+`<task>--<sample>.<ext>`: our modification JSON, the changed scene in any format that is read, or
+LCTGen's vehicles. Out: what became of each. Files are read in a process of its own
+(submitted_file.py); where it dies over one, that one is unreadable and the rest is read on.
+"""
+
+import tempfile
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from augment.benchmark import submitted_file
+from augment.benchmark.difference import find_difference, number_added
+from augment.benchmark.report import CARD
+from augment.benchmark.source_views import ShownSource, identify, show_source
+from augment.benchmark.submitted_file import CONTENT, FileContent
+from augment.benchmark.values import (
+    BenchmarkSet,
+    BenchmarkTask,
+    EntryStatus,
+    Split,
+    SubmissionReport,
+    SubmittedEntry,
+)
+from augment.errors import InvalidDocument, InvalidModification
+from augment.formats import lctgen, sandbox
+from augment.formats.documents import parse_json
+from augment.formats.reading import place_on_lanes
+from augment.formats.sandbox import ProcessLimits
+from augment.metrics.displacement import displacement
+from augment.scene.codec import SCENE
+from augment.scene.entities import Modification, apply
+
+_OPENING = ProcessLimits(cpu_s=30, deadline_s=120)
+MOST_DEATHS = 25
+"""Files that may end their process; each takes it some seconds."""
+_NAMES = TypeAdapter(tuple[str, ...])
+Key = tuple[str, int]
+"""A task and a sample."""
+
+
+def check_submission(benchmark: BenchmarkSet, path: Path, *, checksum: str) -> SubmissionReport:
+    """Return what became of every task and sample of a submission.
+
+    Only tasks of the practice split are scored, whoever computes it.
+
+    Args:
+        benchmark: With as many references as are known here.
+        path: A folder, or a zip of one.
+        checksum: Of the benchmark set.
+
+    Raises:
+        InvalidDocument: It can't be taken as a whole: there is no card or a wrong one, the zip is
+            broken, or it holds too much.
+    """
+    path = path.resolve()
+    if not path.exists():
+        raise InvalidDocument("submission", [(str(path), "is not there")])
+    with tempfile.TemporaryDirectory(prefix="arena-submission-") as scratch:
+        folder = Path(scratch) / "unpacked"
+        folder.mkdir()
+        request = {"what": "open", "path": str(path), "folder": str(folder)}
+        opened = sandbox.run(submitted_file.__name__, request, name=path.name, limits=_OPENING)
+        card = CARD.from_parts(opened["card"])
+        keys = [(task.name, n) for task in benchmark.tasks for n in range(1, card.samples + 1)]
+        by_key, strangers = _sort_files(_NAMES.validate_python(opened["files"]), keys)
+        alone = [names[0] for names in by_key.values() if len(names) == 1]
+        contents = _read_files(Path(opened["root"]), alone, Path(scratch) / "told")
+    checker = _Checker(contents=contents)
+    tasks = {task.name: task for task in benchmark.tasks}
+    return SubmissionReport(
+        benchmark=benchmark.name,
+        version=benchmark.version,
+        checksum=checksum,
+        card=card,
+        entries=tuple(checker.check(tasks[key[0]], key[1], by_key.get(key, ())) for key in keys),
+        remarks=tuple(f"{name} belongs to no task and sample: not read." for name in strangers),
+    )
+
+
+# Private
+
+
+def _sort_files(
+    names: Sequence[str], keys: Sequence[Key]
+) -> tuple[dict[Key, list[str]], list[str]]:
+    """Names by what they belong to, and those that belong to nothing."""
+    stems = {f"{task}--{sample}": (task, sample) for task, sample in keys}
+    stems |= {task: (task, sample) for task, sample in keys if sample == 1}
+    by_key: dict[Key, list[str]] = defaultdict(list)
+    strangers: list[str] = []
+    for name in names:
+        key = stems.get(name.partition(".")[0])
+        (strangers if key is None else by_key[key]).append(name)
+    return dict(by_key), strangers
+
+
+def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileContent]:
+    """What each file says; a process reads them in order, and the next where it ended.
+
+    Raises:
+        InvalidDocument: Too many end their process.
+    """
+    found: dict[str, FileContent] = {}
+    deaths = 0
+    while rest := names[len(found) :]:
+        problem = "was not read"
+        request = {"what": "read", "root": str(root), "files": list(rest), "told": str(told)}
+        told.write_bytes(b"")
+        try:
+            sandbox.run(submitted_file.__name__, request, name=rest[0])
+        except InvalidDocument as fault:
+            problem = "; ".join(text for _, text in fault.problems)
+        lines = told.read_bytes().split(b"\n")[:-1]
+        contents = [_content_in(line) for line in lines]
+        if not contents:  # it died over the first, which had all of its limits for itself
+            contents = [FileContent(problem=problem)]
+            deaths += 1
+        if deaths > MOST_DEATHS:
+            text = f"more than {MOST_DEATHS} files break the limits of their reader, the last"
+            raise InvalidDocument("submission", [("", f"{text} {rest[0]}: {problem}")])
+        found.update(zip(rest, contents, strict=False))
+    return found
+
+
+def _content_in(line: bytes) -> FileContent:
+    try:
+        return CONTENT.from_parts(parse_json(line, what="file", place=""))
+    except InvalidDocument as fault:
+        return FileContent(problem=str(fault))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Checker:
+    """Holds what files say against their tasks."""
+
+    contents: Mapping[str, FileContent]
+    sources: dict[tuple[str, str], ShownSource] = field(default_factory=dict)
+
+    def check(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
+        """What became of a task and sample, with its displacement."""
+        entry = self._read(task, sample, files)
+        if task.split is not Split.PRACTICE or task.reference is None:
+            return entry
+        return replace(entry, displacement=displacement(entry.modification, task.reference))
+
+    def _read(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
+        entry = SubmittedEntry(
+            task=task.name, sample=sample, status=EntryStatus.UNREADABLE, file=", ".join(files)
+        )
+        if not files:
+            return replace(entry, status=EntryStatus.MISSING, reason="there is no file for it")
+        if len(files) > 1:
+            return replace(entry, reason=f"{len(files)} files are for it; one is needed")
+        content = self.contents[files[0]]
+        if content.problem:
+            return replace(entry, reason=content.problem)
+        entry = replace(entry, notes=content.notes)
+        try:
+            modification, notes = self._change(task, content)
+            problems = list(SCENE.problems(apply(task.scene, modification)))
+        except InvalidModification as fault:
+            return replace(entry, reason=f"does not fit its scene: {fault}")
+        if problems:
+            return replace(entry, reason=str(InvalidDocument("modification", problems)))
+        if modification.is_empty and content.scene is None:
+            text = "an empty modification: the system declines"
+            return replace(entry, status=EntryStatus.REFUSED, reason=text)
+        return replace(
+            entry,
+            status=EntryStatus.READ,
+            notes=notes,
+            modification=number_added(task.scene, modification),
+        )
+
+    def _change(
+        self, task: BenchmarkTask, content: FileContent
+    ) -> tuple[Modification, tuple[str, ...]]:
+        if content.scene is None:
+            given = content.modification or Modification()
+            if content.format == lctgen.NAME:
+                placed = place_on_lanes(replace(task.scene, agents=given.added))
+                given = replace(given, added=placed.agents)
+            return given, content.notes
+        if content.format == "json":
+            return find_difference(task.scene, content.scene)
+        key = task.name, content.format
+        if key not in self.sources:
+            self.sources[key] = show_source(task, content.format)
+        shown = self.sources[key]
+        change, notes = find_difference(task.scene, content.scene, identify(shown, content))
+        return change, (*(note for note in content.notes if note not in shown.notes), *notes)
