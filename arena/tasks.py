@@ -6,14 +6,16 @@ from django.contrib.auth.models import User
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.results.exports.study_files import STUDY_FILES
 from arena.results.services.ratings import RATINGS
+from arena.scenarios.exports import BENCHMARK_FILES
 from augment.models import Scenario
 from augment.services.scenarios import pictures
 from augment.services.work import register
 from augment.tasks import send, sender
 
-register(RATINGS, SCENARIO_FILES, STUDY_FILES)
+register(RATINGS, BENCHMARK_FILES, SCENARIO_FILES, STUDY_FILES)
 
 send_snapshot = sender(RATINGS)
+send_benchmark_file = sender(BENCHMARK_FILES)
 send_scenario_file = sender(SCENARIO_FILES)
 send_study_file = sender(STUDY_FILES)
 

@@ -1,6 +1,6 @@
 """Rows of arena: people, tokens, invitations, studies, authors, votes, ratings, fault labels."""
 
-from arena.models.files import ScenarioFile, StudyFile
+from arena.models.files import BenchmarkFile, ScenarioFile, StudyFile
 from arena.models.people import ApiToken, Person, fresh_token
 from arena.models.ratings import (
     EarlyLook,
@@ -36,6 +36,7 @@ __all__ = [
     "OUTCOME_LETTERS",
     "ApiToken",
     "Authorship",
+    "BenchmarkFile",
     "EarlyLook",
     "EnrolledVoter",
     "Enrolment",

@@ -7,7 +7,7 @@ from django.db import models
 from django.db.models import F, Q
 
 from arena.models.studies import Study
-from augment.models import GenerationJob, Work
+from augment.models import Benchmark, GenerationJob, Work
 
 
 class WrittenFile(Work):
@@ -109,3 +109,19 @@ class ScenarioFile(WrittenFile):
             ready_is_stored("ready_scenario_file_is_stored"),
         )
         indexes = (models.Index(F("job"), F("format"), name="scenario_file_of_job"),)
+
+
+class BenchmarkFile(WrittenFile):
+    """The folder of a benchmark as one zip."""
+
+    FOLDER = "benchmark-files"
+    OWN = ("benchmark",)
+
+    benchmark = models.ForeignKey(Benchmark, on_delete=models.CASCADE, related_name="files")
+
+    class Meta:
+        ordering = ("benchmark", "-pk")
+        constraints = (
+            state_is_known("benchmark_file_state_is_known"),
+            ready_is_stored("ready_benchmark_file_is_stored"),
+        )

@@ -3,13 +3,14 @@
 import math
 import uuid
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import QuerySet
+from django.db.models import Count, Q, QuerySet
 
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Augmentation, Benchmark, Contestant, Scenario
+from augment.services.scenarios.benchmarks import Split, Stratum
 from augment.services.scenarios.scenes import type_choices
 
 
@@ -112,3 +113,46 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
     ]
     removed = parts.get("remove", ())
     return lines + [{"change": "removed", "agent": name, "x_m": None} for name in removed]
+
+
+# --- Benchmarks --------------------------------------------------------------------------------
+
+
+def list_benchmarks() -> QuerySet[Benchmark]:
+    """Return all of them with the number of their tasks, the newest version of a name first."""
+    return Benchmark.objects.annotate(
+        tasks=Count("items"), practice=Count("items", filter=Q(items__split=Split.PRACTICE))
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StratumCount:
+    """How many tasks of one stratum, or of all, are in each split."""
+
+    label: str
+    practice: int
+    test: int
+
+    @property
+    def total(self) -> int:
+        """Return both together."""
+        return self.practice + self.test
+
+
+def count_tasks(tasks: Iterable[tuple[str, str]]) -> list[StratumCount]:
+    """Return a line for each stratum, and one for all.
+
+    Args:
+        tasks: Split and stratum of each.
+    """
+    counts = Counter(tasks)
+    lines = [
+        StratumCount(
+            label=stratum.value.capitalize(),
+            practice=counts[Split.PRACTICE, stratum],
+            test=counts[Split.TEST, stratum],
+        )
+        for stratum in Stratum
+    ]
+    practice, test = (sum(getattr(line, name) for line in lines) for name in ("practice", "test"))
+    return [*lines, StratumCount(label="All", practice=practice, test=test)]

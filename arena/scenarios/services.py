@@ -10,6 +10,7 @@ from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.services.events import log_change
 from augment.services.scenarios import editing
+from augment.services.scenarios.benchmarks import refuse_handed_out
 from augment.services.scenarios.pictures import redraw
 from augment.services.scenarios.scenes import change_surroundings, derive_intent, set_wording
 
@@ -49,6 +50,7 @@ def why_not_editable(scenario: Scenario) -> str:
     """Return why nothing of a scenario can be changed now, empty where its drawing can."""
     try:
         editing.refuse_catalogue(scenario)
+        refuse_handed_out(scenario)
         _refuse_judged(scenario)
     except Conflict as conflict:
         return str(conflict)
@@ -86,7 +88,8 @@ def change_scenario(
 ) -> Scenario:
     """Set what a scenario says and draws.
 
-    Its drawing can be changed until an open study shows it, all else until something needs it.
+    Its drawing can be changed until an open study shows it, all else until something needs it;
+    nothing while a benchmark hands it out.
     The arguments are those of `add_scenario`.
 
     Raises:
@@ -97,6 +100,7 @@ def change_scenario(
     # Locked as an opening study locks it: none opens between the check and the change.
     row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
     editing.refuse_catalogue(row, "text")
+    refuse_handed_out(row)
     before, drawn = _state(row), row.reference
     row.reference = reference if isinstance(reference, dict) else None
     change_surroundings(row, keep_traffic=keep_traffic, density=density, goal=goal)
@@ -135,6 +139,7 @@ def _refuse_needed(row: Scenario | BaseScene, what: str) -> None:
             *(f"the job “{job.name}”" for job in row.jobs.order_by("pk")),
             *(f"the study “{study.name}”" for study in row.studies.order_by("pk")),
             *(f"its other wording “{other.slug}”" for other in row.paraphrases.order_by("slug")),
+            *(f"the benchmark {one.benchmark}" for one in row.benchmark_items.order_by("pk")),
             *(["drives"] if row.simulations.exists() else []),
         ]
     if needed_by:

@@ -2,7 +2,7 @@
 
 from django.urls import URLPattern, path
 
-from arena.scenarios.pages import augmentations, editor, scenarios, uploads
+from arena.scenarios.pages import augmentations, benchmarks, editor, scenarios, uploads
 
 urlpatterns: list[URLPattern] = [
     path("scenes/", uploads.scenes_page, name="scenes"),
@@ -34,6 +34,12 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/<uuid:code>/intent/", scenarios.set_intent, name="set-intent"),
     path("scenarios/<uuid:code>/read/", scenarios.read_instruction, name="intent-read"),
     path("scenarios/<uuid:code>/intent.json", scenarios.intent_file, name="intent"),
+    path("benchmarks/", benchmarks.benchmarks_page, name="benchmarks"),
+    path("benchmarks/new/", benchmarks.new_benchmark_page, name="benchmark-new"),
+    path("benchmarks/<uuid:code>/", benchmarks.benchmark_page, name="benchmark"),
+    path("benchmarks/<uuid:code>/write/", benchmarks.write_zip, name="benchmark-write"),
+    path("benchmarks/<uuid:code>/file/", benchmarks.download_benchmark, name="benchmark-file"),
+    path("benchmarks/<uuid:code>/retired/", benchmarks.retire_benchmark, name="benchmark-retired"),
     path("pictures/<slug:kind>/<uuid:code>.png", augmentations.picture, name="picture"),
     path("augmentations/<uuid:code>/", augmentations.augmentation_page, name="augmentation"),
     path("augmentations/<uuid:code>/correct/", editor.correct_page, name="correct"),

@@ -23,6 +23,9 @@ ADMIN, RESEARCHER, EXPERT = "admin", "researcher", "expert"
 STAFF = (ADMIN, RESEARCHER)
 """Who may know which contestant made what."""
 
+BENCHMARK_READERS = STAFF
+"""Who may look at benchmarks and get their folders, which hold no reference of the test."""
+
 BACKEND = "arena.people.queries.AccountBackend"
 FORM_METHODS = ["GET", "HEAD", "POST"]
 GONE = 410

@@ -16,7 +16,7 @@ register = template.Library()
 
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({""})),
-    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads"})),
+    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads", "benchmarks"})),
     "contestants": (_("Contestants"), frozenset({"contestants", "endpoints", "models"})),
     "jobs": (_("Jobs"), frozenset({"jobs", "augmentations", "drives"})),
     "studies": (_("Studies"), frozenset({"studies"})),

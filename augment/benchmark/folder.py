@@ -9,14 +9,13 @@ import json
 import stat
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import date
 from importlib import resources
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
-from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Split, Stratum
+from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Day, Split, Stratum
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.documents import MAX_BYTES, read_json
 from augment.formats.writers import WRITERS, writer_named
@@ -46,20 +45,6 @@ MOST_BYTES = 8 * MAX_BYTES
 """Of all documents of a folder together."""
 
 
-def read_day(given: object) -> object:
-    """Return the day of a text such as 2026-11-26; what is a day already stays.
-
-    Raises:
-        ValueError: It is neither.
-    """
-    if isinstance(given, date):
-        return given
-    if not isinstance(given, str) or len(given) != len("2026-11-26"):
-        raise ValueError(f"expected a day such as 2026-11-26, got {str(given)[:40]!r}")
-    return date.fromisoformat(given)
-
-
-Day = Annotated[date, BeforeValidator(read_day)]
 _Slug = Annotated[Text, Field(max_length=80, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 _Line = Annotated[Text, Field(min_length=1, max_length=200)]
 _Type = Annotated[Text, Field(max_length=40, pattern=r"^[a-z0-9]+([_-][a-z0-9]+)*$")]
@@ -129,7 +114,7 @@ def checksum(benchmark: BenchmarkSet) -> str:
 
 
 def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
-    """Return the files by their names in the folder; the same set gives the same bytes.
+    """Return the files by their names in the folder.
 
     Raises:
         InvalidDocument: A task breaks a rule of the format, or a practice task has no reference.

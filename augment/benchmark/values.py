@@ -80,7 +80,7 @@ def _read_date(given: object) -> object:
     raise ValueError("Input should be a date such as 2026-11-20")
 
 
-_Date = Annotated[date, BeforeValidator(_read_date)]
+Day = Annotated[date, BeforeValidator(_read_date)]
 _Name = Annotated[Text, Field(min_length=1, max_length=100, pattern=r"\S")]
 
 
@@ -114,7 +114,7 @@ class SubmissionCard:
     is_open: Yes
     samples: Annotated[Whole, Field(ge=1, le=MOST_SAMPLES)]
     cost_usd: Annotated[Real, Field(ge=0.0, le=1e9)] | None = None
-    made_on: _Date
+    made_on: Day
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

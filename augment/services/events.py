@@ -8,6 +8,7 @@ from django.utils import timezone
 
 from augment.models import (
     BaseScene,
+    Benchmark,
     Contestant,
     EndpointModel,
     Event,
@@ -50,7 +51,7 @@ def log_event(
 _KINDS = {BaseScene: "scene", EndpointModel: "model", GenerationJob: "job", SceneUpload: "upload"}
 """What the log calls rows whose own name is longer."""
 
-Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene)
+Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene, Benchmark)
 
 
 def log_change(

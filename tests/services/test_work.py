@@ -13,7 +13,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from arena import tasks
-from arena.models import ScenarioFile, StudyFile
+from arena.models import BenchmarkFile, ScenarioFile, StudyFile
 from arena.results.services.ratings import plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
@@ -31,6 +31,7 @@ from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import plan_probe
 from augment.services.judging import simulations
 from augment.services.running.intent_readings import plan_reading
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.work import KINDS, Lease, Settlement, WorkKind
 from tests.jobs.rows import NOON, add_scenario, launch, only_row
 from tests.processes import wait_until
@@ -49,6 +50,13 @@ def a_drive() -> Work:
     scenario, options = add_scenario("street"), simulations.Options()
     pks = simulations.plan_scenario(scenario=scenario, options=options)
     return Simulation.objects.get(pk=pks[0])
+
+
+def a_benchmark_file() -> Work:
+    request = BenchmarkRequest(
+        slug="s", title="S", scenarios=[add_scenario("street").slug], practice=0.0
+    )
+    return BenchmarkFile.objects.create(benchmark=make_benchmark(request))
 
 
 def a_reading() -> Work:
@@ -75,6 +83,7 @@ def a_probe() -> Work:
 
 WAITING: dict[str, Callable[[], Work]] = {
     "augmentation": lambda: only_row(launch()),
+    "benchmarkfile": a_benchmark_file,
     "intentreading": a_reading,
     "pairjudgement": a_judgement,
     "probe": a_probe,

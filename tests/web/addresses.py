@@ -10,7 +10,15 @@ from arena.models import Authorship
 from arena.people.links import invite, mark_author
 from arena.site.urls import urlpatterns
 from arena.studies.services.drafts import keep_draft
-from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
+from augment.models import (
+    Benchmark,
+    Endpoint,
+    EndpointModel,
+    SceneUpload,
+    Simulation,
+    UploadMoment,
+)
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from tests.web.cast import World
 
 STRANGER = str(uuid.uuid4())
@@ -66,6 +74,10 @@ def _code(name: str, word: str, here: World) -> object:
             )
             moment, _ = UploadMoment.objects.get_or_create(upload=upload)
             return upload.code if word == "uploads" else moment.code
+        case "benchmarks":
+            known = Benchmark.objects.first()
+            asked = BenchmarkRequest(slug="set", title="Set", scenarios=[scenario.slug])
+            return (known or make_benchmark(asked)).code
         case "invitations":
             return invite(study=here.study, expert=here.expert).invitation.code
         case "authorships":

@@ -26,13 +26,17 @@ PAGES = _table(
             "faults augmentation transcript contestants contestant endpoints endpoint "
             "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
             "scenarios-bulk prompts correct picture studies study preregistration "
-            "results results-tab"
+            "results results-tab benchmarks benchmark"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "
-            "import-votes study-new study-draft enrolment"
+            "import-votes study-new study-draft enrolment benchmark-new"
         ),
-        (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",
+        (
+            404,
+            404,
+            403,
+        ): "scenarios-export drive-file asked-image prompt-image study-file benchmark-file",
         (403, 403, 403): (
             "results-votes results-votes-file shown-picture results-export results-compare"
         ),
@@ -55,10 +59,11 @@ ACTIONS = _table(
             "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
-            "study-draft-discard study-hand-over first-step"
+            "study-draft-discard study-hand-over first-step benchmark-retired"
         ),
         (302, 302, 403): (
-            "scene-send upload-show scenarios-write study-write set-intent results-open"
+            "scene-send upload-show scenarios-write study-write set-intent results-open "
+            "benchmark-write"
         ),
         ADMIN: (
             "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"

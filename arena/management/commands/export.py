@@ -9,8 +9,10 @@ from arena.errors import ArenaError
 from arena.exports.files import write_whole
 from arena.management.exporting import KINDS, ExportedFile, add_kinds
 from arena.results.exports.study_folder import write_study
+from arena.scenarios.exports import write_benchmark
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
+from augment.services.scenarios.benchmarks import find_benchmark
 from augment.services.terminal import TerminalCommand
 
 
@@ -25,17 +27,25 @@ class Command(TerminalCommand):
         add_kinds(kinds)
         whole = kinds.add_parser("study", help="a whole study")
         whole.add_argument("study", help="its name or its code; it is closed")
-        whole.add_argument("--out", required=True, help="a new folder")
+        handed_out = kinds.add_parser("benchmark", help="what entrants of a benchmark get")
+        handed_out.add_argument("benchmark", help="its name, such as hard or hard@2, or its code")
+        for parser in (whole, handed_out):
+            parser.add_argument("--out", required=True, help="a new folder")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
-        if options["what"] != "study":
+        if options["what"] in KINDS:
             written = KINDS[options["what"]].write(options, self.stderr.write)
             self._deliver(written, options["out"])
             return
         try:
-            study = study_named(options["study"])
-            write_study(study, Path(options["out"]), say=self.stderr.write)
+            if options["what"] == "benchmark":
+                row = find_benchmark(options["benchmark"])
+                for warning in write_benchmark(row, Path(options["out"])):
+                    self.stderr.write(f"Warning: {warning}")
+            else:
+                study = study_named(options["study"])
+                write_study(study, Path(options["out"]), say=self.stderr.write)
         except (ArenaError, AugmentError, OSError) as error:
             raise CommandError(f"Nothing was exported. {error}") from error
         self.stderr.write(f"Wrote {options['out']}.")

@@ -15,18 +15,18 @@ from django.core.files import File
 from django.core.files.storage import default_storage
 from django.db import transaction
 
-from arena.models import ScenarioFile, Snapshot, Study, StudyFile
+from arena.models import BenchmarkFile, ScenarioFile, Snapshot, Study, StudyFile
 from arena.models.files import WrittenFile
 from arena.results.queries.votes import is_imported
 from augment.errors import Conflict, UnknownName
-from augment.models import GenerationJob
-from augment.services.events import log_event
+from augment.models import Benchmark, GenerationJob
+from augment.services.events import log_change
 from augment.services.work import Lease, Settlement, WorkKind
 
 Row = TypeVar("Row", bound=WrittenFile)
 Kind = StudyFile.Kind
 
-FOLDERS = (ScenarioFile.FOLDER, StudyFile.FOLDER)
+FOLDERS = (BenchmarkFile.FOLDER, ScenarioFile.FOLDER, StudyFile.FOLDER)
 """Where the contents lie, among the pictures; a backup leaves them out."""
 
 SHOWS_RESULTS = (Kind.STUDY, Kind.CONTACT_SHEET)
@@ -65,7 +65,7 @@ class FileWork(WorkKind[Row]):
 
 
 @transaction.atomic
-def ask_for(row: Row, owner: Study | GenerationJob, **after: str) -> Row:
+def ask_for(row: Row, owner: Study | GenerationJob | Benchmark, **after: str) -> Row:
     """Keep a row for a worker to write; one that waits already is asked for once more.
 
     Args:
@@ -77,13 +77,7 @@ def ask_for(row: Row, owner: Study | GenerationJob, **after: str) -> Row:
     if waiting is not None:
         return waiting
     row.save()
-    log_event(
-        actor=row.asked_by,
-        verb="ask for a file",
-        object_kind="study" if isinstance(owner, Study) else "job",
-        object_code=owner.code,
-        after=after,
-    )
+    log_change(owner, "ask for a file", row.asked_by, after=after)
     return row
 
 

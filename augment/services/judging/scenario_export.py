@@ -61,18 +61,33 @@ class Exported:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What anyone who passes the files on has to know."""
-        by_licence: dict[bool | None, list[str]] = defaultdict(list)
-        for source in self.sources:
-            by_licence[source.is_non_commercial].append(source.scene)
-        texts = {
-            True: "Made from data that must not be used commercially: %s; so must these files.",
-            None: "The licence of these sources is not known: %s.",
-        }
-        return tuple(
-            text % ", ".join(by_licence[bound])
-            for bound, text in texts.items()
-            if bound in by_licence
-        )
+        return list_warnings(self.sources)
+
+
+def list_warnings(sources: Iterable[Source]) -> tuple[str, ...]:
+    """Return what anyone has to know who passes on files that were made from these."""
+    by_licence: dict[bool | None, list[str]] = defaultdict(list)
+    for source in sources:
+        by_licence[source.is_non_commercial].append(source.scene)
+    texts = {
+        True: "Made from data that must not be used commercially: %s; so must these files.",
+        None: "The licence of these sources is not known: %s.",
+    }
+    return tuple(
+        text % ", ".join(by_licence[bound]) for bound, text in texts.items() if bound in by_licence
+    )
+
+
+def source_of(row: BaseScene) -> Source:
+    """Return a scene with what its provenance says of its licence."""
+    bound = bool(_NON_COMMERCIAL.search(row.provenance))
+    is_known = bound or row.provenance.lower().startswith(_OWN)
+    return Source(
+        scene=row.slug,
+        format=row.source,
+        provenance=row.provenance,
+        is_non_commercial=bound if is_known else None,
+    )
 
 
 def export_job(job: GenerationJob, *, file_format: str, contestant: str | None = None) -> Exported:
@@ -135,7 +150,7 @@ def export_rows(
         format=file_format,
         written=writer(cells),
         missing=tuple(missing),
-        sources=tuple(_source(scenes[slug]) for slug in sorted(scenes)),
+        sources=tuple(source_of(scenes[slug]) for slug in sorted(scenes)),
     )
 
 
@@ -157,15 +172,4 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         made_on=(row.finished_at or row.created_at).date(),
         recording=None if scene.recording is None else recording_from_document(scene.recording),
         source=source,
-    )
-
-
-def _source(row: BaseScene) -> Source:
-    bound = bool(_NON_COMMERCIAL.search(row.provenance))
-    is_known = bound or row.provenance.lower().startswith(_OWN)
-    return Source(
-        scene=row.slug,
-        format=row.source,
-        provenance=row.provenance,
-        is_non_commercial=bound if is_known else None,
     )

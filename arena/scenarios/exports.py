@@ -1,0 +1,71 @@
+"""Benchmarks as folders and zips: what entrants get."""
+
+import tempfile
+from pathlib import Path
+
+from django.core.files.base import ContentFile
+
+from arena.errors import ArenaError
+from arena.exports.files import zip_bytes
+from arena.jobs.exports.files import WARNING
+from arena.models import BenchmarkFile
+from arena.results.services.written_files import FileWork, MadeFile
+from augment.models import BaseScene, Benchmark
+from augment.services.judging.scenario_export import Source, list_warnings, source_of
+from augment.services.scenarios.benchmarks import benchmark_set, write_folder
+
+
+def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
+    """Write the folder: whole, or not at all. Returns what whoever passes it on has to know.
+
+    Args:
+        row: The benchmark.
+        out: A folder that is not there yet.
+
+    Raises:
+        ArenaError: The folder is there.
+        Conflict: The benchmark's scenarios have changed.
+        OSError: It can't be written; nothing is left of it.
+    """
+    if out.exists():
+        raise ArenaError(f"{out} is there already; an export overwrites nothing.")
+    files, sources = _files_of(row)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as folder:
+        beside = Path(folder, out.name)
+        for name, content in files.items():
+            (beside / name).parent.mkdir(parents=True, exist_ok=True)
+            (beside / name).write_bytes(content)
+        beside.rename(out)
+    return list_warnings(sources)
+
+
+def _files_of(row: Benchmark) -> tuple[dict[str, bytes], list[Source]]:
+    """Return the files, with a warning where one is due, and where their scenes come from."""
+    files = write_folder(benchmark_set(row))
+    scenes = BaseScene.objects.filter(scenarios__benchmark_items__benchmark=row)
+    sources = [source_of(scene) for scene in scenes.defer("document", "recording").distinct()]
+    if warnings := list_warnings(sources):
+        files[WARNING] = ("\n".join(warnings) + "\n").encode()
+    return files, sources
+
+
+class BenchmarkFiles(FileWork[BenchmarkFile]):
+    """Zips of benchmarks."""
+
+    model = BenchmarkFile
+    related = ("benchmark",)
+
+    def make(self, row: BenchmarkFile, folder: Path) -> MadeFile:
+        """Return the folder as a zip."""
+        files, sources = _files_of(row.benchmark)
+        marked = any(source.is_non_commercial for source in sources)
+        return MadeFile(
+            name=f"{row.benchmark.slug}-{row.benchmark.version}{'-non-commercial' * marked}.zip",
+            content=ContentFile(zip_bytes(files)),
+            warnings=list_warnings(sources),
+            marked=marked,
+        )
+
+
+BENCHMARK_FILES = BenchmarkFiles()

@@ -1,0 +1,116 @@
+"""Pages of benchmarks: what there is to enter, and making a new version."""
+
+import uuid
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.core.files.storage import default_storage
+from django.db import transaction
+from django.http import FileResponse, Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+
+from arena import tasks
+from arena.exports.files import CONTENT_TYPE
+from arena.models import BenchmarkFile
+from arena.people.queries import role_of
+from arena.results.services.written_files import ask_for
+from arena.scenarios.queries import count_tasks, list_benchmarks
+from arena.site.access import ADMIN, BENCHMARK_READERS, STAFF, act_for, form_for, page_for, user_of
+from arena.site.acts import refusals_in, send_later
+from arena.site.forms import RequestForm
+from augment.models import Benchmark
+from augment.services.events import retire
+from augment.services.inputs import inputs_of, read_request
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark, plan_benchmark
+
+
+class BenchmarkForm(RequestForm):
+    """A new version; scenarios are words, as commands take them."""
+
+    inputs = inputs_of(BenchmarkRequest)
+    scenarios = forms.CharField(
+        max_length=60_000, help_text=next(one.help for one in inputs if one.name == "scenarios")
+    )
+
+    def clean_scenarios(self) -> list[str]:
+        """Return the words."""
+        return str(self.cleaned_data["scenarios"]).split()
+
+
+@page_for(*BENCHMARK_READERS)
+def benchmarks_page(request: HttpRequest) -> HttpResponse:
+    """List every version."""
+    return render(request, "benchmarks/list.html", {"rows": list_benchmarks()})
+
+
+@form_for(ADMIN)
+def new_benchmark_page(request: HttpRequest) -> HttpResponse:
+    """Choose scenarios, see how many of which kind they are, make the version."""
+    form, more = BenchmarkForm(request.POST or None), dict[str, Any]()
+    if "estimate" in request.POST:
+        form.is_valid()
+        for name in ("slug", "title"):
+            form.errors.pop(name, None)
+        if not form.errors:
+            with refusals_in(form, "scenarios"):
+                asked = read_request(BenchmarkRequest, form.cleaned_data, slug="", title="")
+                planned = plan_benchmark(asked)
+                more["counts"] = count_tasks((one.split, one.stratum) for one in planned)
+    elif form.is_bound and form.is_valid():
+        with refusals_in(form, "scenarios"), transaction.atomic():
+            row = make_benchmark(
+                read_request(BenchmarkRequest, form.cleaned_data), user_of(request)
+            )
+            _ask_for_zip(request, row)
+            messages.success(request, f"{row} is made; a worker writes its folder.")
+            return redirect("benchmark", code=row.code)
+    status = 422 if form.errors and "estimate" not in request.POST else 200
+    return render(request, "benchmarks/new.html", {"form": form, **more}, status=status)
+
+
+@page_for(*BENCHMARK_READERS)
+def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show how many tasks there are of which kind, and where to get them."""
+    row = get_object_or_404(Benchmark.objects.select_related("made_by"), code=code)
+    items = row.items.select_related("scenario").defer("scenario__reference")
+    context = {
+        "benchmark": row,
+        "items": items,
+        "counts": count_tasks((one.split, one.stratum) for one in items),
+        "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
+        "file": row.files.order_by("pk").last(),
+        "is_staff": role_of(request.user) in STAFF,
+    }
+    return render(request, "benchmarks/benchmark.html", context)
+
+
+@act_for(*BENCHMARK_READERS, back="benchmark")
+def write_zip(request: HttpRequest, code: uuid.UUID) -> None:
+    """Leave the folder to a worker; twice does no harm."""
+    with transaction.atomic():
+        _ask_for_zip(request, get_object_or_404(Benchmark, code=code))
+        messages.success(request, "A worker writes the folder; it is offered here when ready.")
+
+
+def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:
+    file = ask_for(BenchmarkFile(benchmark=row, asked_by=user_of(request)), row)
+    send_later(request, tasks.send_benchmark_file, file.pk)
+
+
+@page_for(*BENCHMARK_READERS)
+def download_benchmark(request: HttpRequest, code: uuid.UUID) -> FileResponse:
+    """Answer with the newest zip that is ready."""
+    ready = BenchmarkFile.objects.filter(benchmark__code=code, state=BenchmarkFile.State.READY)
+    row = ready.order_by("pk").last()
+    if row is None or not default_storage.exists(row.stored):
+        raise Http404
+    content = default_storage.open(row.stored)
+    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+
+
+@act_for(ADMIN, back="benchmark")
+def retire_benchmark(request: HttpRequest, code: uuid.UUID) -> None:
+    """Retire a version, or take that back."""
+    row = get_object_or_404(Benchmark, code=code)
+    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")

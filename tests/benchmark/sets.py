@@ -1,0 +1,75 @@
+"""A small benchmark with one of everything, and its folder on disk."""
+
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from augment.benchmark.folder import write_folder
+from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Split, Stratum
+from augment.scene.entities import Modification
+from augment.scene.recording import Recording, Track
+from tests.scenes import scene, vehicle
+
+SECRET_M = 43.2187654
+"""A number that stands in references of the test alone."""
+
+CAR = vehicle("Agent2", 20.0, 0.0)
+RECORDING = Recording(
+    times_s=np.array([0.0, 0.5, 1.0]),
+    ego=np.array([[0.0, 0.0, 0.0, 8.0], [4.0, 0.0, 0.0, 8.0], [8.0, 0.0, 0.0, 8.0]]),
+    tracks=(
+        Track(
+            agent_id="Agent2",
+            type=CAR.type,
+            length_m=CAR.length_m,
+            width_m=CAR.width_m,
+            states=np.array([[20.0, 0.0, 0.0, 0.0]] * 2 + [[np.nan] * 4]),
+        ),
+    ),
+)
+
+
+def task(name: str, **changes: Any) -> BenchmarkTask:
+    given: dict[str, Any] = {
+        "name": name,
+        "type": "nudge_around_parked_vehicle",
+        "instruction": "Park a car ahead – „weit“ vorn.",
+        "language": "en",
+        "split": Split.TEST,
+        "stratum": Stratum.HARD,
+        "scene": scene(name=f"{name}-scene", agents=(CAR,)),
+        "reference": Modification(added=(vehicle("Agent3", SECRET_M, 0.25, 0.1),)),
+    }
+    return BenchmarkTask(**(given | changes))
+
+
+def small_set() -> BenchmarkSet:
+    """A practice task, one of the test with a recording, its other wording, a wish unmet."""
+    shown = Modification(added=(vehicle("Agent3", 31.5, -1.0),), removed=("Agent2",))
+    tasks = (
+        task("near", split=Split.PRACTICE, stratum=Stratum.EASY, reference=shown),
+        task("far", recording=RECORDING),
+        task("far-p1", language="de", recording=RECORDING, paraphrase_of="far"),
+        task("no-way", type="cut_in", reference=Modification(), keeps_traffic=False),
+    )
+    made_on = date(2026, 11, 26)
+    return BenchmarkSet(name="small", title="Small", version=2, made_on=made_on, tasks=tasks)
+
+
+def handed_out(benchmark: BenchmarkSet) -> BenchmarkSet:
+    """The same without the references of the test."""
+    tasks = [
+        one if one.split is Split.PRACTICE else replace(one, reference=None)
+        for one in benchmark.tasks
+    ]
+    return replace(benchmark, tasks=tuple(tasks))
+
+
+def on_disk(folder: Path, benchmark: BenchmarkSet) -> Path:
+    for name, content in write_folder(benchmark).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return folder
