@@ -207,6 +207,12 @@ KINDS: dict[str, ExportKind] = {
         _write_rating,
         _format([*RATING_FILES["leaderboard"].formats, "zip"]) | _OF_RATING,
     ),
+    "agreement": ExportKind(
+        "study",
+        RATING_FILES["agreement"].help,
+        _write_rating,
+        _format(RATING_FILES["agreement"].formats) | _OF_RATING,
+    ),
     "votes": ExportKind(
         "study", RATING_FILES["votes"].help, _write_votes, _format(VOTE_FORMATS) | _OF_RATING
     ),

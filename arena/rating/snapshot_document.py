@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
+from arena.rating.agreement import AgreementLine
 from arena.rating.ranking import PairP
 from arena.rating.reliability import Agreement, Rater, Repeats
 from arena.rating.side import SideBias
@@ -219,6 +220,7 @@ class Results:
     Attributes:
         models: What models contestants ask, by slug.
         judges: Pseudonyms by code.
+        agreement: How metrics agree with the decided votes; none for votes from a file.
     """
 
     version: int = 0
@@ -230,6 +232,7 @@ class Results:
     cost: tuple[ScenarioCost, ...] = ()
     models: dict[str, str] = field(default_factory=dict)
     judges: dict[str, str] = field(default_factory=dict)
+    agreement: tuple[AgreementLine, ...] = field(default=(), metadata=_SINCE_5)
 
 
 def read_results(document: Mapping[str, Any]) -> Results:

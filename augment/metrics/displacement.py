@@ -38,6 +38,11 @@ than 0 m and 2 m. Without it the order of the objects would decide. A distance o
 d (1 + 1e-6 d), which changes nothing else."""
 
 
+MISS_M = 10.0
+"""What a missing or surplus object counts where one number says how far off a change is, and a
+matched one at most: about a junction's width, beyond which it stands somewhere else."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Match:
     """A generated object and the one of the reference that it stands for.
@@ -75,6 +80,13 @@ class Displacement:
     def mean_m(self) -> float | None:
         """The mean error, None where nothing is matched."""
         return float(np.mean(self.distances_m)) if self.matches else None
+
+    @property
+    def error_m(self) -> float:
+        """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any."""
+        errors_m = [min(distance, MISS_M) for distance in self.distances_m]
+        errors_m += [MISS_M] * (len(self.missing) + len(self.surplus))
+        return float(np.mean(errors_m)) if errors_m else 0.0
 
 
 def displacement(generated: Modification | None, reference: Modification) -> Displacement:

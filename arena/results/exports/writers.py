@@ -28,6 +28,8 @@ from arena.exports.formats import (
 from arena.models import Snapshot
 from arena.rating.lines import align_cells, caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
+from arena.results.exports.agreement import FORMATS as AGREEMENT_FORMATS
+from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import (
     IN_FILES,
@@ -189,6 +191,8 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
     files["raters.csv"] = csv_of(RATERS, results.trust.raters)
+    if results.agreement:
+        files["agreement.csv"] = AGREEMENT_FORMATS["csv"].write(snapshot)
     if frozen := snapshot.study.preregistration.encode():
         files[FILE_NAME] = frozen
     if table.hypotheses:
@@ -213,6 +217,11 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
 CHARTS = ("pairs", "types", "displacement", "elo-usd", "elo-tokens")
 RATING_FILES = {
     "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
+    "agreement": Export(
+        AGREEMENT_FORMATS,
+        agreement_rating,
+        "which metric agrees with experts, of the newest rating",
+    ),
     "votes": Export(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),
     "all": Export(formats(zip=zip_bytes), bundle_files),
     **{name: Export(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},

@@ -9,6 +9,8 @@ from arena.jobs.exports.driving import shown_driving
 from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
 from arena.people.queries import natural_order
+from arena.rating.agreement import agreement_sentence
+from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import PairRecord, PanelRater
 from arena.rating.verdict import verdict
@@ -19,7 +21,7 @@ from arena.results.exports.tables import (
     for_experts,
     leaderboard_table,
 )
-from arena.results.pages.plots import plot
+from arena.results.pages.plots import PlacedInterval, plot
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
@@ -169,6 +171,23 @@ def _counts(rater: PanelRater) -> Context:
     }
 
 
+def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Which metric agrees with experts, on all decided votes and by scenario type."""
+    lines = snapshot.results.agreement
+    whole = [line for line in lines if not line.type]
+    return {
+        "lines": [(line, _mark(line.share)) for line in whole],
+        "ticks": [(f"{number} %", number) for number in (0, 50, 100)],
+        "decided": whole[-1].decided if whole else 0,
+        "sentence": agreement_sentence(lines),
+        "by_type": [
+            (part.label, [line for line in lines if line.type == part.type])
+            for part in snapshot.results.types
+            if len(lines) > len(whole)
+        ],
+    }
+
+
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
     lines = _numbered(table, {line.slug: line for line in snapshot.results.displacement})
@@ -223,6 +242,7 @@ TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
     "pairs": fill_pairs,
     "types": fill_types,
     "raters": fill_raters,
+    "agreement": fill_agreement,
     "displacement": fill_displacement,
     "driving": fill_driving,
     "cost": fill_cost,
@@ -233,6 +253,17 @@ FOR_EXPERTS = ("table", "pairs", "types")
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _mark(share: Estimate) -> PlacedInterval | None:
+    """A share in percent on an axis to 100; without an interval a point."""
+    if share.value is None:
+        return None
+    lower, value, upper = (
+        round(100.0 * (share.value if bound is None else bound), 2)
+        for bound in (share.lower, share.value, share.upper)
+    )
+    return PlacedInterval(lower=lower, rating=value, upper=upper)
 
 
 def _numbered(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:

@@ -32,6 +32,7 @@ from arena.results.queries.votes import (
     vote_set,
 )
 from arena.results.services import analysis
+from arena.results.services.agreement import rater_agreement
 from arena.results.services.analysis import VoteArrays, vote_arrays
 from arena.results.services.settled import settled_remark
 from arena.results.services.trust import board_remarks, trust
@@ -388,4 +389,5 @@ def _results(
             if competitor.contestant is not None
         },
         judges={vote.judge: vote.judge_name for vote in votes.counted},
+        agreement=() if from_file else rater_agreement(study, votes.counted),
     )

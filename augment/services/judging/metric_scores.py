@@ -1,0 +1,102 @@
+"""One number an augmentation by each metric, more being better: what votes are held against."""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from augment.checks import Ground, Severity
+from augment.checks.registry import check_against_intent
+from augment.errors import InvalidDocument, InvalidModification
+from augment.models import Augmentation, Contestant, Scenario, Simulation
+from augment.scene.codec import modification_from_document
+from augment.services.judging.displacement import of_rows
+from augment.services.judging.simulations import SCORES, Options
+from augment.services.scenarios.scenes import intent_of, scene_of
+
+SAME_M = 0.15
+"""Displacements that differ by no more are equal: objects so near each other look the same."""
+
+UNREADABLE_OR_REFUSED = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricScores:
+    """The scores of augmentations by one metric.
+
+    Attributes:
+        name: As people read it.
+        by_code: More is better; augmentations that the metric knows nothing of are missing.
+        tolerance: Scores that differ by no more are equal.
+    """
+
+    name: str
+    by_code: dict[str, float]
+    tolerance: float = 0.0
+
+
+def metric_scores(ids: Collection[int]) -> tuple[MetricScores, ...]:
+    """Return the scores of the augmentations with these primary keys; three queries."""
+    return (_displacement(ids), _checks(ids), *_driving(ids))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _displacement(ids: Collection[int]) -> MetricScores:
+    """Less is better; none for the reference itself, which would be held against itself."""
+    scores = {
+        str(one.row.code): -one.displacement.error_m
+        for one in of_rows(ids)
+        if one.displacement is not None and one.row.contestant.kind != Contestant.Kind.REFERENCE
+    }
+    return MetricScores(name="Displacement", by_code=scores, tolerance=SAME_M)
+
+
+def _checks(ids: Collection[int]) -> MetricScores:
+    """Fewer wrong findings are better, then fewer doubtful ones; no answer is worst."""
+    rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
+    by_scenario: defaultdict[Scenario, list[Augmentation]] = defaultdict(list)
+    for row in rows.select_related("scenario__base_scene").defer(
+        "scenario__base_scene__recording", "scenario__reference"
+    ):
+        by_scenario[row.scenario].append(row)
+    scores: dict[str, float] = {}
+    for scenario, own in by_scenario.items():
+        scores |= _check_scenario(scenario, own)
+    return MetricScores(name="Checks", by_code=scores)
+
+
+def _check_scenario(scenario: Scenario, rows: Iterable[Augmentation]) -> dict[str, float]:
+    try:
+        ground, intent = Ground.of(scene_of(scenario)), intent_of(scenario)
+    except InvalidDocument:
+        return {}
+    scores = {}
+    for row in rows:
+        if row.state in UNREADABLE_OR_REFUSED:
+            scores[str(row.code)] = -math.inf
+            continue
+        try:
+            change = modification_from_document(row.modification)
+            findings = check_against_intent(ground, change, intent)
+        except (InvalidDocument, InvalidModification):
+            continue
+        found = Counter(finding.severity for finding in findings)
+        scores[str(row.code)] = -found[Severity.WRONG] - min(found[Severity.DOUBTFUL], 99) / 100
+    return scores
+
+
+def _driving(ids: Collection[int]) -> list[MetricScores]:
+    """The lower the ego scores, the better: a change is to make a scene harder to drive."""
+    drives = Options().of(Simulation.objects.filter(augmentation__in=ids))
+    done = drives.filter(state=Simulation.State.DONE)
+    rows = list(done.values_list("augmentation__code", *SCORES.values()))
+    names = {"nuplan": "Driving score (nuPlan)", "interplan": "Driving score (interPlan)"}
+    return [
+        MetricScores(
+            name=names[kind],
+            by_code={str(row[0]): -row[place] for row in rows if row[place] is not None},
+        )
+        for place, kind in enumerate(SCORES, start=1)
+    ]
