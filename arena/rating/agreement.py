@@ -104,6 +104,7 @@ class AgreementLine:
     """How one rater agrees with the decided votes.
 
     Attributes:
+        question: What the experts were asked, empty where nobody says.
         type: The scenario type of the votes, empty for all of them.
         share: From 0 to 1, a tie of the rater as a half, with an interval clustered by expert and
             scenario.
@@ -115,6 +116,7 @@ class AgreementLine:
 
     rater: str
     role: Role = Role.RATER
+    question: str = ""
     type: str = ""
     share: Estimate
     agrees: int

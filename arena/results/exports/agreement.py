@@ -12,7 +12,7 @@ from arena.exports.formats import (
     sheet_of,
     table_formats,
 )
-from arena.models import Snapshot
+from arena.models import Question, Snapshot
 from arena.rating.agreement import AgreementLine, Role, agreement_sentence, share_text
 from arena.rating.lines import UNKNOWN, escape, latex_table
 from augment.errors import Conflict
@@ -24,7 +24,7 @@ METHOD = (
 )
 _COUNTS = ("decided", "agrees", "ties", "differs", "unknown", "experts", "scenarios")
 COLUMNS: Columns = {
-    **{name: (name, TEXT) for name in ("rater", "role", "type")},
+    **{name: (name, TEXT) for name in ("question", "rater", "role", "type")},
     **{
         name: (f"share.{part}", NUMBER)
         for name, part in (("share", "value"), ("lower", "lower"), ("upper", "upper"))
@@ -49,13 +49,14 @@ def agreement_rating(snapshot: Snapshot) -> Snapshot:
 
 
 def agreement_sheet(snapshot: Snapshot) -> Sheet:
-    """Return one row a rater, first on all votes, then by scenario type."""
+    """Return one row a rater: by question, first on all votes, then by scenario type."""
+    asked = agreement_by_question(snapshot)
     facts = {
         "study": snapshot.study.name,
         "rating": str(snapshot.code),
         "simulated": snapshot.includes_simulated,
         "early": snapshot.is_early,
-        "answer": agreement_sentence(snapshot.results.agreement),
+        "answers": {question: agreement_sentence(lines) for question, lines in asked.items()},
         "method": METHOD,
     }
     lines = snapshot.results.agreement
@@ -63,19 +64,17 @@ def agreement_sheet(snapshot: Snapshot) -> Sheet:
 
 
 def agreement_latex(snapshot: Snapshot) -> bytes:
-    """Return the lines on all votes."""
-    lines = [line for line in snapshot.results.agreement if not line.type]
-    marks = {"simulated": snapshot.includes_simulated, "early": snapshot.is_early}
-    words = [word for word, holds in marks.items() if holds]
-    caption = _caption(lines) + (f" ({', '.join(words)})" if words else "")
-    text = latex_table(
-        ([escape(line.rater), share_text(line.share), *map(str, _counts(line))] for line in lines),
-        heads=("Rater", "Agrees (95% CI)", "Votes", "Called equal", "No value"),
-        comments=(f"{snapshot.study.name}, rating {snapshot.code}: {METHOD}",),
-        caption=caption,
-        label="tab:agreement",
-    )
-    return text.encode()
+    """Return a table a question, of the lines on all votes."""
+    asked = agreement_by_question(snapshot)
+    return "\n".join(_latex(snapshot, name, lines) for name, lines in asked.items()).encode()
+
+
+def agreement_by_question(snapshot: Snapshot) -> dict[str, list[AgreementLine]]:
+    """Return the lines of a rating by what was asked, the primary question first."""
+    asked: dict[str, list[AgreementLine]] = {}
+    for line in snapshot.results.agreement:
+        asked.setdefault(line.question, []).append(line)
+    return asked
 
 
 FORMATS = table_formats(agreement_sheet) | formats(latex=agreement_latex)
@@ -84,20 +83,32 @@ FORMATS = table_formats(agreement_sheet) | formats(latex=agreement_latex)
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _latex(snapshot: Snapshot, question: str, lines: Sequence[AgreementLine]) -> str:
+    whole = [line for line in lines if not line.type]
+    marks = {"simulated": snapshot.includes_simulated, "early": snapshot.is_early}
+    words = [word for word, holds in marks.items() if holds]
+    caption = f"{Question(question).label} {_caption(whole)}"
+    return latex_table(
+        ([escape(line.rater), share_text(line.share), *map(str, _counts(line))] for line in whole),
+        heads=("Rater", "Agrees (95 % CI)", "Votes", "Called equal", "No value"),
+        comments=(f"{snapshot.study.name}, rating {snapshot.code}: {METHOD}",),
+        caption=escape(caption + (f" ({', '.join(words)})" if words else "")),
+        label=f"tab:agreement-{question}",
+    )
+
+
 def _counts(line: AgreementLine) -> tuple[object, ...]:
-    ties = UNKNOWN if line.role is Role.COIN else line.ties
-    return line.known, ties, line.unknown
+    return line.known, UNKNOWN if line.role is Role.COIN else line.ties, line.unknown
 
 
 def _caption(lines: Sequence[AgreementLine]) -> str:
-    """What is shown as TeX, on how many votes and clusters, beside ceiling and floor."""
+    """What is shown, on how many votes and clusters, beside ceiling and floor."""
     experts, coin = (
         next(line for line in lines if line.role is role) for role in (Role.EXPERTS, Role.COIN)
     )
-    said = (
-        "Agreement with the experts: share of decided votes with 95 % confidence intervals "
-        f"clustered by expert and scenario ({coin.decided} votes of {coin.experts} experts on "
-        f"{coin.scenarios} scenarios). Ceiling: experts with each other "
-        f"{share_text(experts.share)}; floor: a coin {share_text(coin.share)}."
+    return (
+        "Share of decided votes on which a rater agrees with the expert, with 95 % confidence "
+        f"intervals clustered by expert and scenario ({coin.decided} votes, {coin.experts} "
+        f"experts, {coin.scenarios} scenarios). Ceiling: experts with each other, "
+        f"{share_text(experts.share)}; floor: a coin, {share_text(coin.share)}."
     )
-    return escape(said)

@@ -7,13 +7,14 @@ from typing import Any
 
 from arena.jobs.exports.driving import shown_driving
 from arena.jobs.queries import shown_augmentations
-from arena.models import Snapshot
+from arena.models import Question, Snapshot
 from arena.people.queries import natural_order
 from arena.rating.agreement import agreement_sentence
 from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import PairRecord, PanelRater
 from arena.rating.verdict import verdict
+from arena.results.exports.agreement import agreement_by_question
 from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import (
     EARLY_LOOK,
@@ -172,19 +173,23 @@ def _counts(rater: PanelRater) -> Context:
 
 
 def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Which metric agrees with experts, on all decided votes and by scenario type."""
-    lines = snapshot.results.agreement
-    whole = [line for line in lines if not line.type]
+    """Which metric agrees with experts: each question's decided votes, and by scenario type."""
+    labels = {part.type: part.label for part in snapshot.results.types}
     return {
-        "lines": [(line, _mark(line.share)) for line in whole],
-        "ticks": [(f"{number} %", number) for number in (0, 50, 100)],
-        "decided": whole[-1].decided if whole else 0,
-        "sentence": agreement_sentence(lines),
-        "by_type": [
-            (part.label, [line for line in lines if line.type == part.type])
-            for part in snapshot.results.types
-            if len(lines) > len(whole)
+        "questions": [
+            {
+                "label": Question(question).label,
+                "sentence": agreement_sentence(lines),
+                "lines": [(line, _mark(line.share)) for line in lines if not line.type],
+                "by_type": [
+                    (label, [line for line in lines if line.type == name])
+                    for name, label in labels.items()
+                    if lines[-1].type
+                ],
+            }
+            for question, lines in agreement_by_question(snapshot).items()
         ],
+        "ticks": [(f"{number} %", number) for number in (0, 50, 100)],
     }
 
 

@@ -1,9 +1,10 @@
 """Which metrics agree with the votes of a study."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from dataclasses import replace
 
 from arena.jobs.queries import shown_augmentations
-from arena.models import Study
+from arena.models import Snapshot, Study
 from arena.rating.agreement import (
     AgreementLine,
     NamedRater,
@@ -11,23 +12,31 @@ from arena.rating.agreement import (
     measure_agreement,
     rater_by_scores,
 )
-from arena.results.queries.votes import Judged
+from arena.results.queries.votes import COUNTED, Filters, Judged, current_votes, is_imported
 from arena.results.services.analysis import SCORES
 from augment.services.judging.metric_scores import metric_scores
 
 
-def rater_agreement(study: Study, votes: Sequence[Judged]) -> tuple[AgreementLine, ...]:
-    """Measure how metrics agree with the votes that count.
+def rater_agreement(snapshot: Snapshot) -> tuple[AgreementLine, ...]:
+    """Measure how metrics agree with the votes of a rating, for each question of its study.
 
     Args:
-        study: Its augmentations are scored as they are now.
-        votes: Those on pairs that nobody was shown say nothing.
+        snapshot: Says which votes count. Augmentations are scored as they are now; those of votes
+            from a file are not known.
     """
-    return measure_agreement(pair_votes(votes), study_raters(study))
+    study, filters = snapshot.study, Filters.of_document(snapshot.filters)
+    if is_imported(study):
+        return ()
+    raters, lines = study_raters(study), []
+    for question in study.questions:
+        asked = replace(filters, question=question)
+        votes = pair_votes(current_votes(study, asked, snapshot.last_vote))
+        lines += [replace(line, question=question) for line in measure_agreement(votes, raters)]
+    return tuple(lines)
 
 
-def pair_votes(votes: Sequence[Judged]) -> list[PairVote]:
-    """Return the votes that people gave on pictures."""
+def pair_votes(votes: Iterable[Judged]) -> list[PairVote]:
+    """Return the votes that count."""
     return [
         PairVote(
             judge=vote.judge,
@@ -38,7 +47,7 @@ def pair_votes(votes: Sequence[Judged]) -> list[PairVote]:
             preference=int(2.0 * SCORES[vote.outcome] - 1.0),
         )
         for vote in votes
-        if vote.left_code
+        if vote.mark == COUNTED
     ]
 
 

@@ -389,5 +389,5 @@ def _results(
             if competitor.contestant is not None
         },
         judges={vote.judge: vote.judge_name for vote in votes.counted},
-        agreement=() if from_file else rater_agreement(study, votes.counted),
+        agreement=rater_agreement(snapshot),
     )

@@ -1,0 +1,132 @@
+"""Which metric agrees with the experts of the demo's study, whose simulated votes are known."""
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from django.urls import reverse
+
+from arena.models import Snapshot, Vote
+from arena.rating.agreement import AgreementLine, Role, measure_agreement, rater_by_pairs
+from arena.results.exports.writers import RATING_FILES
+from arena.results.queries.votes import Filters, current_votes
+from arena.results.services.agreement import pair_votes
+from arena.site.demo import RATED, SIMULATED_EXPERTS, hold_study
+from augment.models import Augmentation, Contestant
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import Modification
+from tests.scenes import vehicle
+from tests.study_rows import contestant, expert, picture, scenario
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+PLACES = 24
+OFF_M = dict(zip(RATED, (0.0, 0.8, 1.6, 4.0), strict=True))
+"""How far from the reference each contestant places its car, on the average scenario."""
+
+
+def document(ahead_m: float) -> dict[str, object]:
+    return modification_to_document(Modification(added=(vehicle("Agent2", ahead_m, -0.7),)))
+
+
+@pytest.fixture
+def rating() -> Snapshot:
+    kinds = {RATED[0]: Contestant.Kind.REFERENCE}
+    makers = {slug: contestant(slug, kinds.get(slug, Contestant.Kind.RULE)) for slug in RATED}
+    for number in range(PLACES):
+        place = scenario(f"place-{number:02d}")
+        place.reference = document(20.0 + number)
+        place.save()
+        for slug, maker in makers.items():
+            off_m = OFF_M[slug] * (0.5 + number / PLACES)
+            row = picture(place, maker)
+            Augmentation.objects.filter(pk=row.pk).update(
+                modification=document(20.0 + number + off_m)
+            )
+    for username in SIMULATED_EXPERTS:
+        expert(username, is_simulated=True)
+    study = hold_study(scenarios=[f"place-{number:02d}" for number in range(PLACES)])
+    return study.snapshots.get()
+
+
+def lines_of(rating: Snapshot) -> dict[str, AgreementLine]:
+    return {line.rater: line for line in rating.results.agreement}
+
+
+def decided(rating: Snapshot) -> Iterator[tuple[Augmentation, Augmentation]]:
+    """Who won and who lost, straight from the rows."""
+    rows = Vote.objects.filter(matchup__study=rating.study).exclude(winner=None)
+    for vote in rows.select_related("shown_left__contestant", "shown_right__contestant"):
+        sides = [vote.shown_left, vote.shown_right]
+        yield tuple(sorted(sides, key=lambda side: side.pk != vote.winner_id))  # type: ignore[misc]
+
+
+def test_displacement_and_the_ceiling_are_those_counted_from_the_rows(rating: Snapshot) -> None:
+    lines, votes = lines_of(rating), list(decided(rating))
+    slugs = [(won.contestant.slug, lost.contestant.slug) for won, lost in votes]
+    known = [pair for pair in slugs if RATED[0] not in pair]
+    hits = sum(OFF_M[won] < OFF_M[lost] for won, lost in known)
+    found = lines["Displacement"]
+    assert (found.agrees, found.differs, found.unknown) == (
+        *(hits, len(known) - hits),
+        len(votes) - len(known),
+    )
+    assert found.share.value == pytest.approx(hits / len(known))
+    said: dict[frozenset[int], list[tuple[int, int]]] = {}
+    for vote in Vote.objects.filter(matchup__study=rating.study):
+        pair = frozenset((vote.shown_left_id, vote.shown_right_id))
+        said.setdefault(pair, []).append((vote.expert_id, vote.winner_id or 0))
+    means = []
+    for votes_on_pair in said.values():
+        for judge, winner in votes_on_pair:
+            others = [other for who, other in votes_on_pair if who != judge]
+            if winner and others:
+                means.append(np.mean([1.0 if o == winner else 0.0 if o else 0.5 for o in others]))
+    experts = lines["Experts with each other"]
+    assert experts.share.value == pytest.approx(np.mean(means))
+    assert (experts.known, experts.role) == (len(means), Role.EXPERTS)
+    assert lines["A coin"].known == len(votes)
+
+
+def test_a_metric_that_agrees_on_80_percent_of_the_pairs_is_shown_so(rating: Snapshot) -> None:
+    """Pair after pair in a random order it takes the experts' side while 80 % allow it."""
+    on_pair: dict[tuple[str, str], int] = {}
+    for won, lost in decided(rating):
+        one, other = sorted((str(won.code), str(lost.code)))
+        on_pair[one, other] = on_pair.get((one, other), 0) + (1 if str(won.code) == one else -1)
+    votes = pair_votes(current_votes(rating.study, Filters(), rating.last_vote))
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        pairs = [pair for pair in sorted(on_pair) if on_pair[pair]]
+        wrong = {pairs[at] for at in rng.permutation(len(pairs))[: round(0.2 * len(pairs))]}
+        metric = {
+            pair: int(np.sign(on_pair[pair])) * (-1 if pair in wrong else 1) for pair in pairs
+        }
+        line = measure_agreement(votes, [rater_by_pairs("80", metric)])[1]
+        assert line.share.lower is not None
+        assert line.share.upper is not None
+        assert line.share.lower < 0.8 < line.share.upper
+        assert line.share.value == pytest.approx(0.8, abs=0.05)
+
+
+def test_the_page_says_it_first_and_every_file_has_it(rating: Snapshot) -> None:
+    found = lines_of(rating)["Displacement"]
+    client = signed_in(people()["researcher"])
+    address = reverse("results-tab", args=[rating.study.code, "agreement"])
+    shown = " ".join(client.get(address).content.decode().split())
+    assert "Closest to the experts: Displacement, in agreement on" in shown
+    assert f"of {found.known} decided votes; experts agree with each other on" in shown
+    made = {}
+    for form in RATING_FILES["agreement"].formats:
+        answer = client.get(reverse("results-export", args=[rating.study.code, "agreement", form]))
+        made[form] = answer.content
+    first = json.loads(made["json"])["raters"][0]
+    assert (first["question"], first["role"]) == ("instruction", "experts")
+    assert made["csv"].decode().startswith("question,rater,role,type,share,lower,upper,decided,")
+    latex = made["latex"].decode()
+    coin = lines_of(rating)["A coin"]
+    assert f"({coin.decided} votes, 5 experts, {coin.scenarios} scenarios)" in latex
+    assert "Ceiling: experts with each other, " in latex
+    assert r"floor: a coin, 50 \%. (simulated)" in latex
