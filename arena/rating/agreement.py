@@ -91,7 +91,7 @@ def rater_by_pairs(name: str, preferences: Mapping[tuple[str, str], int]) -> Nam
     return NamedRater(name=name, prefers=prefers)
 
 
-class Role(StrEnum):
+class LineRole(StrEnum):
     """What a line is: what is measured, or what it is held against."""
 
     EXPERTS = "experts"
@@ -115,7 +115,7 @@ class AgreementLine:
     """
 
     rater: str
-    role: Role = Role.RATER
+    role: LineRole = LineRole.RATER
     question: str = ""
     type: str = ""
     share: Estimate
@@ -157,17 +157,17 @@ def measure_agreement(
         return ()
     numbered = _number(votes)
     opinions = [
-        (EXPERTS_NAME, Role.EXPERTS, *_other_experts(numbered)),
-        *((rater.name, Role.RATER, *_opinion(numbered, rater)) for rater in raters),
-        (COIN_NAME, Role.COIN, np.zeros(len(votes)), np.zeros(len(votes))),
+        (EXPERTS_NAME, LineRole.EXPERTS, *_other_experts(numbered)),
+        *((rater.name, LineRole.RATER, *_opinion(numbered, rater)) for rater in raters),
+        (COIN_NAME, LineRole.COIN, np.zeros(len(votes)), np.zeros(len(votes))),
     ]
     lines = [_line(numbered, *opinion) for opinion in opinions]
     measured = [
         (line, opinion)
         for line, opinion in zip(lines, opinions, strict=True)
-        if line.known or line.role is not Role.RATER
+        if line.known or line.role is not LineRole.RATER
     ]
-    order = list(Role)
+    order = list(LineRole)
     measured.sort(key=lambda one: (order.index(one[0].role), -(one[0].share.value or 0.0)))
     types = list(dict.fromkeys(vote.type for vote in votes))
     of_types = [
@@ -181,10 +181,10 @@ def measure_agreement(
 def agreement_sentence(lines: Sequence[AgreementLine]) -> str:
     """Say in one sentence which rater agrees best, beside experts and a coin."""
     whole = [line for line in lines if not line.type]
-    best = next((line for line in whole if line.role is Role.RATER), None)
+    best = next((line for line in whole if line.role is LineRole.RATER), None)
     if best is None:
         return "No metric has a value for what was decided."
-    experts = next(line for line in whole if line.role is Role.EXPERTS)
+    experts = next(line for line in whole if line.role is LineRole.EXPERTS)
     among = (
         "how far experts agree with each other is unknown, nobody judged the same pair"
         if experts.share.value is None
@@ -328,7 +328,7 @@ def _other_experts(votes: _Numbered) -> tuple[FloatArray, FloatArray]:
 def _line(
     votes: _Numbered,
     name: str,
-    role: Role,
+    role: LineRole,
     lean: FloatArray,
     tied: FloatArray,
     *,
@@ -341,7 +341,7 @@ def _line(
     hits = 0.5 + 0.5 * votes.sign[known] * lean[known]
     expert, scenario = votes.expert[known], votes.scenario[known]
     ties = round(float(tied[known].sum()))
-    if role is Role.COIN:
+    if role is LineRole.COIN:
         share, ties = Estimate(value=0.5), 0
     else:
         share = two_way_share(hits, expert, scenario)

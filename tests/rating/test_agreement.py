@@ -8,9 +8,9 @@ import pytest
 
 from arena.rating.agreement import (
     AgreementLine,
+    LineRole,
     NamedRater,
     PairVote,
-    Role,
     agreement_sentence,
     measure_agreement,
     rater_by_pairs,
@@ -146,7 +146,7 @@ def test_a_metric_built_to_agree_on_80_percent_is_shown_so() -> None:
         ]
         metric = NamedRater(name="80", prefers=a_metric_that_agrees(0.8, rng))
         line = line_of(measure_agreement(votes, [metric]), "80")
-        assert line.role is Role.RATER
+        assert line.role is LineRole.RATER
         assert line.share.lower is not None
         assert line.share.upper is not None
         held += line.share.lower <= 0.8 <= line.share.upper

@@ -8,7 +8,7 @@ import pytest
 from django.urls import reverse
 
 from arena.models import Snapshot, Vote
-from arena.rating.agreement import AgreementLine, Role, measure_agreement, rater_by_pairs
+from arena.rating.agreement import AgreementLine, LineRole, measure_agreement, rater_by_pairs
 from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.votes import Filters, current_votes
 from arena.results.services.agreement import pair_votes
@@ -86,7 +86,7 @@ def test_displacement_and_the_ceiling_are_those_counted_from_the_rows(rating: Sn
                 means.append(np.mean([1.0 if o == winner else 0.0 if o else 0.5 for o in others]))
     experts = lines["Experts with each other"]
     assert experts.share.value == pytest.approx(np.mean(means))
-    assert (experts.known, experts.role) == (len(means), Role.EXPERTS)
+    assert (experts.known, experts.role) == (len(means), LineRole.EXPERTS)
     assert lines["A coin"].known == len(votes)
 
 

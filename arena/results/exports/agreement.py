@@ -13,7 +13,7 @@ from arena.exports.formats import (
     table_formats,
 )
 from arena.models import Question, Snapshot
-from arena.rating.agreement import AgreementLine, Role, agreement_sentence, share_text
+from arena.rating.agreement import AgreementLine, LineRole, agreement_sentence, share_text
 from arena.rating.lines import UNKNOWN, escape, latex_table
 from augment.errors import Conflict
 
@@ -98,13 +98,14 @@ def _latex(snapshot: Snapshot, question: str, lines: Sequence[AgreementLine]) ->
 
 
 def _counts(line: AgreementLine) -> tuple[object, ...]:
-    return line.known, UNKNOWN if line.role is Role.COIN else line.ties, line.unknown
+    return line.known, UNKNOWN if line.role is LineRole.COIN else line.ties, line.unknown
 
 
 def _caption(lines: Sequence[AgreementLine]) -> str:
     """What is shown, on how many votes and clusters, beside ceiling and floor."""
     experts, coin = (
-        next(line for line in lines if line.role is role) for role in (Role.EXPERTS, Role.COIN)
+        next(line for line in lines if line.role is role)
+        for role in (LineRole.EXPERTS, LineRole.COIN)
     )
     return (
         "Share of decided votes on which a rater agrees with the expert, with 95 % confidence "
