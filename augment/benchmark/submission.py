@@ -36,7 +36,7 @@ from augment.metrics.displacement import displacement
 from augment.scene.codec import SCENE
 from augment.scene.entities import Modification, apply
 
-_OPENING = ProcessLimits(cpu_s=30, deadline_s=120)
+_OPENING = ProcessLimits(cpu_s=16, deadline_s=120)
 MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
 _NAMES = TypeAdapter(tuple[str, ...])

@@ -61,7 +61,7 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
     if len(rows) > MOST_VEHICLES:
         raise fault_at("agent", f"{len(rows)} vehicles; at most {MOST_VEHICLES} are read")
     notes = ["LCTGen says nothing of other road users than vehicles, nor what stays or goes."]
-    away_m = float(np.hypot(*rows[0, :2])) if len(rows) else 0.0
+    away_m = float(np.hypot(*rows[0, :2]))
     if away_m > _ASIDE_M:
         notes.append(f"Its ego, {away_m:.2f} m from the scene's, is left out.")
     others = rows[1:]
@@ -109,7 +109,5 @@ def _rows(document: object) -> FloatArray:
 
 def _first_state(track: Any, place: str) -> FloatArray:
     state = track.get("state") if isinstance(track, Mapping) else None
-    states = read_finite(np.empty(0) if state is None else state, f"{place[:60]}.state", 10)
-    if not len(states):
-        raise fault_at(place[:60], "needs a state")
+    states = read_finite(() if state is None else state, f"{place[:60]}.state", 10)
     return np.asarray(states[0, _TRACK_COLUMNS])

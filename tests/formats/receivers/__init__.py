@@ -14,7 +14,13 @@ HERE = Path(__file__).parent
 
 
 def told_by(*files: Path) -> list[dict[str, Any]]:
-    """What the script beside this file prints about each of the files.
+    """What the script beside this file prints about each of the files."""
+    lines = run(HERE / "script.py", *(str(file) for file in files)).splitlines()
+    return [json.loads(line) for line in lines]
+
+
+def run(script: Path, *arguments: str) -> str:
+    """What a script prints.
 
     Without the environment (`make receivers`) a named skip, in CI a failure.
     """
@@ -22,7 +28,7 @@ def told_by(*files: Path) -> list[dict[str, Any]]:
         if os.environ.get("CI"):
             pytest.fail("make receivers was not run, and in CI nothing is skipped")
         pytest.skip("the receivers are not installed: make receivers")
-    command = [str(PYTHON), "-I", str(HERE / "script.py"), *(str(file) for file in files)]
+    command = [str(PYTHON), "-I", str(script), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    return done.stdout

@@ -1,0 +1,45 @@
+"""Files that programs wrote which share no code with us are read as submissions."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+from augment.benchmark.folder import write_folder
+from augment.benchmark.submission import check_submission
+from augment.benchmark.values import Split
+from augment.metrics.displacement import are_alike
+from augment.scene.entities import AgentType, Modification
+from tests.benchmark.tasks import benchmark, street, task
+from tests.benchmark.test_report import CARD_PARTS
+from tests.formats.receivers import run
+from tests.scenes import vehicle
+
+SCRIPT = Path(__file__).with_name("entrants.py")
+
+
+def test_commonroad_io_and_a_writer_of_scenarionet_can_enter(tmp_path: Path) -> None:
+    given = benchmark(task("near"), task("far", split=Split.TEST, reference=None))
+    files = write_folder(given)
+    sources = {
+        "commonroad": ("near.xml", files["commonroad/near.xml"]),
+        "scenarionet": ("far.pkl", files["scenarionet/sd_scenario_arena_1_far.pkl"]),
+    }
+    made = tmp_path / "mine"
+    made.mkdir()
+    (made / "card.json").write_text(json.dumps(CARD_PARTS))
+    for name, (file, content) in sources.items():
+        (tmp_path / file).write_bytes(content)
+        run(SCRIPT, name, str(tmp_path / file), str(made / file))
+    ours = {agent.type: agent for agent in street().agents}
+    driving = street().agents[0]
+    wanted = Modification(
+        added=(vehicle("Agent12", 30.0, 0.5, 0.1),),
+        moved=(replace(driving, x_m=25.0),),
+        removed=(ours[AgentType.PEDESTRIAN].id,),
+    )
+    for entry in check_submission(given, made, checksum="").entries:
+        assert entry.modification is not None, entry
+        assert are_alike(entry.modification, wanted), entry
+        assert [one.id for one in entry.modification.added] == ["Agent12"]
+        notes = ["not said in this format"] if entry.task == "near" else []
+        assert [note for note in notes if note not in "".join(entry.notes)] == []

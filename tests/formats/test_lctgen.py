@@ -1,0 +1,91 @@
+"""What LCTGen generated becomes vehicles to be added, and nothing else."""
+
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from augment.errors import InvalidDocument
+from augment.formats.lctgen import read_arrays, read_vehicles
+from augment.formats.scenarionet.unpickling import read_pickle
+from augment.scene.entities import AgentType
+
+EGO = [0.4, -0.1, 8.0, 0.0, 0.0, 4.6, 1.9]
+AHEAD = [20.0, 3.5, -3.0, 4.0, math.pi, 4.4, 1.8]
+PADDING = [0.0] * 7
+STATE = np.zeros((190, 10))
+
+
+class AgentType_(int):
+    """Stands for a member of LCTGen's own enumeration: pickled by its class and number."""
+
+    def __reduce__(self) -> Any:
+        return AgentType_, (1,)
+
+
+def tracks_pickle(path: Path, *rows: list[float]) -> Path:
+    """As `save_as_metadrive_data` writes: a state of x, y, z, l, w, h, heading, vx, vy, valid."""
+    tracks = {}
+    for number, (x, y, vx, vy, heading, length, width) in enumerate(rows):
+        state = STATE.copy()
+        state[:] = [x, y, 0.0, length, width, 0.0, heading, vx, vy, 1.0]
+        tracks[number] = {"type": AgentType_(1), "state": state}
+    written = pickle.dumps({"id": "fake", "sdc_index": 0, "tracks": tracks, "map": {}}, protocol=3)
+    ours = f"c{__name__}\nAgentType_\n".encode()
+    path.write_bytes(written.replace(ours, b"ctrafficgen.utils.typedef\nAgentType\n"))
+    return path
+
+
+def check_ahead(document: object) -> None:
+    modification, notes = read_vehicles(document)
+    (vehicle,) = modification.added
+    assert (vehicle.type, vehicle.x_m, vehicle.y_m) == (AgentType.VEHICLE, 20.0, 3.5)
+    assert vehicle.heading_rad == pytest.approx(math.pi)
+    assert (vehicle.length_m, vehicle.width_m, vehicle.speed_mps) == (4.4, 1.8, 5.0)
+    assert (modification.moved, modification.removed) == ((), ())
+    assert len(notes) == 1
+
+
+def test_agents_and_tracks_mean_the_same(tmp_path: Path) -> None:
+    rows = np.array([EGO, AHEAD, PADDING])
+    np.savez(tmp_path / "a.npz", agent=rows)
+    check_ahead(read_arrays(tmp_path / "a.npz"))
+    check_ahead({"agent": [[*row, 1.0] for row in rows.tolist()]})
+    check_ahead(read_pickle(tracks_pickle(tmp_path / "a.pkl", EGO, AHEAD)))
+
+
+def test_what_is_not_said_is_noted() -> None:
+    sizeless = [*AHEAD[:5], 0.0, 1.8]
+    modification, notes = read_vehicles({"agent": [[3.0, 4.0, *EGO[2:]], sizeless]})
+    assert modification.added[0].length_m == 4.8
+    assert notes[1:] == (
+        "Its ego, 5.00 m from the scene's, is left out.",
+        "1 vehicles without a size got the usual one.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("document", "reason"),
+    [
+        ({}, "expected LCTGen's `agent` or `tracks`"),
+        ([], "expected LCTGen's `agent` or `tracks`"),
+        ({"agent": [[1.0, 2.0]]}, "agent: needs 7 numbers a row"),
+        ({"agent": [[float("nan"), *EGO[1:]]]}, r"agent\[0\]: needs finite numbers"),
+        ({"agent": np.zeros((1001, 7))}, "1001 vehicles; at most 1000 are read"),
+        ({"tracks": {0: {"state": STATE}}}, "the first is the ego, and is not there at t0"),
+        ({"tracks": {0: {"state": STATE[:0]}}}, r"tracks\.0\.state: needs an array"),
+        ({"tracks": {0: "car"}}, r"tracks\.0\.state: needs an array"),
+    ],
+)
+def test_what_is_no_generated_scene_is_refused(document: object, reason: str) -> None:
+    with pytest.raises(InvalidDocument, match=reason):
+        read_vehicles(document)
+
+
+def test_arrays_of_objects_are_not_read(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", agent=np.array([{"x": 1}], dtype=object))
+    with pytest.raises(InvalidDocument, match=r"is no \.npz that is read"):
+        read_arrays(tmp_path / "a.npz")
