@@ -34,6 +34,7 @@ class Cell:
         stem: The name of its files, without an ending.
         made_on: When the change was made, for formats that ask for a date.
         recording: What was recorded after t0, None where nothing was.
+        augmentation, contestant: The code of its row and the slug of who made it, where known.
         source: Where the scenario comes from in nuPlan and interPlan, None where it does not.
     """
 
@@ -45,6 +46,8 @@ class Cell:
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
     recording: Recording | None = None
+    augmentation: str = ""
+    contestant: str = "nobody"
     source: InterplanSource | None = None
 
     @cached_property

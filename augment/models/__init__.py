@@ -13,6 +13,7 @@ from augment.models.jobs import (
     GenerationJob,
     IntentReading,
     ModelCall,
+    NuplanResult,
     Simulation,
     TranscriptNote,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "IntentReading",
     "JudgeRun",
     "ModelCall",
+    "NuplanResult",
     "PairJudgement",
     "Probe",
     "Scenario",

@@ -391,3 +391,33 @@ class Simulation(Work):
             ),
         )
         indexes = (models.Index(fields=("state", "sent_at")),)
+
+
+class NuplanResult(models.Model):
+    """An augmentation as nuPlan's own simulation drove it elsewhere; never a drive of ours."""
+
+    augmentation = models.ForeignKey(
+        Augmentation, on_delete=models.CASCADE, related_name="nuplan_results"
+    )
+    planner = models.CharField(max_length=120, help_text="as it calls itself in nuPlan")
+    rules = models.CharField(max_length=10, help_text="whose score it is: nuplan or interplan")
+    score = models.FloatField(null=True, blank=True, help_text="0 to 1; none where it failed")
+    reason = models.CharField(max_length=300, blank=True, help_text="why the simulation failed")
+    parts = models.JSONField(default=dict, help_text="score by metric")
+    read_at = models.DateTimeField(auto_now=True)
+
+    class Meta:
+        ordering = ("augmentation", "planner", "rules")
+        constraints = (
+            models.UniqueConstraint(
+                name="one_nuplan_result_a_planner", fields=("augmentation", "planner", "rules")
+            ),
+            models.CheckConstraint(
+                name="nuplan_result_is_a_score_or_a_reason",
+                condition=Q(rules__in=["nuplan", "interplan"])
+                & (Q(score__gte=0.0, score__lte=1.0, reason="") | (Q(score=None) & ~Q(reason=""))),
+            ),
+        )
+
+    def __str__(self) -> str:
+        return f"{self.augmentation} by {self.planner}"

@@ -1,4 +1,5 @@
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -6,8 +7,9 @@ import yaml
 
 from augment.errors import Conflict
 from augment.formats.interplan.file import token_of
-from augment.formats.interplan.writer import interplan_text as write
-from augment.formats.writing import Cell
+from augment.formats.interplan.runs import MODIFICATIONS
+from augment.formats.interplan.writer import write as write_files
+from augment.formats.writing import Cell, Loss
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -23,6 +25,11 @@ from tests.scenes import cone, pedestrian, vehicle
 
 UNTOLD = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 """interPlan's file has no keys for them."""
+
+
+def write(cells: Sequence[Cell]) -> tuple[str, tuple[Loss, ...]]:
+    written = write_files(cells)
+    return written.files[MODIFICATIONS].decode(), written.losses
 
 
 def cell(slug: str, *added: TrafficAgent, keeps_traffic: bool = False) -> Cell:

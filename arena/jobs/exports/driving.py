@@ -44,6 +44,8 @@ def driving_notes(table: DrivingScores) -> list[str]:
             line.close for line in table.lines
         ),
         f"Not complete: {table.under_way} drives wait or run.": table.under_way,
+        "Driven in nuPlan: by its own simulation elsewhere, read back; never compared with a "
+        "scene before its change.": any(line.driven_by for line in table.lines),
         SIMULATED_NOTE: any(line.is_simulated for line in table.lines),
     }
     failed = (f"Drives that failed: {number} ({reason})." for reason, number in table.failures)
@@ -84,6 +86,7 @@ COLUMNS: Columns = {
     "closer_than_0_3_m": ("close", WHOLE),
     "collided": ("collided", WHOLE),
     "emergency_braked": ("braked", WHOLE),
+    "driven_in_nuplan_by": ("driven_by", TEXT),
 }
 
 
@@ -110,12 +113,18 @@ def driving_latex(table: DrivingScores) -> bytes:
     rows = (
         (
             escape(shown_name(line.name, line.is_simulated)),
-            *(_printed(line.mean), str(line.drives), _printed(line.before), str(line.close)),
+            *(
+                _printed(line.mean),
+                str(line.drives),
+                _printed(line.before),
+                "--" if line.close is None else str(line.close),
+            ),
         )
         for line in table.lines
     )
     planner = escape(table.options.planner)
-    caption = f"Mean driving score of {planner} in Scenario Arena's own simulator; n: drives."
+    but = ", unless a row says otherwise" * any(line.driven_by for line in table.lines)
+    caption = f"Mean driving score of {planner} in Scenario Arena's own simulator{but}; n: drives."
     text = latex_table(
         rows,
         heads=heads,

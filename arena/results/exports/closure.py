@@ -35,6 +35,7 @@ from augment.models import (
     GenerationJob,
     IntentReading,
     ModelCall,
+    NuplanResult,
     Scenario,
     Simulation,
     TranscriptNote,
@@ -148,6 +149,7 @@ _CHOSEN: dict[type[models.Model], Callable[[Closure], Q]] = {
         )
         & ~Q(state__in=Simulation.UNDER_WAY)
     ),
+    NuplanResult: lambda it: Q(augmentation__job__in=it.jobs),
     Study: lambda it: Q(pk=it.study.pk),
     Study.contestants.through: lambda it: Q(study=it.study),
     Study.scenarios.through: lambda it: Q(study=it.study),

@@ -35,6 +35,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "lines": modification_lines(augmentation.modification),
         "corrections": augmentation.corrections.select_related("contestant", "made_by"),
         "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
+        "nuplan_results": augmentation.nuplan_results.all(),
         "measured": of_augmentation(augmentation),
         "checked": checked,
         "tries": tries,

@@ -5,7 +5,7 @@ Frames: from each scene's ego frame to the frame of its origin.
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from augment.errors import Conflict
 from augment.formats.interplan import file as interplan
 from augment.formats.interplan.file import InterplanSource
+from augment.formats.interplan.runs import MODIFICATIONS, NuplanScenario, run_files
 from augment.formats.writing import Cell, Loss, LossReport, Written
 from augment.geometry.frames import difference, wrap
 from augment.scene.entities import (
@@ -38,13 +39,7 @@ _MADE_UP = (
 
 
 def write(cells: Sequence[Cell]) -> Written:
-    """One YAML file for all of them."""
-    text, losses = interplan_text(cells)
-    return Written(files={"interplan.yaml": text.encode()}, losses=losses)
-
-
-def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
-    """Return the file's text and what it could not say.
+    """One YAML file for all of them, and what nuPlan needs to drive those of its own scenes.
 
     What came from interPlan's file keeps its base token and index, and is written as it stood
     there unless it was changed. Scenes that nuPlan does not have get a token made from their
@@ -57,7 +52,8 @@ def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     Raises:
         Conflict: More than a hundred for one scene, which two digits can't number.
     """
-    entries, losses = [], []
+    entries: list[_Entry] = []
+    losses: list[Loss] = []
     for cell in cells:
         if cell.type is None:
             text = "interPlan has five types of scenarios, and this one is of another: left out"
@@ -67,10 +63,14 @@ def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
     made_up = {one.token for one in entries if one.cell.source is None}
     comments = [f"{_MADE_UP} {', '.join(sorted(made_up))}"] if made_up else []
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
+    runs: list[NuplanScenario] = []
     for entry, index in zip(entries, _numbered(entries), strict=True):
         by_token[entry.token][index] = entry.written()
         losses += entry.report.losses
-        comments.append(f"{entry.token}-s{index} {entry.cell.scene.name}: {entry.cell.name}")
+        name = f"{entry.token}-s{index}"
+        comments.append(f"{name} {entry.cell.scene.name}: {entry.cell.name}")
+        if entry.token not in made_up:
+            runs.append(entry.run_as(name))
         comments += [f"  lost: {loss.text}" for loss in entry.report.losses]
     given = {one.token: one.source for one in reversed(entries) if one.source.index is not None}
     documents = {
@@ -78,7 +78,8 @@ def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
         for token, special in by_token.items()
     }
     file = next((source.file for source in given.values() if source.file), None)
-    return interplan.yaml_text(documents, comments, file), tuple(losses)
+    text = interplan.yaml_text(documents, comments, file)
+    return Written(files={MODIFICATIONS: text.encode()} | run_files(runs), losses=tuple(losses))
 
 
 def _numbered(entries: Sequence["_Entry"]) -> list[str]:
@@ -128,6 +129,16 @@ class _Entry:
         scene = without_traffic(self.cell.scene)
         special = interplan.SpecialScenario.model_validate(entry)
         return interplan.read_entry(self.token, self.source.index or "0", special, scene)[0]
+
+    def run_as(self, name: str) -> NuplanScenario:
+        """How nuPlan's results call it."""
+        cell = self.cell
+        return NuplanScenario(
+            scenario=name,
+            augmentation=cell.augmentation,
+            contestant=cell.contestant,
+            name=cell.name,
+        )
 
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""

@@ -1,18 +1,20 @@
 """Mean driving scores: by contestant, by scenario type, beside the unmodified scenes."""
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
-from django.db.models import Q
+from django.db.models import Q, QuerySet
 
-from augment.models import Contestant, GenerationJob, Scenario, Simulation
+from augment.models import Contestant, GenerationJob, NuplanResult, Scenario, Simulation
 from augment.scene.entities import ScenarioType, in_type_order
 from augment.services.judging.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject
+_NO_COLLISION = "no_ego_at_fault_collisions"
+"""nuPlan's metric of collisions: 1 without one."""
 CLOSE_M = 0.3
 """A least clearance below this is marked wherever a score is shown; the score does not ask."""
 
@@ -30,15 +32,17 @@ class DrivingLine:
 
     Attributes:
         contestant: None for the scenes before the change and the references.
+        driven_by: The planner that drove it in nuPlan itself, empty for drives of ours. Such a
+            line has a mean and nothing before the change.
         drives: How many count: those whose scene was also driven before the change.
         failed: How many could not be driven.
         mean: 0 to 1, None without drives.
         before: The mean of the same scenes before the change; None without.
         by_type: The mean by scenario type, in the catalogue's order, None without drives.
         least_clearance_m: The smallest of its drives; None where nobody else was there.
-        close: How many drives came closer to somebody than `CLOSE_M`.
+        close: How many drives came closer to somebody than `CLOSE_M`; None where nobody says.
         collided: How many drives had a collision at fault.
-        braked: How many had an emergency brake.
+        braked: How many had an emergency brake; None where nobody says.
     """
 
     subject: str
@@ -50,9 +54,10 @@ class DrivingLine:
     before: float | None
     by_type: dict[str, float | None]
     least_clearance_m: float | None
-    close: int
+    close: int | None
     collided: int
-    braked: int
+    braked: int | None
+    driven_by: str = ""
 
     @property
     def is_simulated(self) -> bool:
@@ -74,7 +79,7 @@ class DrivingScores:
     Attributes:
         title: Its name.
         lines: The unmodified scenes, the reference, then contestants by how much they lower the
-            score, the most first.
+            score, the most first; behind them what was driven in nuPlan.
         under_way: How many drives wait or run.
         failures: Why drives failed, with how often.
         outlasting: How many drives went on after the end of their recording.
@@ -105,7 +110,7 @@ class DrivingScores:
 def scores_of_job(
     job: GenerationJob, *, options: Options | None = None, score: str
 ) -> DrivingScores:
-    """Return the table of a job; two queries.
+    """Return the table of a job; three queries.
 
     Args:
         job: Whose results were driven.
@@ -113,7 +118,8 @@ def scores_of_job(
         score: One of `SCORES`.
     """
     options = options or next(iter(options_driven(job)), Options())
-    return _scores(job.name, drives_of_job(job), options, score)
+    results = NuplanResult.objects.filter(augmentation__job=job, rules=score)
+    return _scores(job.name, drives_of_job(job), results, options, score)
 
 
 def scores_of_augmentations(
@@ -122,7 +128,8 @@ def scores_of_augmentations(
     """Return the table of the augmentations with these keys, with their scenes."""
     scenarios = Scenario.objects.filter(augmentations__in=ids)
     scenes = Q(augmentation=None, scenario__in=scenarios)
-    return _scores(title, Q(augmentation__in=ids) | scenes, options, score)
+    results = NuplanResult.objects.filter(augmentation__in=ids, rules=score)
+    return _scores(title, Q(augmentation__in=ids) | scenes, results, options, score)
 
 
 def drives_of_job(job: GenerationJob) -> Q:
@@ -161,7 +168,9 @@ def options_driven(job: GenerationJob) -> list[Options]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _scores(title: str, which: Q, options: Options, score: str) -> DrivingScores:
+def _scores(
+    title: str, which: Q, results: QuerySet[NuplanResult], options: Options, score: str
+) -> DrivingScores:
     drives = options.of(Simulation.objects.filter(which))
     read = drives.select_related("scenario", "augmentation__contestant").only(*_COLUMNS)
     rows = list(read.order_by("pk"))
@@ -174,14 +183,16 @@ def _scores(title: str, which: Q, options: Options, score: str) -> DrivingScores
     for row in rows:
         contestant = 0 if row.augmentation is None else row.augmentation.contestant_id
         cells[row.subject, contestant].append(row)
-    kinds = in_type_order([*ScenarioType, *(row.scenario.type for row in rows)])
+    elsewhere = list(results.select_related("augmentation__contestant", "augmentation__scenario"))
+    types = [*(row.scenario.type for row in rows), *map(_type_of, elsewhere)]
+    kinds = in_type_order([*ScenarioType, *types])
     lines = [_line(cell, before, score, kinds) for cell in cells.values()]
     failures = Counter(row.reason for row in rows if row.state == State.FAILED)
     return DrivingScores(
         title=title,
         score=score,
         options=options,
-        lines=tuple(sorted(lines, key=_place)),
+        lines=(*sorted(lines, key=_place), *_nuplan_lines(elsewhere, kinds)),
         total=len(rows),
         under_way=sum(row.state in Simulation.UNDER_WAY for row in rows),
         failures=tuple(sorted(failures.items(), key=lambda item: (-item[1], item[0]))),
@@ -215,6 +226,38 @@ def _line(
         collided=sum(any(one["at_fault"] for one in drive) for drive in collisions),
         braked=sum(bool(_document(row).get("emergency_brake_steps")) for row in paired),
     )
+
+
+def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iterator[DrivingLine]:
+    """Yield a line for each contestant and planner of nuPlan, by their names."""
+    cells: defaultdict[tuple[str, str, str], list[NuplanResult]] = defaultdict(list)
+    for row in results:
+        contestant = row.augmentation.contestant
+        cells[contestant.name.lower(), contestant.slug, row.planner].append(row)
+    for (_, _, planner), cell in sorted(cells.items()):
+        contestant = cell[0].augmentation.contestant
+        done = [(_type_of(row), row.score, row) for row in cell if row.score is not None]
+        yield DrivingLine(
+            subject=Subject.AUGMENTATION,
+            name=f"{contestant.name}, driven in nuPlan by {planner}",
+            contestant=contestant,
+            drives=len(done),
+            failed=len(cell) - len(done),
+            mean=_mean([score for _, score, _ in done]),
+            before=None,
+            by_type={
+                kind: _mean([score for one, score, _ in done if one == kind]) for kind in kinds
+            },
+            least_clearance_m=None,
+            close=None,
+            collided=sum(row.parts.get(_NO_COLLISION) not in (None, 1.0) for *_, row in done),
+            braked=None,
+            driven_by=planner,
+        )
+
+
+def _type_of(row: NuplanResult) -> str:
+    return row.augmentation.scenario.type
 
 
 def _document(row: Simulation) -> dict[str, Any]:

@@ -171,5 +171,7 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
         recording=None if scene.recording is None else recording_from_document(scene.recording),
+        augmentation=str(row.code),
+        contestant=row.contestant.slug,
         source=source,
     )

@@ -1,0 +1,137 @@
+"""What a run in nuPlan needs beside interPlan's file: filters, commands, whose scenario is whose.
+
+Names of configurations are those of interPlan's and nuPlan's own scripts.
+"""
+
+import csv
+import io
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import yaml
+
+from augment.errors import InvalidDocument
+
+MODIFICATIONS = "interplan.yaml"
+TOKENS, SCRIPT = "nuplan_tokens.csv", "run_nuplan.sh"
+MOST_TOKENS = 20_000
+_COLUMNS = ("scenario", "augmentation", "contestant", "name")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NuplanScenario:
+    """One changed scenario as nuPlan's results call it.
+
+    Attributes:
+        scenario: Base token and index, as `2d62c3139aa95007-s3`.
+        augmentation: The code of its row.
+        contestant: The slug of who made it.
+        name: What a person calls it.
+    """
+
+    scenario: str
+    augmentation: str
+    contestant: str
+    name: str
+
+
+def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
+    """Return a filter for each contestant, a script with a command for each, and the tokens.
+
+    Args:
+        scenarios: Those whose base token is nuPlan's; without any there are no files.
+    """
+    by_contestant: defaultdict[str, list[NuplanScenario]] = defaultdict(list)
+    for one in scenarios:
+        by_contestant[one.contestant].append(one)
+    if not by_contestant:
+        return {}
+    filters = {
+        f"scenario_filter/arena-{slug}.yaml": _filter(found)
+        for slug, found in sorted(by_contestant.items())
+    }
+    commands = "".join(
+        f"run arena-{slug}   # {len(found)} scenarios\n"
+        for slug, found in sorted(by_contestant.items())
+    )
+    table = io.StringIO()
+    rows = csv.writer(table, lineterminator="\n")
+    rows.writerow(_COLUMNS)
+    for found in by_contestant.values():
+        rows.writerows([getattr(one, column) for column in _COLUMNS] for one in found)
+    return {**filters, SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
+
+
+def read_tokens(content: bytes) -> dict[str, NuplanScenario]:
+    """Return what a table of tokens says, by nuPlan's name of the scenario.
+
+    Raises:
+        InvalidDocument: It is none of ours, names a scenario twice, or is too long.
+    """
+    try:
+        rows = list(csv.reader(io.StringIO(content.decode()), strict=True))
+    except (UnicodeDecodeError, csv.Error) as fault:
+        raise InvalidDocument(TOKENS, [("", f"is no CSV file: {fault}")]) from None
+    if not rows or tuple(rows[0]) != _COLUMNS or len(rows) > MOST_TOKENS + 1:
+        problem = f"needs the columns {', '.join(_COLUMNS)} and at most {MOST_TOKENS:,} lines"
+        raise InvalidDocument(TOKENS, [("line 1", problem)])
+    found: dict[str, NuplanScenario] = {}
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(_COLUMNS) or row[0] in found:
+            problem = f"needs {len(_COLUMNS)} values and a scenario that no other line has"
+            raise InvalidDocument(TOKENS, [(f"line {number}", problem)])
+        found[row[0]] = NuplanScenario(**dict(zip(_COLUMNS, row, strict=True)))
+    return found
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _filter(scenarios: list[NuplanScenario]) -> bytes:
+    open_limits = (
+        *("log_names", "map_names", "num_scenarios_per_type", "limit_total_scenarios"),
+        *("timestamp_threshold_s", "ego_displacement_minimum_m", "ego_start_speed_threshold"),
+        *("ego_stop_speed_threshold", "speed_noise_tolerance"),
+    )
+    document = {
+        "_target_": (
+            "interplan.planning.scenario_builder.benchmark_scenario_filter.BenchmarkScenarioFilter"
+        ),
+        "_convert_": "all",
+        "defaults": [f"/{MODIFICATIONS.removesuffix('.yaml')}@modifications"],
+        "scenario_types": None,
+        "scenario_tokens": [one.scenario for one in scenarios],
+        **dict.fromkeys(open_limits),
+        **dict.fromkeys(("expand_scenarios", "remove_invalid_goals", "shuffle"), False),
+    }
+    return yaml.safe_dump(document, sort_keys=False).encode()
+
+
+_SCRIPT = """\
+#!/bin/sh
+# Drives what the contestants made in nuPlan, with interPlan's benchmark; a command a contestant.
+#   INTERPLAN_PLUGIN_ROOT=... PLANNER=pdm_closed_planner sh run_nuplan.sh
+# Afterwards: manage.py import nuplan_results EXPERIMENT_FOLDER ... --tokens nuplan_tokens.csv
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+
+run() {
+  python "${INTERPLAN_PLUGIN_ROOT:?is the folder of interPlan's code}\
+/interplan/planning/script/run_simulation.py" \\
+    +simulation=default_interplan_benchmark \\
+    planner="${PLANNER:-pdm_closed_planner}" \\
+    scenario_filter="$1" \\
+    experiment_name="$1" \\
+    hydra.searchpath="[file://$here,\
+pkg://interplan.planning.script.config.common,\
+pkg://interplan.planning.script.config.simulation,\
+pkg://interplan.planning.script.experiments,\
+pkg://tuplan_garage.planning.script.config.common,\
+pkg://tuplan_garage.planning.script.config.simulation,\
+pkg://nuplan.planning.script.config.common,\
+pkg://nuplan.planning.script.config.simulation,\
+pkg://nuplan.planning.script.experiments]"
+}
+
+"""
