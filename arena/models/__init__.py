@@ -1,5 +1,6 @@
-"""Rows of arena: people, tokens, invitations, studies, authors, votes, ratings, fault labels."""
+"""Rows of arena: people, tokens, invitations, studies, authors, votes, ratings, boards, labels."""
 
+from arena.models.boards import Board, BoardTable
 from arena.models.files import BenchmarkFile, ScenarioFile, StudyFile
 from arena.models.people import ApiToken, Person, fresh_token
 from arena.models.ratings import (
@@ -37,6 +38,8 @@ __all__ = [
     "ApiToken",
     "Authorship",
     "BenchmarkFile",
+    "Board",
+    "BoardTable",
     "EarlyLook",
     "EnrolledVoter",
     "Enrolment",

@@ -71,6 +71,7 @@ class PlanRules:
         checks: What can be checked with.
         alike: (scenario, contestant, contestant) that nobody can tell apart, whose pictures
             differ all the same; settled as a tie like identical ones.
+        challengers: Contestants of whom every pair has one; empty for all pairs.
     """
 
     entries: tuple[Entry, ...]
@@ -84,11 +85,12 @@ class PlanRules:
     check_share: float = 0.0
     checks: tuple[Check, ...] = ()
     alike: tuple[tuple[str, str, str], ...] = ()
+    challengers: tuple[str, ...] = ()
 
     @property
     def grid(self) -> Grid:
         """What can be shown of the entries."""
-        return grid_of(self.entries, self.alike)
+        return grid_of(self.entries, self.alike, self.challengers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,13 +153,24 @@ class Grid:
         return np.array([known[name] for name in names], dtype=np.int64)
 
 
-def grid_of(entries: tuple[Entry, ...], alike: tuple[tuple[str, str, str], ...] = ()) -> Grid:
-    """The units that can be shown, and the identical and alike pairs that can't."""
+def grid_of(
+    entries: tuple[Entry, ...],
+    alike: tuple[tuple[str, str, str], ...] = (),
+    challengers: Sequence[str] = (),
+) -> Grid:
+    """The units that can be shown, and the identical and alike pairs that can't.
+
+    Pairs without a challenger are neither, where there are challengers.
+    """
     settled = {(scenario, *sorted((one, other))) for scenario, one, other in alike}
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in entries}
     scenarios = tuple(sorted({entry.scenario for entry in entries}))
     contestants = sorted({entry.contestant for entry in entries})
-    pairs = tuple(combinations(contestants, 2))
+    pairs = tuple(
+        pair
+        for pair in combinations(contestants, 2)
+        if not challengers or not set(challengers).isdisjoint(pair)
+    )
     showable = np.zeros((len(pairs), len(scenarios)), dtype=bool)
     identical = []
     for row, (first, second) in enumerate(pairs):

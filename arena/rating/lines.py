@@ -95,6 +95,12 @@ def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{', '.join(names)}: {note}" for note, names in names_by_note.items()]
 
 
+def says_no_order(lines: Sequence["Line"]) -> bool:
+    """Whether all ranks are 1: then nobody can be told from anybody, and no rank is shown."""
+    ranks = [line.rank for line in lines if line.rank is not None]
+    return len(lines) > 1 and len(ranks) != 1 and set(ranks) <= {1}
+
+
 def caption_text(method: str, *, votes: int, experts: int, scenarios: int) -> str:
     """The caption as TeX: what is shown, by which method, on how many votes.
 

@@ -24,6 +24,7 @@ NO_INTERVALS = (
     "nothing that could have come out otherwise."
 )
 
+NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
 NOT_RATED = "no rating by this model"
 NO_INTERVAL = "no interval and no rank: too few votes"
 NO_RANK = "no rank: too few votes"

@@ -6,6 +6,7 @@ from django.urls import URLPattern, path
 from arena.contestants.urls import urlpatterns as CONTESTANTS
 from arena.jobs.urls import urlpatterns as JOBS
 from arena.people import pages as people
+from arena.results.pages import boards
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
 from arena.results.pages.comparison import comparison_page
@@ -98,6 +99,20 @@ urlpatterns: list[URLPattern] = [
     ),
     path("shared/<str:token>/", shared_page, name="shared-results"),
     path("shared/<str:token>/table.<slug:form>", shared_file, name="shared-file"),
+    path("boards/", boards.boards_page, name="boards"),
+    path("boards/<uuid:code>/", boards.board_page, name="board"),
+    path("boards/<uuid:code>/export.zip", boards.board_export, name="board-export"),
+    path("boards/<uuid:code>/publish/", boards.publish, name="board-publish"),
+    path("boards/<uuid:code>/batch/", boards.start_batch, name="board-batch"),
+    path("boards/<uuid:code>/share/", boards.share, name="board-share"),
+    path("boards/<uuid:code>/unshare/", boards.unshare, name="board-unshare"),
+    path("boards/<uuid:code>/<int:number>.<slug:form>", boards.board_file, name="board-file"),
+    path("shared/boards/<str:token>/", boards.shared_board, name="shared-board"),
+    path(
+        "shared/boards/<str:token>/<int:number>.<slug:form>",
+        boards.shared_board_file,
+        name="shared-board-file",
+    ),
     path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),
     path("studies/<uuid:code>/rate/<uuid:rating>/", results.compute_again, name="rating-again"),
 ]

@@ -26,7 +26,15 @@ from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
 from arena.voting.queries.ballots import ExpertTally, VotingProgress, tallies
 from augment.errors import UnknownName
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import (
+    Augmentation,
+    Benchmark,
+    BenchmarkItem,
+    Contestant,
+    GenerationJob,
+    Scenario,
+)
+from augment.services.scenarios.benchmarks import Split
 
 # --- Studies -----------------------------------------------------------------------------------
 
@@ -140,7 +148,12 @@ def scenario_sources(jobs: Iterable[GenerationJob]) -> dict[str, str]:
     """Return where the scenarios of a study can come from, by what forms and drafts call it."""
     sets = {f"set:{name}": f"Finished, {name} set" for name in Scenario.SETS}
     of_jobs = {f"job:{job.code}": f"Finished in {job.name}" for job in jobs}
-    return {FINISHED: "All that are finished", **sets, "set:": "Finished, our own", **of_jobs}
+    splits = {
+        f"benchmark:{row.code}": f"Finished, test split of {row}"
+        for row in Benchmark.objects.filter(retired_at=None)
+    }
+    own = {"set:": "Finished, our own"}
+    return {FINISHED: "All that are finished", **sets, **own, **splits, **of_jobs}
 
 
 def finished_scenarios(contestants: Collection[str], source: str) -> list[str]:
@@ -151,6 +164,9 @@ def finished_scenarios(contestants: Collection[str], source: str) -> list[str]:
         rows = rows.filter(job__code=name)
     elif kind == "set":
         rows = rows.filter(scenario__catalogue_set=name)
+    elif kind == "benchmark":
+        items = BenchmarkItem.objects.filter(benchmark__code=name, split=Split.TEST)
+        rows = rows.filter(scenario__benchmark_items__in=items)
     counted = rows.order_by().values_list("scenario__slug")
     finished = counted.annotate(n=Count("contestant", distinct=True)).filter(
         n=len(set(contestants))

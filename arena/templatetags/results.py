@@ -37,6 +37,8 @@ _LABELS: dict[str, dict[str, str]] = {
         "stop sharing results": "took the public link back",
         "hand over": "handed over",
         "plan batch": "planned a batch",
+        "publish": "published a table",
+        "open batch": "opened a batch",
         "simulate votes": "simulated votes",
         "import votes": "imported votes",
         "mark author": "marked an author",

@@ -19,7 +19,7 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads", "benchmarks"})),
     "contestants": (_("Contestants"), frozenset({"contestants", "endpoints", "models"})),
     "jobs": (_("Jobs"), frozenset({"jobs", "augmentations", "drives"})),
-    "studies": (_("Studies"), frozenset({"studies"})),
+    "studies": (_("Studies"), frozenset({"studies", "boards"})),
     "people": (_("People"), frozenset({"people", "audit"})),
 }
 """Labels, and with which words the addresses of their pages begin."""

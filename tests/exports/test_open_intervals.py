@@ -11,7 +11,8 @@ from django.core.management import call_command
 from pyarrow import parquet
 
 from arena.models import Snapshot, Study
-from arena.results.exports.tables import NOT_RANKED, leaderboard_table
+from arena.rating.remarks import NOT_RANKED
+from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import FORMATS
 from arena.results.services.ratings import rate_now as rate
 

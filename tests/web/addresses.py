@@ -6,7 +6,7 @@ from typing import Any
 from django.urls import reverse
 
 from arena.api.urls import urlpatterns as API
-from arena.models import Authorship
+from arena.models import Authorship, Board
 from arena.people.links import invite, mark_author
 from arena.site.urls import urlpatterns
 from arena.studies.services.drafts import keep_draft
@@ -78,6 +78,10 @@ def _code(name: str, word: str, here: World) -> object:
             known = Benchmark.objects.first()
             asked = BenchmarkRequest(slug="set", title="Set", scenarios=[scenario.slug])
             return (known or make_benchmark(asked)).code
+        case "boards":
+            board, _ = Board.objects.get_or_create(name="City")
+            board.studies.add(here.study)
+            return board.code
         case "invitations":
             return invite(study=here.study, expert=here.expert).invitation.code
         case "authorships":

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from django.contrib.auth.models import User
 from django.urls import reverse
 
+from arena.results.exports.board_files import write_table
 from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
+from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now as rate
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
@@ -44,6 +46,9 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     named |= {
         name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
     }
+    board = make_board(name="City", study=study)
+    publish_table(board, write=write_table)
+    named["board"] = reverse("board", args=[board.code])
     return _shown(people()["admin"], named)
 
 

@@ -26,17 +26,16 @@ PAGES = _table(
             "faults augmentation transcript contestants contestant endpoints endpoint "
             "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
             "scenarios-bulk prompts correct picture studies study preregistration "
-            "results results-tab benchmarks benchmark"
+            "results results-tab benchmarks benchmark boards board board-export"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "
             "import-votes study-new study-draft enrolment benchmark-new"
         ),
-        (
-            404,
-            404,
-            403,
-        ): "scenarios-export drive-file asked-image prompt-image study-file benchmark-file",
+        (404, 404, 403): (
+            "scenarios-export drive-file asked-image prompt-image study-file benchmark-file "
+            "board-file"
+        ),
         (403, 403, 403): (
             "results-votes results-votes-file shown-picture results-export results-compare"
         ),
@@ -59,11 +58,11 @@ ACTIONS = _table(
             "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
-            "study-draft-discard study-hand-over first-step benchmark-retired"
+            "study-draft-discard study-hand-over first-step benchmark-retired board-batch"
         ),
         (302, 302, 403): (
             "scene-send upload-show scenarios-write study-write set-intent results-open "
-            "benchmark-write"
+            "benchmark-write board-publish board-share board-unshare"
         ),
         ADMIN: (
             "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"
@@ -78,7 +77,7 @@ ACTIONS = _table(
 """By POST."""
 OPEN_TO_THE_WORLD = {
     *("login", "logout", "enrol", "invitation", "healthz", "readyz", "metrics", "first"),
-    *("welcome", "shared-results", "shared-file"),
+    *("welcome", "shared-results", "shared-file", "shared-board", "shared-board-file"),
 }
 
 

@@ -8,7 +8,9 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
 from arena.management.exporting import KINDS, ExportedFile, add_kinds
+from arena.results.exports.board_files import board_folder, write_folder
 from arena.results.exports.study_folder import write_study
+from arena.results.services.boards import board_named
 from arena.scenarios.exports import write_benchmark
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
@@ -29,8 +31,10 @@ class Command(TerminalCommand):
         whole.add_argument("study", help="its name or its code; it is closed")
         handed_out = kinds.add_parser("benchmark", help="what entrants of a benchmark get")
         handed_out.add_argument("benchmark", help="its name, such as hard or hard@2, or its code")
-        for parser in (whole, handed_out):
-            parser.add_argument("--out", required=True, help="a new folder")
+        board = kinds.add_parser("board", help="all tables of a board, for any web host")
+        board.add_argument("board", help="its name or its code")
+        for parser in (whole, handed_out, board):
+            parser.add_argument("--out", required=True, help="a folder; a new one but for boards")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
@@ -43,6 +47,8 @@ class Command(TerminalCommand):
                 row = find_benchmark(options["benchmark"])
                 for warning in write_benchmark(row, Path(options["out"])):
                     self.stderr.write(f"Warning: {warning}")
+            elif options["what"] == "board":
+                write_folder(board_folder(board_named(options["board"])), Path(options["out"]))
             else:
                 study = study_named(options["study"])
                 write_study(study, Path(options["out"]), say=self.stderr.write)

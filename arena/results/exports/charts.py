@@ -107,14 +107,19 @@ def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatte
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
+    """Draw the ratings of a table, and say below what kind of intervals these are."""
+    return rows_chart(table.rows, _interval_label(table), file_format=file_format)
+
+
+def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
     """Draw ratings as dots with their intervals as bars, best on top; diamonds are simulated."""
     from matplotlib.figure import Figure
 
     with house_style():
-        figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(table.rows)), layout="constrained")
+        figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(rows)), layout="constrained")
         axes = figure.add_subplot()
-        _draw_intervals(axes, table.rows, {row.slug: row.interval for row in table.rows})
-        axes.set_xlabel(_interval_label(table))
+        _draw_intervals(axes, rows, {row.slug: row.interval for row in rows})
+        axes.set_xlabel(label)
         return write_figure(figure, file_format)
 
 

@@ -13,7 +13,8 @@ from django.db.models import F
 from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO
 from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.rating.lines import Line, notes_by_reason
+from arena.rating.lines import Line, notes_by_reason, says_no_order
+from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.results.queries.votes import LeftOut
 from arena.studies.services.opening import preregistration_sha256
@@ -22,7 +23,6 @@ from arena.studies.services.plan import Answered, answer_hypotheses
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
 EARLY_LOOK = "Early look: the study was still open."
-NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
 APART = -1
 """The part of those who are rated with nobody."""
 
@@ -169,8 +169,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
         for standing in standings
     ]
-    ranks = [row.rank for row in rows if row.rank is not None]
-    if len(rows) > 1 and len(ranks) != 1 and set(ranks) <= {1}:
+    if says_no_order(rows):
         rows = [replace(row, rank=None, rank_best=None, rank_worst=None) for row in rows]
         reasons = (*reasons, NOT_RANKED)
     return LeaderboardTable(

@@ -319,10 +319,11 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
     types = dict(study.scenarios.values_list("slug", "type"))
     entries = tuple(Entry(**entry) for entry in study.rules["entries"])
     alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
+    challengers = study.rules.get("challengers", ())
     drawn = draw_ties(
         settled,
         {judge: len(own) for judge, own in by_judge.items()},
-        showable=int(grid_of(entries, alike).showable.sum()),
+        showable=int(grid_of(entries, alike, challengers).showable.sum()),
         seed=study.seed,
     )
     simulated = {row.slug for row in study.contestants.all() if row.is_simulated}

@@ -198,13 +198,7 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, results.judges)))
     snapshot.votes_counted = len(votes.counted)
     snapshot.votes_left_out = votes.left_out
-    snapshot.versions = {
-        "python": platform.python_version(),
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-        "results": RESULTS_VERSION,
-        "votes": VOTES_VERSION,
-    }
+    snapshot.versions = software_versions()
     snapshot.reason = board.explanation
     snapshot.degenerate_rounds = board.degenerate_rounds
     # Whether something in the table is simulated, be it a line without votes.
@@ -257,6 +251,17 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
 def votes_version_of(snapshot: Snapshot) -> int:
     """The version of the columns that its file of votes has; older ones had no word for it."""
     return int(snapshot.versions.get("votes", 1))
+
+
+def software_versions() -> dict[str, str | int]:
+    """The versions of what the numbers of a rating depend on."""
+    return {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "results": RESULTS_VERSION,
+        "votes": VOTES_VERSION,
+    }
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -55,11 +55,15 @@ _ELSEWHERE = frozenset({"entries", "experts", "hypotheses", "stopping", "jobs", 
 
 
 @transaction.atomic
-def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
+def open_study(
+    study_plan: StudyPlan, *, challengers: Sequence[str] = (), actor: User | None = None
+) -> Study:
     """Plan all matchups of a new study and open it.
 
     Args:
         study_plan: Who takes part, and by which rules; the same ones give the same plan.
+        challengers: Contestants of whom every pair has one, whatever job their pictures are of;
+            none for all pairs.
         actor: Who opens it, for the log.
 
     Raises:
@@ -83,8 +87,11 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
         seed=study_plan.seed,
         rule=study_plan.samples,
         jobs=[find_job(job) for job in study_plan.jobs],
+        challengers=challengers,
     )
-    rules, broken, alike_shown = _rules(study_plan, shown.cells, scenarios, experts)
+    rules, broken, alike_shown = _rules(
+        study_plan, shown.cells, scenarios, experts, tuple(sorted(challengers))
+    )
     planned = plan(rules)
     cells = broken | shown.cells
     frozen = _frozen(study_plan, rules, planned, shown, alike_shown)
@@ -158,7 +165,11 @@ def _check_simulated(
 
 
 def _rules(
-    study_plan: StudyPlan, cells: Cells, scenarios: list[Scenario], experts: list[User]
+    study_plan: StudyPlan,
+    cells: Cells,
+    scenarios: list[Scenario],
+    experts: list[User],
+    challengers: tuple[str, ...],
 ) -> tuple[PlanRules, Cells, list[Triple]]:
     """Return what the planner is told, the pictures of checks, and alike pairs that are shown."""
     entries = tuple(
@@ -173,7 +184,11 @@ def _rules(
         shows_all = study_plan.samples is SampleRule.ALL
         checks, broken = check_pictures(scenarios, windows_of(entries), shows_all=shows_all)
         require_checks(checks, wanted=wanted)
-    alike = () if study_plan.show_alike else alike_pairs(cells)
+    alike = [
+        triple
+        for triple in (() if study_plan.show_alike else alike_pairs(cells))
+        if not challengers or not set(challengers).isdisjoint(triple[1:])
+    ]
     alike_shown = draw_shown(alike, entries, seed=study_plan.seed)
     rules = PlanRules(
         entries=entries,
@@ -182,6 +197,7 @@ def _rules(
         seed=study_plan.seed,
         checks=checks,
         alike=tuple(sorted(set(alike) - set(alike_shown))),
+        challengers=challengers,
         **shares,
     )
     return rules, broken, alike_shown
@@ -199,7 +215,7 @@ def _frozen(
     hypotheses = read_hypotheses(study_plan.hypotheses, contestants)
     return {
         "planner": PLANNER,
-        **asdict(rules),
+        **{rule: kept for rule, kept in asdict(rules).items() if rule != "challengers" or kept},
         "scenario_gap_kept": planned.scenario_gap,
         "identical": [list(triple) for triple in planned.identical],
         "alike_shown": [list(pair) for pair in alike_shown],

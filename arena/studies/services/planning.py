@@ -45,6 +45,7 @@ def rules_of(study: Study) -> PlanRules:
         experts=tuple(kept["experts"]),
         checks=tuple(Check(**check) for check in kept.get("checks", ())),
         alike=tuple((place, one, other) for place, one, other in kept.get("alike", ())),
+        challengers=tuple(kept.get("challengers", ())),
         **{name: kept[name] for name in _PLAIN if name in kept},
     )
 

@@ -170,6 +170,7 @@ def choose_pictures(
     seed: int,
     rule: SampleRule = SampleRule.ONE,
     jobs: Sequence[GenerationJob] = (),
+    challengers: Sequence[str] = (),
 ) -> StudyPictures:
     """Return the augmentation that finished last of each scenario, contestant and sample shown.
 
@@ -179,6 +180,7 @@ def choose_pictures(
         seed: Of the study.
         rule: Which samples are shown.
         jobs: Whose augmentations count; none for those of every job.
+        challengers: Slugs of contestants whose augmentations count whatever their job.
 
     Raises:
         NothingToPlan: Pictures are missing; the text names them.
@@ -186,7 +188,7 @@ def choose_pictures(
     """
     rows = find_showable(scenarios).filter(contestant__in=contestants)
     if jobs:
-        rows = rows.filter(job__in=jobs)
+        rows = rows.filter(Q(job__in=jobs) | Q(contestant__slug__in=challengers))
     rows = rows.select_related("scenario", "contestant", "job")
     latest: Latest = defaultdict(dict)
     for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):

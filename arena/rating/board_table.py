@@ -1,0 +1,161 @@
+"""A published table of a board as a value, its codec, and what makes tables comparable.
+
+In: the lines of a rating. Out: the same lines on the scale of the board's first table.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from arena.rating.lines import Line
+from augment.errors import InvalidDocument
+
+FORMAT, VERSION = "scenario-arena/board-table", 1
+MEAN = 1000.0
+"""Elo points: the mean of the contestants of the first study, in every table."""
+
+AnyLine = TypeVar("AnyLine", bound=Line)
+AnyName = TypeVar("AnyName")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardLine(Line):
+    """One contestant's line; `name` is what people know.
+
+    Attributes:
+        since: The day of the first table that has it, as ISO 8601.
+        authors: Of a submission, else none.
+        is_open: Whether a submission's code and weights are public; None where nobody says.
+    """
+
+    slug: str
+    kind: str
+    is_simulated: bool
+    since: str
+    authors: tuple[str, ...] = ()
+    is_open: bool | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PooledStudy:
+    """A study whose votes a table counts.
+
+    Attributes:
+        closed_at: In UTC as ISO 8601.
+        preregistration: SHA-256 of the file that was frozen at its opening.
+        challengers: Slugs of the contestants that it brought; none for the first study.
+    """
+
+    name: str
+    code: str
+    closed_at: str
+    votes: int
+    preregistration: str
+    challengers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardTableDocument:
+    """All that a published table says.
+
+    Attributes:
+        made_at: In UTC as ISO 8601.
+        benchmark: Its name and version, as in "merging@2"; empty for a board without one.
+        benchmark_sha256: Its checksum, empty likewise.
+        question: What the experts were asked.
+        answer: What the table says, in one sentence.
+        lines: Best first.
+        founders: Slugs of the contestants whose ratings have the mean 1000.
+        votes_sha256: Of the counted votes of all studies in one CSV file.
+        left_out: How many votes do not count, by reason.
+        notes: What must be said with the numbers.
+        versions: Of what the numbers depend on, by name.
+    """
+
+    board: str
+    number: int
+    made_at: str
+    benchmark: str
+    benchmark_sha256: str
+    question: str
+    method: str
+    answer: str
+    lines: tuple[BoardLine, ...]
+    studies: tuple[PooledStudy, ...]
+    founders: tuple[str, ...]
+    votes: int
+    votes_sha256: str
+    left_out: dict[str, int]
+    notes: tuple[str, ...]
+    versions: dict[str, str]
+    includes_simulated: bool
+
+    @property
+    def made_on(self) -> str:
+        """The day, as ISO 8601."""
+        return self.made_at[:10]
+
+
+def table_to_document(table: BoardTableDocument) -> dict[str, Any]:
+    """Return a table as a JSON object."""
+    return {"format": FORMAT, "version": VERSION, **asdict(table)}
+
+
+def table_from_document(document: Mapping[str, Any]) -> BoardTableDocument:
+    """Return the table of a JSON object.
+
+    Raises:
+        InvalidDocument: It is none that this version knows.
+    """
+    head = {"format": FORMAT, "version": VERSION}
+    for name, wanted in head.items():
+        if document.get(name) != wanted:
+            raise InvalidDocument("board table", [(name, f"{wanted!r} is allowed")])
+    try:
+        return _adapter().validate_python(
+            {name: value for name, value in document.items() if name not in head}
+        )
+    except ValidationError as error:
+        faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
+        raise InvalidDocument("board table", faults) from error
+
+
+@cache
+def _adapter() -> TypeAdapter[BoardTableDocument]:
+    return TypeAdapter(BoardTableDocument)
+
+
+def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[AnyLine]:
+    """Move ratings and bounds so that the mean of the founders is 1000.
+
+    Newcomers then move nobody else by being strong or weak. Where not everybody is rated together
+    the lines stay as they are: their groups can't be compared anyway.
+
+    Args:
+        lines: Of a rating, named by slugs.
+        founders: Names of those whose mean is fixed; who of them has no rating is passed over.
+    """
+    parts = {line.part for line in lines if line.rating is not None}
+    fixed = [line.rating for line in lines if line.name in founders and line.rating is not None]
+    if len(parts) != 1 or not fixed:
+        return list(lines)
+    shift = MEAN - sum(fixed) / len(fixed)
+
+    def move(value: float | None) -> float | None:
+        return None if value is None else value + shift
+
+    return [
+        replace(line, rating=move(line.rating), lower=move(line.lower), upper=move(line.upper))
+        for line in lines
+    ]
+
+
+def spread_over(ranked: Sequence[AnyName], most: int) -> list[AnyName]:
+    """Return at most so many of a table's lines: the first, the last and evenly between."""
+    last = len(ranked) - 1
+    if last < most:
+        return list(ranked)
+    return [ranked[round(step * last / (most - 1))] for step in range(most)]

@@ -1,0 +1,112 @@
+"""The files of a board: each table as HTML, CSV, JSON and a chart, and a page of all of them.
+
+In: documents of tables. Out: files that any web host can serve and that open from a folder; they
+need nothing from elsewhere and have no scripts. The files of a table are written once, when it is
+published; the folder has them as they were.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from itertools import repeat
+from pathlib import Path
+from typing import Any
+
+from django.template.loader import render_to_string
+
+from arena.exports.files import write_whole
+from arena.exports.formats import (
+    NUMBER,
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Columns,
+    json_bytes,
+    sheet_csv,
+    sheet_of,
+)
+from arena.models import Board
+from arena.rating.board_table import BoardTableDocument, table_to_document
+from arena.rating.lines import Line
+from arena.results.exports.charts import rows_chart
+from arena.results.exports.tables import Row
+
+STYLE, INDEX = "board.css", "index.html"
+
+_COLUMNS: Columns = {
+    "rank": ("rank", WHOLE),
+    "contestant": ("name", TEXT),
+    "elo": ("rating", NUMBER),
+    "lower": ("lower", NUMBER),
+    "upper": ("upper", NUMBER),
+    **{name: (name, WHOLE) for name in ("votes", "wins", "ties", "losses")},
+    "slug": ("slug", TEXT),
+    "kind": ("kind", TEXT),
+    "simulated": ("is_simulated", YES_NO),
+    "since": ("since", TEXT),
+    "authors": (lambda line: "; ".join(line.authors), TEXT),
+    "open": ("is_open", YES_NO),
+    "note": ("note", TEXT),
+    "rank_best": ("rank_best", WHOLE),
+    "rank_worst": ("rank_worst", WHOLE),
+}
+
+
+def write_table(table: BoardTableDocument) -> dict[str, str]:
+    """Write the files of a table, by their endings."""
+    rows = rows_of(table)
+    simulated = " (simulated)" if table.includes_simulated else ""
+    chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
+    return {
+        "json": json_bytes(table_to_document(table)).decode(),
+        "csv": sheet_csv(sheet_of(table.lines, _COLUMNS, name="board-table")).decode(),
+        "svg": chart.decode(),
+        "html": render_to_string("boards/frozen.html", _shown(table)),
+    }
+
+
+def rows_of(table: BoardTableDocument) -> list[Row]:
+    """Return the lines as pages and charts of ratings take them."""
+    names = [one.name for one in fields(Line)]
+    return [
+        Row(
+            slug=line.slug,
+            kind=line.kind,
+            simulated=line.is_simulated,
+            **{name: getattr(line, name) for name in names},
+        )
+        for line in table.lines
+    ]
+
+
+def board_folder(board: Board) -> dict[str, bytes]:
+    """Return the files of all tables and a page that shows the newest and links to the others."""
+    tables = list(board.tables.all())
+    page = {"title": board.name, "tables": tables}
+    if tables:
+        page = _shown(tables[0].document) | page
+    files = {
+        f"table-{table.number}.{form}": text.encode()
+        for table in tables
+        for form, text in table.files.items()
+    }
+    return files | {
+        INDEX: render_to_string("boards/frozen.html", page).encode(),
+        STYLE: render_to_string("boards/board.css").encode(),
+    }
+
+
+def write_folder(files: Mapping[str, bytes], out: Path) -> None:
+    """Write files into a folder, which may have an earlier export.
+
+    Raises:
+        OSError: It can't be written to.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        write_whole(out / name, content)
+
+
+def _shown(table: BoardTableDocument) -> dict[str, Any]:
+    """What the template needs of a table; its chart is a file of its own."""
+    rows = list(zip(rows_of(table), table.lines, repeat(None)))
+    return {"title": table.board, "table": table, "rows": rows}

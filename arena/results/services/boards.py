@@ -1,0 +1,336 @@
+"""Boards: one rating over the votes of a series of studies, published as dated tables."""
+
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+from django.utils import timezone
+
+from arena.errors import StudyStillOpen
+from arena.models import Board, BoardTable, Question, Study
+from arena.models.people import fresh_token
+from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy, anchor_lines
+from arena.rating.leaderboard import Leaderboard, rate
+from arena.rating.lines import Line, says_no_order
+from arena.rating.remarks import NOT_RANKED
+from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
+from arena.rating.verdict import verdict
+from arena.results.queries.votes import (
+    AUTOMATIC,
+    Competitor,
+    Filters,
+    Judged,
+    last_vote_of,
+    vote_set,
+)
+from arena.results.services.analysis import vote_arrays
+from arena.results.services.ratings import software_versions
+from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
+from arena.studies.queries import authors_of
+from arena.studies.services.opening import preregistration_sha256, product_version
+from augment.errors import Conflict, UnknownName
+from augment.models import Benchmark, Scenario
+from augment.services.events import log_change
+from augment.services.judging.realism import REALISM_VERSION
+from augment.services.scenarios.benchmarks import Split
+from augment.services.texts import one_line
+
+LONGEST_NAME = 100
+
+WriteFiles = Callable[[BoardTableDocument], dict[str, str]]
+"""Makes the files of a table: their texts by their endings, "json" the document itself."""
+
+# --- A board and its link ----------------------------------------------------------------------
+
+
+@transaction.atomic
+def make_board(
+    *, name: str, study: Study, benchmark: Benchmark | None = None, actor: User | None = None
+) -> Board:
+    """Begin a board with its first study, whose scenarios and rules all batches share.
+
+    Args:
+        name: Of the board; batches have it in theirs, which experts see.
+        study: The first one.
+        benchmark: Whose test split it shows; None for scenarios of no benchmark.
+        actor: Who begins it, for the log.
+
+    Raises:
+        InvalidDocument: The name is empty, too long or not one line.
+        Conflict: The name is taken, the study's votes can't be pooled with others, or it does not
+            show the benchmark's test split.
+    """
+    name = one_line("name", name, what="board", longest=LONGEST_NAME)
+    try:
+        with transaction.atomic():
+            board = Board.objects.create(name=name, benchmark=benchmark)
+    except IntegrityError:
+        raise Conflict(f"There is a board named '{name}' already.") from None
+    board.studies.add(study)
+    require_poolable(board, but_open=True)
+    log_change(board, "make", actor, after={"name": name, "study": str(study.code)})
+    return board
+
+
+def board_named(name_or_code: str) -> Board:
+    """Return a board by its name or its code.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    for board in Board.objects.all():
+        if name_or_code in (board.name, str(board.code)):
+            return board
+    names = Board.objects.order_by("name").values_list("name", flat=True)
+    raise UnknownName("board", name_or_code, list(names))
+
+
+@transaction.atomic
+def share_board(board: Board, *, actor: User | None = None) -> None:
+    """Make the link by which anybody reads the board's tables; one that is there stays."""
+    if Board.objects.filter(pk=board.pk, token=None).update(token=fresh_token()):
+        log_change(board, "share results", actor)
+
+
+@transaction.atomic
+def stop_sharing_board(board: Board, *, actor: User | None = None) -> None:
+    """Take the link back for good; a later one is another."""
+    if Board.objects.filter(pk=board.pk, token__isnull=False).update(token=None):
+        log_change(board, "stop sharing results", actor)
+
+
+# --- Tables ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pool:
+    """The votes of all closed studies of a board.
+
+    Attributes:
+        competitors: Of all studies, by slug.
+        votes: Those that count, study by study.
+        founders: Slugs of the first study's contestants.
+        question: What the experts were asked.
+    """
+
+    competitors: tuple[Competitor, ...]
+    votes: tuple[Judged, ...]
+    studies: tuple[PooledStudy, ...]
+    founders: tuple[str, ...]
+    left_out: dict[str, int]
+    question: str
+
+
+def publish_table(
+    board: Board, *, write: WriteFiles, now: datetime | None = None, actor: User | None = None
+) -> BoardTable:
+    """Rate the pooled votes and keep the table and its files for good, as the next number.
+
+    Args:
+        board: Whose.
+        write: Makes the files.
+        now: The table's date; the clock's unless given.
+        actor: Who publishes, for the log.
+
+    Raises:
+        StudyStillOpen: One of the studies takes votes.
+        Conflict: No study was closed since the newest table, no vote counts, the studies can't be
+            pooled, or somebody else published meanwhile.
+    """
+    newest = board.tables.first()
+    pool = pool_votes(board)
+    known = {study.code for study in newest.document.studies} if newest else set()
+    if known >= {study.code for study in pool.studies}:
+        raise Conflict("No study of the board was closed since its newest table.")
+    if not pool.votes:
+        raise Conflict("No study of the board has votes that count.")
+    number, now = (newest.number if newest else 0) + 1, now or timezone.now()
+    before = newest.document if newest else None
+    document = make_document(board, pool, before, number=number, now=now)
+    files = write(document)
+    try:
+        with transaction.atomic():
+            table = BoardTable.objects.create(board=board, number=number, made_at=now, files=files)
+            after = {"number": number, "votes": document.votes}
+            log_change(board, "publish", actor, after=after)
+    except IntegrityError:
+        raise Conflict(f"Table {number} has just been published by somebody else.") from None
+    return table
+
+
+def pool_votes(board: Board) -> Pool:
+    """Read the votes of all studies that were closed; who was cancelled has no results.
+
+    Raises:
+        StudyStillOpen: One of them takes votes.
+        Conflict: They show different scenarios.
+    """
+    studies = require_poolable(board)
+    competitors: dict[str, Competitor] = {}
+    votes: list[Judged] = []
+    left_out: Counter[str] = Counter()
+    pooled = []
+    for study in studies:
+        filters = Filters(authors=authors_of(study))
+        found = vote_set(study, filters=filters, last=last_vote_of(study))
+        competitors |= {one.slug: one for one in found.competitors}
+        votes += found.counted
+        left_out.update(found.left_out)
+        pooled.append(_pooled(study, len(found.counted)))
+    founders = studies[0].contestants.order_by("slug").values_list("slug", flat=True)
+    return Pool(
+        competitors=tuple(competitors[slug] for slug in sorted(competitors)),
+        votes=tuple(votes),
+        studies=tuple(pooled),
+        founders=tuple(founders),
+        left_out=dict(sorted(left_out.items())),
+        question=str(Question(studies[0].questions[0]).label),
+    )
+
+
+def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
+    """Return the board's studies in order, without cancelled ones.
+
+    Args:
+        board: Whose.
+        but_open: Whether studies that take votes will do.
+
+    Raises:
+        StudyStillOpen: One of them takes votes.
+        Conflict: They show different scenarios or ask different questions, or there is none.
+    """
+    rows = board.studies.exclude(state=Study.State.CANCELLED).order_by("opened_at", "pk")
+    studies = list(rows)
+    if not studies:
+        raise Conflict("All studies of the board were cancelled: nothing can be rated.")
+    first = studies[0]
+    wanted, whose = _scenarios_of(first), f"'{first.name}'"
+    if board.benchmark is not None:
+        wanted, whose = _test_split(board.benchmark), f"the test split of {board.benchmark}"
+    for study in studies:
+        if study.state == Study.State.OPEN and not but_open:
+            raise StudyStillOpen(study.name)
+        if _scenarios_of(study) != wanted:
+            raise Conflict(
+                f"'{study.name}' does not show just the scenarios and instructions of {whose}: "
+                "its votes can't be rated on this board."
+            )
+        if study.questions[0] != first.questions[0]:
+            raise Conflict(
+                f"'{study.name}' asks something else than '{first.name}': their votes can't be "
+                "rated together."
+            )
+    return studies
+
+
+def make_document(
+    board: Board, pool: Pool, before: BoardTableDocument | None, *, number: int, now: datetime
+) -> BoardTableDocument:
+    """Rate a pool; experts and scenarios are clusters over all of its studies.
+
+    Args:
+        board: Whose votes these are.
+        pool: All of them.
+        before: The newest table so far, which knows since when who is listed.
+        number: Of the new table.
+        now: When it is made.
+    """
+    rated = rate(vote_arrays(pool.competitors, pool.votes).comparisons)
+    lines, is_ranked = _lines_of(pool, rated)
+    since = {line.slug: line.since for line in before.lines} if before else {}
+    made_at = now.astimezone(UTC).isoformat(timespec="seconds")
+    judges = {vote.judge: vote.judge_name for vote in pool.votes}
+    return BoardTableDocument(
+        board=board.name,
+        number=number,
+        made_at=made_at,
+        benchmark=str(board.benchmark or ""),
+        benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
+        question=pool.question,
+        method=f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, "
+        f"clustered by {UNIT_TEXTS[rated.unit]}",
+        answer=_answer(lines, pool, rated),
+        lines=tuple(
+            _board_line(line, competitor, since.get(competitor.slug, made_at[:10]))
+            for line, competitor in lines
+        ),
+        studies=pool.studies,
+        founders=pool.founders,
+        votes=len(pool.votes),
+        votes_sha256=digest_of(votes_csv(vote_rows(pool.votes, judges))),
+        left_out=pool.left_out,
+        notes=(*rated.reasons, *rated.warnings, *([] if is_ranked else [NOT_RANKED])),
+        versions={"scenario-arena": product_version(), "realism": str(REALISM_VERSION)}
+        | {name: str(version) for name, version in software_versions().items()},
+        includes_simulated=any(one.is_simulated for one in pool.competitors + pool.votes),
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+_SHOWN = ("slug", "type", "instruction")
+
+
+def _scenarios_of(study: Study) -> list[tuple[str, ...]]:
+    """What the study shows: scenarios with types and instructions, as frozen at its opening.
+
+    Raises:
+        Conflict: Nothing was frozen.
+    """
+    if not study.preregistration:
+        raise Conflict(f"Nobody knows what '{study.name}' showed: it has no preregistration.")
+    frozen = json.loads(study.preregistration)["scenarios"]
+    return [tuple(scenario[name] for name in _SHOWN) for scenario in frozen]
+
+
+def _test_split(benchmark: Benchmark) -> list[tuple[str, ...]]:
+    """What a study shows of a benchmark: references of the other split are known to all."""
+    items = benchmark.items.filter(split=Split.TEST)
+    scenarios = Scenario.objects.filter(benchmark_items__in=items).order_by("slug")
+    return list(scenarios.values_list(*_SHOWN))
+
+
+def _pooled(study: Study, votes: int) -> PooledStudy:
+    return PooledStudy(
+        name=study.name,
+        code=str(study.code),
+        closed_at=study.closed_at.astimezone(UTC).isoformat() if study.closed_at else "",
+        votes=votes,
+        preregistration=preregistration_sha256(study),
+        challengers=tuple(study.rules.get("challengers", ())),
+    )
+
+
+def _lines_of(pool: Pool, rated: Leaderboard) -> tuple[list[tuple[Line, Competitor]], bool]:
+    """Return the lines with whose they are, best first, and whether they have ranks."""
+    lines = anchor_lines(rated.lines, pool.founders)
+    is_ranked = not says_no_order(lines)
+    if not is_ranked:
+        lines = [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
+    return [(lines[place], pool.competitors[place]) for place in rated.order], is_ranked
+
+
+def _answer(lines: Sequence[tuple[Line, Competitor]], pool: Pool, rated: Leaderboard) -> str:
+    """The table in one sentence."""
+    place_of = {old: new for new, old in enumerate(rated.order)}
+    apart = rated.told_apart
+    pairs = (
+        None
+        if apart is None
+        else [(place_of[a], place_of[b]) for a, b in np.argwhere(apart.above).tolist()]
+    )
+    cast = sum(vote.kind != AUTOMATIC for vote in pool.votes)
+    return verdict([replace(line, name=who.name) for line, who in lines], cast, pairs)
+
+
+def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:
+    values = asdict(line) | {"name": who.name}
+    return BoardLine(
+        slug=who.slug, kind=who.kind, is_simulated=who.is_simulated, since=since, **values
+    )

@@ -1,0 +1,89 @@
+"""Boards by pages alone: from a closed study to tables that anybody reads."""
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Board, Study
+from augment.models import Contestant
+from tests.board_rows import newcomer, voted
+from tests.study_rows import a_study
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path: Path) -> None:
+    first = voted(a_study(votes_per_expert=18))
+    newcomer("dot")
+    admin, stranger = signed_in(people()["admin"]), Client()
+    admin.post(reverse("boards"), {"name": "City", "study": str(first.code)})
+    board = Board.objects.get()
+    page = reverse("board", args=[board.code])
+    assert "No table was published yet." in admin.get(page).content.decode()
+    publish = reverse("board-publish", args=[board.code])
+    admin.post(publish)
+    shown = admin.get(page).content.decode()
+    assert "with 36 votes" in shown
+    assert "Dot" in shown
+    assert "Publish a new table" not in shown
+    asked = {"newcomers": ["dot"], "experts": ["eva", "finn"], "votes_per_expert": 18}
+    answer = admin.post(reverse("board-batch", args=[board.code]), asked)
+    batch = Study.objects.get(name="City, batch 1")
+    assert answer.headers["Location"] == reverse("study", args=[batch.code])
+    assert "is still open" in admin.post(publish, follow=True).content.decode()
+    voted(batch, seed=2)
+    assert "Table 2 is published." in admin.post(publish, follow=True).content.decode()
+    old = admin.get(page, {"table": "1"}).content.decode()
+    assert "The newest table" in old
+    assert admin.get(page, {"table": "3"}).status_code == 404
+
+    admin.post(reverse("board-share", args=[board.code]))
+    board.refresh_from_db()
+    address = reverse("shared-board", args=[board.token])
+    assert address in admin.get(page).content.decode()
+    public = stranger.get(address)
+    assert "noindex" in public.headers["X-Robots-Tag"]
+    assert "72 votes" in public.content.decode()
+    assert "eva" not in public.content.decode()
+    data = stranger.get(f"{address}2.json").content
+    assert {line["slug"] for line in json.loads(data)["lines"]} == {"ann", "bob", "cid", "dot"}
+    assert stranger.get(f"{address}1.csv").content.startswith(b"rank,contestant,elo")
+    assert stranger.get(f"{address}1.html").status_code == 404
+
+    packed = admin.get(reverse("board-export", args=[board.code])).content
+    call_command("export", "board", "City", out=str(tmp_path / "site"))
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        inside = {name: archive.read(name) for name in archive.namelist()}
+    assert inside == {path.name: path.read_bytes() for path in (tmp_path / "site").iterdir()}
+    assert inside["table-2.json"] == data
+    with pytest.raises(CommandError, match="City"):
+        call_command("export", "board", "Village", out=str(tmp_path / "site"))
+
+    admin.post(reverse("board-unshare", args=[board.code]))
+    assert stranger.get(address).status_code == 404
+
+
+def test_what_is_simulated_says_so_in_every_file() -> None:
+    study = voted(a_study(votes_per_expert=18, contestants=("ann", "bob"), scenarios=18))
+    Contestant.objects.filter(slug="bob").update(kind=Contestant.Kind.SIMULATED)
+    Study.objects.filter(pk=study.pk).update(allow_simulated=True)
+    admin = signed_in(people()["admin"])
+    admin.post(reverse("boards"), {"name": "City", "study": str(study.code)})
+    board = Board.objects.get()
+    admin.post(reverse("board-publish", args=[board.code]))
+    files = board.tables.get().files
+    assert "Simulated votes and contestants count here" in files["html"]
+    assert json.loads(files["json"])["includes_simulated"]
+    assert "(simulated)" in files["svg"]
+    assert ",yes," in files["csv"] or ",true," in files["csv"].lower()
+    assert (
+        "Simulated votes and contestants count"
+        in admin.get(reverse("board", args=[board.code])).content.decode()
+    )
