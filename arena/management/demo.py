@@ -18,9 +18,18 @@ from arena.results.exports.writers import FORMATS, plain_text
 from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
-from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
+from augment.models import (
+    Augmentation,
+    BaseScene,
+    Benchmark,
+    Contestant,
+    Endpoint,
+    GenerationJob,
+    Scenario,
+)
 from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.progress import count_rows
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.tasks import enqueue_job, enqueue_simulations
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
@@ -43,6 +52,10 @@ def prepare(say: Callable[[str], None]) -> None:
     demo.load_scenarios()
     scenarios, scenes = len(demo.scenarios_of(None)), BaseScene.objects.count()
     say(f"Catalogue: {scenarios} scenarios on {scenes} scenes")
+    if not Benchmark.objects.exists():
+        make_benchmark(
+            BenchmarkRequest(slug="paper", title="The paper’s types", scenarios=["set:paper"])
+        )
     Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
     say(f"Contestants: {', '.join(Contestant.objects.values_list('slug', flat=True))}")

@@ -120,9 +120,11 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
 
 def list_benchmarks() -> QuerySet[Benchmark]:
     """Return all of them with the number of their tasks, the newest version of a name first."""
-    return Benchmark.objects.annotate(
-        tasks=Count("items"), practice=Count("items", filter=Q(items__split=Split.PRACTICE))
+    in_practice = Q(items__split=Split.PRACTICE)
+    rows = Benchmark.objects.annotate(
+        tasks=Count("items"), practice=Count("items", filter=in_practice)
     )
+    return rows.order_by("slug", "-version")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,11 +134,6 @@ class StratumCount:
     label: str
     practice: int
     test: int
-
-    @property
-    def total(self) -> int:
-        """Return both together."""
-        return self.practice + self.test
 
 
 def count_tasks(tasks: Iterable[tuple[str, str]]) -> list[StratumCount]:

@@ -56,7 +56,8 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
             with refusals_in(form, "scenarios"):
                 asked = read_request(BenchmarkRequest, form.cleaned_data, slug="", title="")
                 planned = plan_benchmark(asked)
-                more["counts"] = count_tasks((one.split, one.stratum) for one in planned)
+                counts = count_tasks((one.split, one.stratum) for one in planned)
+                more = {"counts": counts, "total": len(planned)}
     elif form.is_bound and form.is_valid():
         with refusals_in(form, "scenarios"), transaction.atomic():
             row = make_benchmark(
