@@ -1,6 +1,7 @@
 """Rows for tests of studies: contestants with pictures of scenarios, and the people who vote."""
 
 import uuid
+from collections.abc import Sequence
 from typing import TypedDict
 
 from django.contrib.auth.models import User
@@ -107,12 +108,15 @@ def expert(username: str, *, is_simulated: bool = False) -> User:
     )
 
 
-def a_study(*, votes_per_expert: int = 9, seed: int = 7, **cast: object) -> Study:
+def a_study(
+    *, votes_per_expert: int = 9, seed: int = 7, questions: Sequence[str] = (), **cast: object
+) -> Study:
     """An open study of three contestants, six scenarios and two experts, unless told otherwise."""
     return open_study(
         name="Round 1",
         votes_per_expert=votes_per_expert,
         seed=seed,
+        questions=tuple(questions),
         **cast_of(**cast),  # type: ignore[arg-type]
     )
 

@@ -122,6 +122,9 @@ class Matchup(Coded):
         related_name="repeated_by",
         help_text="the main matchup that this one shows again, sides swapped",
     )
+    asked = ""
+    """The question that comes next, where a query of the voting page has looked it up."""
+
     batch = models.PositiveIntegerField(
         default=0, help_text="0 was planned at the opening; later plannings count up"
     )

@@ -65,6 +65,9 @@ class WholeStudyDocument(StudyDocument):
     contestants = NamesField("slug", source="study.contestants")
     scenarios = NamesField("slug", source="study.scenarios")
     experts = NamesField("username", source="study.experts")
+    questions = serializers.ListField(
+        child=serializers.CharField(), source="study.questions", help_text="The primary one first."
+    )
     votes_per_expert = serializers.IntegerField(source="study.votes_per_expert")
     seed = serializers.IntegerField(source="study.seed")
 

@@ -6,7 +6,7 @@ from typing import Any, Self
 from django import forms
 from django.contrib.auth.models import User
 
-from arena.models import Study
+from arena.models import Question, Study
 from arena.site.forms import ChoiceForm, form_field, offer
 from arena.studies.queries import finished_scenarios, scenario_sources
 from arena.studies.services.drafts import SWITCHES
@@ -39,6 +39,7 @@ class StudyForm(ChoiceForm):
         rows = [row for group in self.groups for row in group.scenarios]
         offer(self, "scenarios", [*self.sources.items(), *((row.slug, row.slug) for row in rows)])
         offer(self, "jobs", [(str(job.code), job.name) for job in jobs])
+        offer(self, "questions", Question.choices)
         offer(self, "experts", [(user.get_username(), user.get_username()) for user in experts])
         self.fields["experts"].error_messages["required"] = "Choose at least one expert."
 
@@ -62,6 +63,10 @@ class StudyForm(ChoiceForm):
             return singles
         self.source_job = chosen[0].partition("job:")[2]
         return finished_scenarios(self.cleaned_data.get("contestants", ()), chosen[0])
+
+    def clean_questions(self) -> list[str]:
+        """Return the primary one, which may be ticked besides, and the others."""
+        return list(dict.fromkeys(self.cleaned_data["questions"]))
 
     @property
     def singles(self) -> int:

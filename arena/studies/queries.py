@@ -24,7 +24,7 @@ from arena.models import (
 )
 from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
-from arena.voting.queries.ballots import ExpertTally, VotingProgress, tallies
+from arena.voting.queries.ballots import ExpertTally, VotingProgress, of_skipped_pair, tallies
 from augment.errors import UnknownName
 from augment.models import (
     Augmentation,
@@ -87,17 +87,17 @@ def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[St
     matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
     if expert is not None:
         matchups = matchups.filter(expert=expert)
-    is_skip = Q(outcome=Vote.Outcome.SKIP)
     current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
-    votes = current.values_list("matchup__study")
     totals = dict(matchups.order_by().values_list("study").annotate(n=Count("pk")))
-    voted = dict(votes.exclude(is_skip).annotate(n=Count("pk")))
-    skipped = dict(votes.filter(is_skip).annotate(n=Count("pk")))
+    answers = current.exclude(of_skipped_pair()).values_list("matchup__study", "question")
+    voted = {(study, asked): n for study, asked, n in answers.annotate(n=Count("pk"))}
+    skips = current.filter(outcome=Vote.Outcome.SKIP).values_list("matchup__study")
+    skipped = dict(skips.annotate(n=Count("pk")))
     return [
         StudyProgress(
             study=study,
             total=totals.get(study.pk, 0),
-            voted=voted.get(study.pk, 0),
+            voted=voted.get((study.pk, study.questions[-1]), 0),
             skipped=skipped.get(study.pk, 0),
         )
         for study in studies
@@ -265,10 +265,10 @@ def enrolled_voters(study: Study) -> Voters:
     `last_vote_at` and `is_done`.
     """
     mine = Q(expert__matchups__study=study)
-    answered = mine & Q(expert__matchups__votes__isnull=False)
     skipped = mine & Q(
         expert__matchups__votes__outcome="skip", expert__matchups__votes__superseded_by=None
     )
+    answered = skipped | (mine & Q(expert__matchups__votes__question=study.questions[-1]))
     is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
     return (
         EnrolledVoter.objects.filter(enrolment__study=study)

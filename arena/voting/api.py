@@ -22,7 +22,7 @@ from arena.api.fields import (
 )
 from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
-from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
+from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Study, Vote
 from arena.people.services import keep_voting
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.voting.queries.ballots import upcoming
@@ -49,6 +49,10 @@ class MatchupDocument(serializers.Serializer[Any]):
 
     matchup = serializers.UUIDField()
     position = serializers.IntegerField()
+    question = serializers.ChoiceField(
+        choices=Question.choices,
+        help_text="What is asked next; a pair comes until all are answered.",
+    )
     instruction = serializers.CharField()
     a = serializers.CharField(help_text="The address of a picture.")
     b = serializers.CharField(help_text="The address of a picture.")
@@ -74,6 +78,9 @@ class VoteBody(StrictSerializer):
 
     key = CodeField()
     matchup = CodeField()
+    question = serializers.ChoiceField(
+        choices=Question.choices, required=False, allow_blank=True, default=""
+    )
     outcome = serializers.ChoiceField(choices=list(OUTCOMES))
     both_miss = FlagField(required=False, default=False)
     strength = serializers.ChoiceField(

@@ -4,13 +4,14 @@ from typing import Any
 
 from django.contrib.auth.models import User
 from django.core.exceptions import ValidationError
+from django.db.models import Q
 from django.db.models.functions import Length
 from django.urls import reverse
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
-from arena.models import OUTCOME_LETTERS, Report, Study, Vote
+from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
 from arena.studies.queries import enrolled_voters
 from arena.studies.services.experts import SIDES
 from arena.voting.queries.ballots import own_votes, upcoming, voting_progress
@@ -21,6 +22,7 @@ AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""
 
 UNDOABLE = 10
+"""How many pairs back; each question of one is a step."""
 
 LONGEST = 3
 """How many instructions: which of them takes most lines depends on words and fonts."""
@@ -41,7 +43,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             the next pair.
     """
     pairs = [as_shown(matchup) for matchup in upcoming(study=study, expert=expert, n=AHEAD)]
-    context = over_context(study, expert)
+    context = over_context(study, expert) | _asked(study)
     changed = _vote_of_key(study, expert, change)
     if not pairs and changed is None:
         return None
@@ -53,7 +55,6 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "rings": not study.rules.get("hide_rings"),
     }
     keys = {name: keys for name, keys in KEYS.items() if has.get(name, True)}
-    by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
     alts = {
         "a": _("Image A, edited scene"),
         "b": _("Image B, edited scene"),
@@ -61,7 +62,6 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     }
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
-        "longest": list(by_length.values_list("instruction", flat=True)[:LONGEST]),
         "alts": alts,
         "modules": MODULES,
         "legend": switches["legend"],
@@ -73,6 +73,8 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "looks": [(name, label) for name, label in _looks().items() if name in keys],
         "given": {
             "study": str(study.code),
+            "questions": context["questions"],
+            "undoable": UNDOABLE * len(study.questions),
             "outbox": f"arena votes {expert.person.code} {study.code}",
             "urls": _urls(study),
             "alts": alts,
@@ -93,18 +95,32 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
 def over_context(study: Study, expert: User) -> dict[str, Any]:
     """Return what the pages without a pair show."""
     is_open = study.state == Study.State.OPEN
+    undoable = UNDOABLE * len(study.questions)
     return {
         "study": study,
         "progress": voting_progress(study=study, expert=expert),
-        "last": list(own_votes(study, expert).reverse()[:UNDOABLE]) if is_open else [],
+        "last": list(own_votes(study, expert).reverse()[:undoable]) if is_open else [],
         "enrolled": enrolled_voters(study).filter(expert=expert).first(),
+    }
+
+
+def _asked(study: Study) -> dict[str, Any]:
+    """What is asked about each pair, as a voter reads it."""
+    questions = {key: str(Question(key).label) for key in study.questions}
+    by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
+    return {
+        "questions": questions,
+        "first_question": questions[study.questions[0]],
+        "longest_question": max(questions.values(), key=len),
+        "longest": list(by_length.values_list("instruction", flat=True)[:LONGEST]),
     }
 
 
 def _seen_today(study: Study, expert: User) -> list[int | None]:
     """How long each pair was on the screen that the expert decided today, in ms."""
     votes = own_votes(study, expert).filter(at__date=timezone.localdate())
-    return list(votes.values_list("ms_visible", flat=True))
+    ends = votes.filter(Q(question=study.questions[-1]) | Q(outcome=Vote.Outcome.SKIP))
+    return list(ends.values_list("ms_visible", flat=True))
 
 
 def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
@@ -116,8 +132,10 @@ def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
 
 
 def _as_json(vote: Vote) -> dict[str, Any]:
+    vote.matchup.asked = vote.question
     return {
         "key": str(vote.key),
+        "question": vote.question,
         "position": vote.matchup.position,
         "outcome": OUTCOME_LETTERS[vote.outcome],
         "both_miss": vote.both_miss,

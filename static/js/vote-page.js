@@ -62,8 +62,23 @@ export function drawPair({ instruction, position, legend, unchanged = [], width,
   document.title = document.title.replace(/\d+/, position);
 }
 
-export function drawReview(vote) {
-  at("question").textContent = vote ? text(vote.outcome === "skip" ? "changing-skip" : "changing", vote.position, wordOf(vote)) : text("question");
+const keysOfQuestions = Object.keys(given.questions);
+const isOne = keysOfQuestions.length === 1;
+
+// Which question of how many, where there are several.
+const stepOf = (question) => text("step", keysOfQuestions.indexOf(question) + 1, keysOfQuestions.length);
+
+export const asking = (question) => (isOne ? "" : `${stepOf(question)}. ${given.questions[question]}`);
+
+// Whether somebody may add to Equal that both miss the instruction.
+export const maybeNeither = (question) => question === "instruction";
+
+export function drawQuestion(question, vote) {
+  const changing = vote && text(vote.outcome === "skip" ? "changing-skip" : "changing", vote.position, wordOf(vote));
+  const asks = given.questions[question];
+  at("question").textContent = !vote ? asks : isOne ? changing : `${asks} ${changing}`;
+  at("step").textContent = isOne ? "" : stepOf(question);
+  for (const neither of all("[value=both_miss]")) neither.disabled = !maybeNeither(question);
   at("leave").hidden = !vote;
   const pressed = vote?.both_miss ? "both_miss" : vote?.outcome.toLowerCase();
   for (const button of all(".answers button")) {
@@ -89,7 +104,7 @@ export function drawLast(votes) {
     const item = at("last-one").content.cloneNode(true);
     const [link] = item.querySelectorAll("a");
     link.dataset.vote = vote.key;
-    link.ariaLabel = text("change", vote.position, wordOf(vote));
+    link.ariaLabel = text("change", vote.position, wordOf(vote)) + (isOne ? "" : `. ${asking(vote.question)}`);
     link.children[0].textContent = vote.position;
     link.children[1].textContent = wordOf(vote);
     return item;

@@ -61,7 +61,7 @@ export class Pairs {
   take(shownOnes) {
     this.#tries = 0;
     for (const shown of shownOnes) {
-      const held = this.list.find((pair) => pair.shown.matchup === shown.matchup);
+      const held = this.held(shown);
       if (held?.state === "broken") held.load(shown);
       else if (!held && !this.#decided.has(shown.matchup)) this.list.push(this.make(shown));
     }
@@ -69,13 +69,28 @@ export class Pairs {
     this.changed();
   }
 
+  held({ matchup }) {
+    return this.list.find((pair) => pair.shown.matchup === matchup);
+  }
+
+  // A pair with a question left: it comes before all others, also after it was decided.
+  keep(pair, question) {
+    pair.shown.question = question;
+    this.#decided.delete(pair.shown.matchup);
+    if (!this.held(pair.shown)) this.list.unshift(pair);
+  }
+
   decide(matchup) {
     this.#decided.add(matchup);
     this.list = this.list.filter((pair) => pair.shown.matchup !== matchup);
   }
 
-  reopen(matchup) {
+  // What the server did not take is asked again.
+  reopen({ matchup, question }) {
     this.#decided.delete(matchup);
+    const held = this.held({ matchup });
+    if (held && question) held.shown.question = question;
+    this.changed();
   }
 
   async fill() {

@@ -1,5 +1,6 @@
 // The voting loop: pairs are decoded ahead; a vote is written down in the browser, the next pair
-// is painted, and the vote goes out in the background.
+// is painted, and the vote goes out in the background. A pair stays until its last question is
+// answered.
 import { actionOf } from "./vote-keys.js";
 import { Lens } from "./vote-lens.js";
 import { ask, Outbox } from "./vote-outbox.js";
@@ -10,18 +11,22 @@ import { hold } from "./vote-tabs.js";
 
 // The second half of a double press must not judge the next pair.
 const BOUNCE_MS = 200;
-const UNDOABLE = 10;
 const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
 const { at, given, text } = page;
-const { preferences, urls } = given;
+const { preferences, undoable, urls } = given;
+const questions = Object.keys(given.questions);
 const form = at("vote");
 const field = form.elements.comment;
-// The votes, the latest first: {key, position, outcome, both_miss, strength, comment, shown, pair};
-// the one of them whose pair is on the screen again; the pair whose pictures are painted.
+// The votes, the latest first: {key, position, question, outcome, both_miss, strength, comment,
+// shown, pair}; the one of them whose pair is on the screen again; the pair that is judged, the one
+// whose pictures are painted, since when, and what is asked about it: a vote to change, or a question.
 let votes = given.last;
 let review = null;
 let onScreen = null;
+let painted = null;
+let shownAt = 0;
+let asked = null;
 let paintedAt = Infinity;
 let hiddenMs = 0;
 let isLeaving = false;
@@ -36,6 +41,28 @@ const outbox = new Outbox(given.outbox, urls, {
   stopped,
 });
 
+// --- Questions -----------------------------------------------------------------------------------
+
+const question = () => review?.question ?? onScreen.shown.question;
+const votesOn = ({ matchup }) => votes.filter(({ shown }) => shown.matchup === matchup);
+const isSkipped = (shown) => votesOn(shown).some(({ outcome }) => outcome === "skip");
+
+// What is asked next of a pair, from the question that its server knows of; undefined when done.
+function nextOf(shown) {
+  if (isSkipped(shown)) return undefined;
+  const answered = votesOn(shown).map((vote) => vote.question);
+  return questions.slice(questions.indexOf(shown.question)).find((key) => !answered.includes(key));
+}
+
+// Answers that wait here may be ahead of what the server says.
+function caughtUp(shownOnes) {
+  for (const shown of shownOnes) shown.question = nextOf(shown) ?? shown.question;
+  return shownOnes;
+}
+
+// Of a pair that was skipped only the skip can be changed; other answers wait behind it.
+const changeable = () => votes.filter(({ question: key, shown }) => key === questions[0] || !isSkipped(shown));
+
 // --- Painting ------------------------------------------------------------------------------------
 
 function draw() {
@@ -47,29 +74,36 @@ function draw() {
   at("answers").inert = !isReady;
   form.inert = state === "loading";
   if (isReady) {
-    if (pair !== onScreen) paint(pair);
+    if (pair !== painted || asked !== (review ?? pair.shown.question)) paint(pair);
     return;
   }
   // What does not show can be skipped.
   onScreen = form.inert ? null : pair;
+  painted = null;
   at("veil-text").textContent = text(state);
   at("again").hidden = form.inert;
   if (!pair) finish();
 }
 
+// Another question about the same pair leaves pictures and tools as they are.
 function paint(pair) {
-  onScreen = pair;
+  const isNew = pair !== painted;
+  onScreen = painted = pair;
+  asked = review ?? pair.shown.question;
   paintedAt = Infinity;
-  page.drawPair(pair.shown);
-  lens.show(pair, preferences.keep_zoom);
-  form.dataset.matchup = pair.shown.matchup;
-  form.elements.report_side.value = "both";
-  page.drawReview(review);
+  if (isNew) {
+    page.drawPair(pair.shown);
+    lens.show(pair, preferences.keep_zoom);
+    form.dataset.matchup = pair.shown.matchup;
+    form.elements.report_side.value = "both";
+  }
+  page.drawQuestion(question(), review);
+  if (!isNew) page.say(page.asking(question()));
   field.value = (review ? review.comment : pair.draft) ?? "";
   page.drawComment(field.value);
   requestAnimationFrame(() => {
     paintedAt = performance.now();
-    hiddenMs = 0;
+    if (isNew) [shownAt, hiddenMs] = [paintedAt, 0];
     setTimeout(afterwards);
   });
 }
@@ -77,7 +111,7 @@ function paint(pair) {
 // What need not be in the same frame.
 function afterwards() {
   page.replay(at("ask"));
-  page.drawLast(votes);
+  page.drawLast(changeable());
   drawPace();
   const coming = pairs.list[review ? 0 : 1];
   coming?.warm();
@@ -93,38 +127,52 @@ function decide(outcome, more = {}) {
   if (!(now - paintedAt >= BOUNCE_MS)) return page.replay(at("saved"));
   const { shown } = onScreen;
   const [key, comment] = [page.freshKey(), field.value.trim()];
-  const body = { key, matchup: shown.matchup, outcome, ...more, comment, aids: [...lens.aids] };
-  body.ms_visible = Math.round(now - paintedAt - hiddenMs);
+  // A skip is of the whole pair, whatever was asked last.
+  const body = { key, matchup: shown.matchup, question: outcome === "skip" ? questions[0] : question() };
+  Object.assign(body, { outcome, ...more, comment, aids: [...lens.aids] });
+  body.ms_visible = Math.round(now - shownAt - hiddenMs);
   const vote = voteOf({ body, shown }, onScreen);
+  const isIt = (one) => one?.question === body.question;
+  const old = isIt(review) ? review : votesOn(shown).find(isIt);
   page.note("");
   page.closePop();
-  if (review) {
-    const isSame = ["outcome", "both_miss", "strength", "comment"].every((name) => vote[name] === review[name]);
+  if (old) {
+    const isSame = ["outcome", "both_miss", "strength", "comment"].every((name) => vote[name] === old[name]);
     if (isSame && outcome !== "skip") return leave();
-    body.supersedes = review.key;
-    Object.assign(review, vote);
-    review = null;
+    body.supersedes = old.key;
+    Object.assign(old, vote);
   } else {
-    votes = [vote, ...votes].slice(0, UNDOABLE);
-    pairs.decide(shown.matchup);
-    setTimeout(count, 0, body.ms_visible);
+    votes = [vote, ...votes].slice(0, undoable);
   }
+  if (!review) onScreen.draft = "";
+  const next = settle(onScreen);
+  if (!review && !next) setTimeout(count, 0, body.ms_visible);
+  review = null;
   outbox.add("votes", body, shown);
   draw();
 }
 
-function voteOf({ body, shown }, pair) {
-  const { key, outcome, comment, both_miss = false, strength = "" } = body;
-  return { key, outcome, comment, both_miss, strength, position: shown.position, shown, pair };
+// The next question takes the place of the last one; without one the pair is done.
+function settle(pair) {
+  const next = nextOf(pair.shown);
+  if (next) pairs.keep(pair, next);
+  else pairs.decide(pair.shown.matchup);
+  return next;
 }
 
-function undo(vote = votes[review ? votes.indexOf(review) + 1 : 0]) {
+function voteOf({ body, shown }, pair) {
+  const { key, question: of = questions[0], outcome, comment, both_miss = false, strength = "" } = body;
+  return { key, question: of, outcome, comment, both_miss, strength, position: shown.position, shown, pair };
+}
+
+function undo(vote) {
+  const earlier = changeable();
+  vote ??= earlier[review ? earlier.indexOf(review) + 1 : 0];
   if (!vote) return page.note(text("no-more"));
   if (onScreen && !review) onScreen.draft = field.value;
   page.closePop();
-  if (vote.pair?.state !== "ready") vote.pair = pairs.make(vote.shown);
+  if (vote.pair?.state !== "ready") vote.pair = pairs.held(vote.shown) ?? pairs.make(vote.shown);
   review = vote;
-  onScreen = null;
   draw();
 }
 
@@ -132,8 +180,7 @@ function leave() {
   lens.flip(false);
   if (!at("pause").hidden) rest();
   if (!review) return;
-  review = onScreen = null;
-  page.drawReview(null);
+  review = null;
   draw();
 }
 
@@ -151,9 +198,10 @@ function saved({ to }, body) {
   page.unblock();
   if (to === "reports") return page.note(text("reported"));
   page.drawProgress(body);
-  pairs.take(body.next);
-  if (onScreen && !review && !outbox.entries.length) {
-    page.say(text("spoken", onScreen.shown.position, given.total, onScreen.shown.instruction));
+  pairs.take(caughtUp(body.next));
+  if (onScreen && !review && !outbox.entries.length && question() === questions[0]) {
+    const { position, instruction } = onScreen.shown;
+    page.say(`${text("spoken", position, given.total, instruction)} ${page.asking(question())}`.trim());
   }
 }
 
@@ -163,10 +211,10 @@ function refused({ to, body: vote }, status, answer) {
   if (stored === vote.outcome) return;
   if (stored) page.note(text("first-counts", text(stored)));
   else page.note(text(status === 404 ? "taken-back" : "not-accepted"));
-  if (!stored && status !== 404) pairs.reopen(vote.matchup);
   if (review?.key === vote.key) leave();
   votes = votes.filter(({ key }) => key !== vote.key);
-  page.drawLast(votes);
+  if (!stored && status !== 404) pairs.reopen(vote);
+  page.drawLast(changeable());
   pairs.fill();
 }
 
@@ -185,7 +233,7 @@ async function fetchPairs(n) {
   if ([401, 403, 410].includes(status)) stopped(status);
   if (status !== 200) return null;
   page.unblock();
-  return body;
+  return caughtUp(body);
 }
 
 // No pair is left here; the server knows whether that is all.
@@ -209,7 +257,7 @@ const actions = {
   b: () => prefer("B", "slightly"),
   a_clearly: () => given.ask_strength && prefer("A", "clearly"),
   b_clearly: () => given.ask_strength && prefer("B", "clearly"),
-  both_miss: () => given.allow_both_miss && decide("E", { both_miss: true }),
+  both_miss: () => given.allow_both_miss && page.maybeNeither(question()) && decide("E", { both_miss: true }),
   undo: () => undo(),
   skip: () => page.showPop("skip"),
   report: () => page.showPop("report"),
@@ -335,16 +383,18 @@ async function start() {
   classList.add("is-live");
   if (!(await hold(given.outbox, elsewhere))) return elsewhere();
   const waiting = outbox.entries.filter(({ to }) => to === "votes").map((entry) => voteOf(entry));
-  const byMatchup = new Map([...votes.reverse(), ...waiting].map((vote) => [vote.shown.matchup, vote]));
-  votes = [...byMatchup.values()].reverse().slice(0, UNDOABLE);
-  for (const matchup of byMatchup.keys()) pairs.decide(matchup);
+  const keyOf = ({ shown, question: key }) => `${shown.matchup} ${key}`;
+  const cast = new Map([...votes.reverse(), ...waiting].map((vote) => [keyOf(vote), vote]));
+  votes = [...cast.values()].reverse();
+  for (const { shown } of votes) if (!nextOf(shown)) pairs.decide(shown.matchup);
+  votes = votes.slice(0, undoable);
   page.drawSaved(outbox.entries.length);
-  page.drawLast(votes);
-  pairs.take(given.pairs);
+  page.drawLast(changeable());
+  pairs.take(caughtUp(given.pairs));
   outbox.start();
   const { change } = given;
   // One that was skipped long ago is none of the last votes.
-  if (change) undo(byMatchup.get(change.shown.matchup) ?? change);
+  if (change) undo(cast.get(keyOf(change)) ?? change);
 }
 
 start();

@@ -21,6 +21,7 @@ def test_every_field_of_a_plan_can_be_given() -> None:
         **{"votes_per_expert": 7, "seed": 2, "samples": "all", "jobs": ["Round 1"]},
         **dict.fromkeys(("repeats", "checks", "overlap"), 25.0),
         "hypotheses": ["ann above bob"],
+        "questions": ["realism", "instruction"],
     }
     given |= {one.name: not one.default for one in PLAN_INPUTS if one.kind is InputKind.SWITCH}
     body = StudyBody(data=given)

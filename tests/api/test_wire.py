@@ -26,6 +26,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
         {
             "matchup": str(matchup.code),
             "position": matchup.position,
+            "question": "instruction",
             "instruction": matchup.scenario.instruction,
             "a": f"/i/{matchup.left_token}",
             "b": f"/i/{matchup.right_token}",

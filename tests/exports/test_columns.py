@@ -15,8 +15,10 @@ from tests.results.old import OLD, stored
 
 pytestmark = pytest.mark.django_db
 
-ADDED = ("rank_best", "rank_worst", "preregistration", "options")
+ADDED = ("rank_best", "rank_worst", "preregistration", "options", "question")
 """The columns that files of an old rating did not have, in their order at the end."""
+OF_ALL = ("preregistration", "question")
+"""Those that JSON says once."""
 
 
 @pytest.fixture
@@ -38,11 +40,11 @@ def test_files_of_an_old_rating_are_what_they_were_but_for_the_ranks_at_their_en
     assert digest(before) == OLD["files"]["leaderboard.csv"]
     document = json.loads(FORMATS["json"].write(table))
     for line in document["standings"]:
-        of_a_line = [name for name in ADDED if name != "preregistration"]
+        of_a_line = [name for name in ADDED if name not in OF_ALL]
         assert list(line)[-len(of_a_line) :] == of_a_line
         for name in of_a_line:
             del line[name]
-    for name in ("preregistration", "hypotheses"):
+    for name in (*OF_ALL, "hypotheses"):
         del document[name]
     text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
     assert digest(text) == OLD["files"]["leaderboard.json"]

@@ -8,6 +8,8 @@ from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Study
 from arena.results.pages.tabs import FOR_EXPERTS, TABS
+from arena.results.queries.votes import Filters
+from arena.results.services.questions import compare_questions
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.scene.entities import ScenarioType
@@ -144,3 +146,29 @@ def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> Non
     assert "Early look: the study was still open." in shown
     Study.objects.filter(pk=study.pk).update(state=Study.State.OPEN)
     assert "still open" in admin.get(address).content.decode(), "each opens for themselves"
+
+
+def test_questions_stand_side_by_side_and_are_never_averaged(reader: Client) -> None:
+    study = study_rows.a_study(votes_per_expert=9, questions=("instruction", "realism"))
+    for number, matchup in enumerate(study.matchups.order_by("pk")):
+        best = min(matchup.left.contestant.slug, matchup.right.contestant.slug)
+        better = "left" if matchup.left.contestant.slug == best else "right"
+        worse = "right" if better == "left" else "left"
+        study_rows.vote(matchup, better if number % 6 else worse)
+        other = better if number == 1 else "equal" if number == 2 else worse
+        study_rows.vote(matchup, other, question="realism")
+    study = close_study(study=study)
+    alone = rate(study=study, rounds=50)
+    shown = page(reader, study)
+    assert "Realism is not rated in the same way yet." in shown
+    rate(study=study, rounds=50, filters=Filters(question="realism", leave_out_settled=True))
+    assert compare_questions(alone).ratings["realism"] is None  # type: ignore[union-attr]
+    newest = rate(study=study, rounds=50, filters=Filters(question="realism"))
+    (link,) = compare_questions(newest).links  # type: ignore[union-attr]
+    assert (link.spearman, link.pairs) == (pytest.approx(-1.0), 17)
+    assert link.same.value == pytest.approx(4 / 17), "three slips, and one that both like"
+    shown = page(reader, study)
+    assert "rank correlation of ratings −1.00 (Spearman)" in shown
+    assert "of 17 pairs decided in both" in shown
+    assert f'?rating={alone.code}">Instruction</a>' in shown
+    assert "question realism" in shown

@@ -60,6 +60,7 @@ _SHOWN: dict[str, Value] = {
     "augmentation_b": "right.code",
 }
 _JUDGED: dict[str, Value] = {
+    "question": "question",
     "outcome": "outcome",
     "both_miss": "both_miss",
     "strength": "strength",

@@ -11,7 +11,7 @@ from typing import Any
 from django.db.models import F
 
 from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO
-from arena.models import Snapshot, Standing
+from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
 from arena.rating.lines import Line, notes_by_reason, says_no_order
 from arena.rating.remarks import NOT_RANKED
@@ -48,7 +48,9 @@ def method_text(rating: Snapshot) -> str:
         else f"by {rating.rounds} resamples of {unit}"
     )
     method = METHOD_TEXTS[rating.method]
-    return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}"
+    is_usual = rating.study.questions == [Question.INSTRUCTION]
+    asked = "" if is_usual else f", question {rating.question}"
+    return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}{asked}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +101,11 @@ class LeaderboardTable:
     def study(self) -> str:
         """The study's name."""
         return self.snapshot.study.name
+
+    @property
+    def question(self) -> str:
+        """What was asked in the votes that are rated."""
+        return self.snapshot.question
 
     @property
     def is_simulated(self) -> bool:
@@ -272,6 +279,7 @@ COLUMNS = (
     _column("preregistration", key=""),
     Column(field="ranks_text", printed="95% ranks"),
     _column("options"),
+    _column("question", key=""),
 )
 
 IN_FILES = tuple(column for column in COLUMNS if column.name)

@@ -40,7 +40,9 @@ def vote_table(snapshot: Snapshot) -> Sheet:
 
 def unrated_votes(study: Study) -> Sheet:
     """Return the votes of a study that nobody rates, repeats and checks too; no skips."""
-    current = current_votes(study, Filters(), last_vote_of(study))
+    last = last_vote_of(study)
+    asked = [Filters(question=question) for question in study.questions]
+    current = [vote for filters in asked for vote in current_votes(study, filters, last)]
     decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
     return _sheet(vote_rows(decided, names), VERSION)
@@ -72,5 +74,6 @@ def _list_row(line: ListedVote) -> tuple[object, ...]:
         vote.outcome if vote.outcome in ("left", "right") else None,
         *(vote.ms_visible, vote.is_simulated, vote.at.isoformat(timespec="milliseconds")),
         *(matchup.position, vote.aids, vote.comment, left.code, right.code, vote.strength),
+        vote.question,
         *(line.mark, vote.reason, vote.key),
     )

@@ -79,6 +79,7 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
         "format": "scenario-arena/leaderboard",
         "version": 1,
         "study": table.study,
+        "question": table.question,
         "simulated": table.is_simulated,
         "early": table.early,
         "method": {

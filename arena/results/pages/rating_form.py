@@ -9,7 +9,7 @@ from django.db import transaction
 from django.http import HttpRequest
 
 from arena import tasks
-from arena.models import Snapshot, Study
+from arena.models import Question, Snapshot, Study
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
 from arena.site.forms import RequestForm, offer
@@ -32,9 +32,15 @@ class RatingForm(RequestForm):
     experts = AnyOf(required=False)
 
     def __init__(
-        self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
+        self,
+        data: dict[str, Any] | None = None,
+        *,
+        snapshot: Snapshot | None = None,
+        study: Study | None = None,
     ) -> None:
         super().__init__(data)
+        if study is not None:
+            offer(self, "question", ((key, Question(key).label) for key in study.questions))
         for name in ("method", "rounds", "seed"):
             self.fields[name].required = False
         offer(self, "types", type_choices())

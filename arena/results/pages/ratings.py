@@ -71,7 +71,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
     }
     if is_staff:
-        context["form"] = RatingForm(snapshot=snapshot)
+        context["form"] = RatingForm(snapshot=snapshot, study=study)
         # Votes from a file have no page of a study, where the files are otherwise.
         context["export"] = export_place(study, user) if is_imported(study) else None
     if is_staff and (link := getattr(snapshot, "shared", None)):

@@ -26,6 +26,7 @@ from arena.results.pages.plots import PlacedInterval, plot
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
+from arena.results.services.questions import compare_questions
 from augment.models import EndpointModel, Simulation
 from augment.services.judging.driving_scores import scores_of_augmentations
 from augment.services.judging.simulations import SCORES, Options
@@ -68,6 +69,11 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "both_miss_share": both_miss / max(snapshot.votes_counted, 1),
         "weighed_order": [names[slug] for slug in order],
     }
+
+
+def fill_all(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """The same, with the study's questions beside each other where it asks several."""
+    return fill_table(snapshot, table) | {"questions": compare_questions(snapshot)}
 
 
 def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -243,7 +249,7 @@ def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
-    "table": fill_table,
+    "table": fill_all,
     "pairs": fill_pairs,
     "types": fill_types,
     "raters": fill_raters,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from arena.models import Question
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Method
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
@@ -43,6 +44,13 @@ class RatingRequest:
         InputKind.WHOLE, "Rounds", least=1, most=MOST_ROUNDS, default=DEFAULT_ROUNDS
     )
     seed: int = input_field(InputKind.WHOLE, "Seed", least=0, most=HIGHEST_SEED, default=0)
+    question: str | None = input_field(
+        InputKind.CHOICE,
+        "Question",
+        "One that the study asks; its primary one unless given.",
+        choices=dict(Question.choices),
+        default=None,
+    )
     types: Sequence[str] = input_field(InputKind.NAMES, "Scenario types", default=())
     experts: Sequence[str] = input_field(
         InputKind.NAMES, "Experts", "Codes as a rating names them; none for all.", default=()
@@ -75,5 +83,6 @@ class RatingRequest:
                 kinds=(MAIN, REPEAT) if self.with_repeats else (MAIN,),
                 leave_out_settled=self.leave_out_settled,
                 leave_out_own=self.leave_out_own,
+                question=self.question or "",
             ),
         )

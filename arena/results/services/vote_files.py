@@ -47,14 +47,15 @@ COLUMNS = (
     "augmentation_a",
     "augmentation_b",
     "strength",
+    "question",
 )
 """The first three are Chatbot Arena's; `model_a` was on the left, `side` is the winner's.
 `augmentation_a` is the code of what `model_a` made."""
 
-VERSION = 3
+VERSION = 4
 """Of the columns, kept with a snapshot: its file and the hash of it stay as they were."""
 
-_WIDTHS = {1: 10, 2: 16, VERSION: len(COLUMNS)}
+_WIDTHS = {1: 10, 2: 16, 3: 17, VERSION: len(COLUMNS)}
 """So many columns, the first ones, by version."""
 
 Row = tuple[str | int | bool | None, ...]
@@ -98,6 +99,7 @@ def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row
             vote.left_code,
             vote.right_code,
             vote.strength,
+            vote.question,
         )
 
 

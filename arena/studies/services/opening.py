@@ -18,6 +18,7 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Question, Study
+from arena.models.studies import one_question
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.pairing.rules import ATTENTION_CHECKS, MOST_CHECKS, Triple, check_share, draw_shown
 from arena.people.queries import experts as expert_accounts
@@ -69,7 +70,8 @@ def open_study(
     Raises:
         InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A contestant, scenario or expert does not exist.
-        Conflict: The name is taken, the seed out of range, or something simulated unasked.
+        Conflict: The name is taken, the seed out of range, a question unknown, or something
+            simulated unasked.
         NothingToPlan: A target or hypothesis can't be read; pictures, drives or checks are
             missing.
     """
@@ -77,6 +79,7 @@ def open_study(
     if Study.objects.filter(name=name).exists():
         raise Conflict(f"There is a study named '{name}' already.")
     check_seed(study_plan.seed)
+    check_questions(study_plan.questions or one_question())
     contestants, scenarios = _contestants(study_plan), _scenarios(study_plan)
     accounts = {user.username: user for user in expert_accounts()}
     experts = find_named("expert", study_plan.experts, accounts)
@@ -239,6 +242,7 @@ def _insert(
                 votes_per_expert=rules.votes_per_expert,
                 seed=rules.seed,
                 rules=frozen,
+                questions=list(study_plan.questions) or one_question(),
                 opened_at=timezone.now(),
                 **switches | {"allow_simulated": has_simulated},
             )
@@ -284,6 +288,10 @@ def _preregistration(study: Study) -> dict[str, Any]:
         "choices": {name.removeprefix("allow_"): getattr(study, name) for name in SWITCH_COLUMNS},
         "contestants": [_contestant_document(row) for row in contestants],
         "scenarios": list(scenarios),
+        "questions": [
+            {"key": key, "text": str(Question(key).label), "is_primary": key == study.questions[0]}
+            for key in study.questions
+        ],
         "jobs": rules["jobs"],
         "pictures": rules["entries"],
         "plan": _plan_document(study),
@@ -292,6 +300,7 @@ def _preregistration(study: Study) -> dict[str, Any]:
             "method": "Bradley-Terry on the Elo scale, ties half a win, mean 1000",
             "intervals": "95 %, two-way over experts and scenarios, closed form",
             "pairs": "all judged at once, 5 % for the whole table",
+            "questions": "each rated by its own votes, never averaged",
             "settled_pairs": "ties, as many a pair as others have votes on average",
             "left_out": "hidden repeats, attention checks, skips, superseded votes",
         },

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from arena.models.studies import one_question
 from arena.rating.comparisons import LEVEL, FloatArray, t_quantile
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.ranking import CAUTION
@@ -37,7 +38,8 @@ class StudyEstimate:
         ties: Percent of the votes that say equal.
         expert_sd, scenario_sd: By how many points experts and scenarios differ about a contestant.
         power: Percent, the chance with which two are to be told apart.
-        seconds: For one vote.
+        questions: Asked about each pair.
+        seconds: For one pair with one question, and `seconds_more` for each further one.
     """
 
     contestants: int
@@ -47,6 +49,7 @@ class StudyEstimate:
     repeats: float = 5.0
     checks: float = 2.0
     overlap: float = 10.0
+    questions: int = 1
 
     spread: float = 150.0
     ties: float = 45.0
@@ -54,6 +57,7 @@ class StudyEstimate:
     scenario_sd: float = 70.0
     power: float = 80.0
     seconds: float = 12.0
+    seconds_more: float = 3.0
 
     @property
     def pairs(self) -> int:
@@ -74,7 +78,12 @@ class StudyEstimate:
     def minutes(self) -> float:
         """What each expert needs, repeats and checks included."""
         on_top = 1.0 + (self.repeats + self.checks) / 100
-        return self.votes_per_expert * on_top * self.seconds / 60.0
+        return self.votes_per_expert * on_top * (self.seconds + self.extra_seconds) / 60.0
+
+    @property
+    def extra_seconds(self) -> float:
+        """What the further questions about a pair take."""
+        return (self.questions - 1) * self.seconds_more
 
     @property
     def gaps(self) -> FloatArray:
@@ -103,7 +112,8 @@ def estimate_of(given: Mapping[str, Any]) -> StudyEstimate | None:
     numbers = {name: given.get(name) or 0 for name in QUANTITIES}
     if not all(counted.values()) or not numbers["votes_per_expert"]:
         return None
-    return StudyEstimate(**counted, **numbers)
+    questions = len(given.get("questions") or one_question())
+    return StudyEstimate(**counted, **numbers, questions=questions)
 
 
 def compare_votes(estimate: StudyEstimate) -> list[tuple[StudyEstimate, Prospect]]:

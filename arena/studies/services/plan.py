@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any, Self
 
 from arena.errors import NothingToPlan
-from arena.models import Snapshot, Study
+from arena.models import Question, Snapshot, Study
 from arena.pairing.rules import MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.voting.services.shown_pictures import SampleRule
 from augment.services.inputs import InputKind, input_field, inputs_of
@@ -187,6 +187,13 @@ class StudyPlan:
         "answered by the results.",
         default=(),
     )
+    questions: tuple[str, ...] = input_field(
+        InputKind.NAMES,
+        "Questions about each pair",
+        f"Out of {', '.join(Question.values)}; the first one is the primary question. Only which "
+        "carries out the instruction better unless given.",
+        default=(),
+    )
     samples: SampleRule = input_field(
         InputKind.CHOICE,
         "Where a job has several samples",
@@ -321,6 +328,7 @@ def plan_of(study: Study) -> StudyPlan:
         seed=study.seed,
         hypotheses=tuple(one.text for one in hypotheses_of(study)),
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
+        questions=tuple(study.questions),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),
         show_alike=bool(rules.get("show_alike")),
         hide_rings=bool(rules.get("hide_rings")),

@@ -7,7 +7,7 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Count, Q, QuerySet
+from django.db.models import Case, Count, Exists, OuterRef, Q, QuerySet, Value, When
 from django.utils import timezone
 
 from arena.errors import NotYours
@@ -65,12 +65,18 @@ def hold_matchup(*, expert: User, code: UUID) -> Matchup:
     matchup = (
         rows.exclude(study__early_looks__user=expert)
         .select_related("study")
-        .only("study__name", "study__state", "left", "right")
+        .only("study__name", "study__state", "study__questions", "left", "right")
         .first()
     )
     if matchup is None:
         raise NotYours("This matchup is not yours.")
     return matchup
+
+
+def of_skipped_pair() -> Q:
+    """Votes on pairs that are skipped whole, the skips themselves among them."""
+    skips = Vote.objects.filter(outcome=Vote.Outcome.SKIP, superseded_by=None)
+    return Q(Exists(skips.filter(matchup=OuterRef("matchup"))))
 
 
 def current_votes(study: Study) -> QuerySet[Vote]:
@@ -79,45 +85,61 @@ def current_votes(study: Study) -> QuerySet[Vote]:
 
 
 def own_votes(study: Study, expert: User) -> QuerySet[Vote]:
-    """Return an expert's current votes with what is shown of them, by their pairs' places."""
+    """Return an expert's current votes with what is shown of them, in the order of asking."""
     votes = current_votes(study).filter(expert=expert).select_related("matchup__scenario")
-    return votes.defer("matchup__scenario__reference").order_by("matchup__position")
+    turns = [When(question=key, then=turn) for turn, key in enumerate(study.questions)]
+    return votes.defer("matchup__scenario__reference").order_by("matchup__position", Case(*turns))
 
 
 def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """Return the next matchups of this expert, at most n, with what a browser needs of them.
 
-    There is none of a study that takes no votes.
+    Each says what is `asked` next; one that is answered in part comes again. There is none of a
+    study that takes no votes.
     """
     if study.state != Study.State.OPEN:
         return []
-    rows = Matchup.objects.filter(study=study, expert=expert, votes=None)
+    rows = Matchup.objects.filter(study=study, expert=expert)
+    *earlier, last = study.questions
+    if earlier:
+        own = Vote.objects.filter(matchup=OuterRef("pk"))
+        skips = own.filter(outcome=Vote.Outcome.SKIP, superseded_by=None)
+        rows = rows.exclude(Exists(own.filter(question=last))).exclude(Exists(skips))
+        turns = [When(~Exists(own.filter(question=key)), then=Value(key)) for key in earlier]
+        rows = rows.annotate(turn=Case(*turns, default=Value(last)))
+    else:
+        rows = rows.filter(votes=None).annotate(turn=Value(last))
     needed = (
         *("code", "study_id", "expert_id", "position", "kind", "view"),
         *("left_token", "right_token", "original_token"),
         *("left_image", "right_image", "original_image"),
         "scenario__instruction",
     )
-    return list(rows.select_related("scenario").only(*needed).order_by("position")[:n])
+    found = rows.select_related("scenario").only(*needed).order_by("position")[:n]
+    for matchup in found:
+        matchup.asked = matchup.turn
+    return list(found)
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
     """Count the expert's matchups that have a vote or were skipped; one query."""
-    return voting_state(study_pk=study.pk, expert=expert, since=timezone.now())[1]
+    return voting_state(study=study, expert=expert, since=timezone.now())[1]
 
 
 def voting_state(
-    *, study_pk: int, expert: User, since: datetime
+    *, study: Study, expert: User, since: datetime
 ) -> tuple[Study, VotingProgress, int]:
     """Return a study read anew, the expert's progress, and the votes since; one query.
 
     Args:
-        study_pk: Of a study that exists; columns that are not needed are loaded when asked for.
+        study: Which; its questions never change. Columns of what is returned that are not needed
+            are loaded when asked for.
         expert: Whose matchups and votes are counted.
         since: Votes after this moment are counted apart, of whatever study.
     """
     values = {
-        "study": study_pk,
+        "study": study.pk,
+        "last": study.questions[-1],
         "expert": expert.pk,
         "since": connection.ops.adapt_datetimefield_value(since),
     }
@@ -131,13 +153,15 @@ def voting_state(
 # Thousands of votes ask this, and building the query anew cost as much as asking it.
 _STATE = """
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
-       study.ask_strength, study.allow_replay,
+       study.ask_strength, study.allow_replay, study.questions,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
-       (SELECT COUNT(*) FROM arena_vote vote
+       (SELECT COUNT(DISTINCT vote.matchup_id) FROM arena_vote vote
         JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
         WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND vote.supersedes_id IS NULL) AS decided,
+          AND ((vote.question = %(last)s AND vote.supersedes_id IS NULL)
+            OR (vote.outcome = 'skip' AND NOT EXISTS (
+              SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)))) AS decided,
        (SELECT COUNT(*) FROM arena_vote vote
         JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
         WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
@@ -151,12 +175,14 @@ WHERE study.id = %(study)s
 
 
 def tallies(study: Study) -> list[ExpertTally]:
-    """Return one line per expert of the study, by pseudonym."""
+    """Return one line per expert of the study, by pseudonym; votes are those that end a pair."""
     totals = Matchup.objects.filter(study=study).order_by().values_list("expert")
     total_of = dict(totals.annotate(n=Count("pk")))
     outcomes = ("left", "equal", "right", "skip")
     counts = {name: Count("pk", filter=Q(outcome=name)) for name in outcomes}
-    votes = current_votes(study).order_by().values_list("expert").annotate(**counts)
+    is_end = Q(question=study.questions[-1]) & ~of_skipped_pair()
+    ends = current_votes(study).filter(is_end | Q(outcome=Vote.Outcome.SKIP))
+    votes = ends.order_by().values_list("expert").annotate(**counts)
     counts_of = {expert: numbers for expert, *numbers in votes}
     lines = []
     for expert in by_pseudonym(study.experts.select_related("person")):

@@ -67,6 +67,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     shown = {
         "matchup": str(matchup.code),
         "position": matchup.position,
+        "question": matchup.asked,
         "instruction": matchup.scenario.instruction,
         "a": reverse("matchup-image", args=[matchup.left_token]),
         "b": reverse("matchup-image", args=[matchup.right_token]),

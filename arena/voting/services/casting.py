@@ -5,8 +5,8 @@ decision sent again; or an error that says why nothing was stored.
 """
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from uuid import UUID
 
@@ -17,7 +17,7 @@ from django.db.models import Q
 from django.utils import timezone
 
 from arena.errors import AlreadyDecided, InvalidVote, StudyNotOpen, TooFast
-from arena.models import AIDS, Matchup, Study, Vote
+from arena.models import AIDS, Matchup, Question, Study, Vote
 from arena.voting.queries.ballots import VotingProgress, hold_matchup, voting_state
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
@@ -34,6 +34,7 @@ class Decision:
 
     key: UUID
     matchup: UUID
+    question: str
     outcome: Vote.Outcome
     both_miss: bool
     strength: str
@@ -63,6 +64,7 @@ def decision_of(
     matchup_code: UUID | str,
     key: UUID | str,
     outcome: str,
+    question: str = "",
     both_miss: bool = False,
     strength: str = "",
     reason: str = "",
@@ -77,39 +79,25 @@ def decision_of(
         matchup_code: What was decided; one of the expert's own matchups.
         key: Made by the browser, one per decision.
         outcome: "left", "equal", "right" or "skip"; the side is kept apart from who won.
+        question: Which of the study's is answered; empty is the primary one.
         both_miss: With "equal": both miss the instruction. Counts as a tie.
         strength: With "left" or "right": "slightly" or "clearly", empty where it was not said.
         reason: With "skip": why, one of Vote.SkipReason.
         comment: Whatever the expert wants to add.
         aids: What was used to look, out of AIDS.
-        supersedes: The key of the matchup's current vote, to change it.
+        supersedes: The key of the matchup's current vote on the question, to change it.
         ms_visible: How long the pair was on screen.
 
     Raises:
         ValueError: The outcome is none of the four.
         InvalidVote: Parts do not go together, or are unknown.
     """
-    chosen, used = Vote.Outcome(outcome), set(aids)
-    wrong = {}
-    if both_miss and chosen != Vote.Outcome.EQUAL:
-        wrong["both_miss"] = "Both can only miss the instruction where they are equal."
-    if strength and (strength not in Vote.Strength or chosen not in PREFERENCES):
-        allowed = " or ".join(Vote.Strength.values)
-        wrong["strength"] = f"Only a preference has a strength: {allowed}."
-    if chosen == Vote.Outcome.SKIP and reason not in Vote.SkipReason.values:
-        wrong["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
-    if chosen != Vote.Outcome.SKIP and reason:
-        wrong["reason"] = "Only a skip has a reason."
-    if len(comment) > LONGEST_COMMENT:
-        wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
-    if unknown := sorted(used - set(AIDS)):
-        wrong["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
-    if wrong:
-        raise InvalidVote(wrong)
-    return Decision(
+    used = set(aids)
+    decision = Decision(
         key=UUID(str(key)),
         matchup=UUID(str(matchup_code)),
-        outcome=chosen,
+        question=question,
+        outcome=Vote.Outcome(outcome),
         both_miss=both_miss,
         strength=strength,
         reason=reason,
@@ -118,6 +106,14 @@ def decision_of(
         supersedes=None if supersedes is None else UUID(str(supersedes)),
         ms_visible=ms_visible,
     )
+    wrong = _find_faults(decision)
+    if len(comment) > LONGEST_COMMENT:
+        wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+    if unknown := sorted(used - set(AIDS)):
+        wrong["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
+    if wrong:
+        raise InvalidVote(wrong)
+    return decision
 
 
 def cast_vote(*, expert: User, decision: Decision) -> Vote:
@@ -128,9 +124,9 @@ def cast_vote(*, expert: User, decision: Decision) -> Vote:
     Raises:
         NotYours: The matchup is somebody else's or does not exist.
         StudyNotOpen: The study takes no votes.
-        AlreadyDecided: The matchup has a vote that `supersedes` does not name.
-        Conflict: The key belongs to another vote, or `supersedes` names none of this matchup's.
-        InvalidVote: The study does not allow it.
+        AlreadyDecided: The question has a vote that `supersedes` does not name.
+        Conflict: The key belongs to another vote, or `supersedes` names none on this question.
+        InvalidVote: The study does not allow it, or asks another question first.
     """
     return _store(expert, decision, is_paced=False).vote
 
@@ -152,6 +148,22 @@ def receive_vote(*, expert: User, decision: Decision) -> Received:
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _find_faults(decision: Decision) -> dict[str, str]:
+    """What does not go with the outcome, by the name of the part."""
+    outcome, wrong = decision.outcome, {}
+    if decision.both_miss and outcome != Vote.Outcome.EQUAL:
+        wrong["both_miss"] = "Both can only miss the instruction where they are equal."
+    is_strength = decision.strength in Vote.Strength and outcome in PREFERENCES
+    if decision.strength and not is_strength:
+        allowed = " or ".join(Vote.Strength.values)
+        wrong["strength"] = f"Only a preference has a strength: {allowed}."
+    if outcome == Vote.Outcome.SKIP and decision.reason not in Vote.SkipReason.values:
+        wrong["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
+    if outcome != Vote.Outcome.SKIP and decision.reason:
+        wrong["reason"] = "Only a skip has a reason."
+    return wrong
+
+
 def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
     with in_turn(within_s=settings.VOTE_WAIT_S if is_paced else None):
         try:
@@ -165,6 +177,8 @@ def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
 @transaction.atomic
 def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
     matchup = hold_matchup(expert=expert, code=decision.matchup)
+    asked = matchup.study.questions
+    decision = replace(decision, question=decision.question or asked[0])
     known = list(
         Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk))
         .select_related("supersedes", "superseded_by")
@@ -176,10 +190,12 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
         _check_replay(vote, matchup, decision)
     else:
         _check_open(matchup.study)
-        vote = _insert(matchup, expert, decision, _superseded(known, decision.supersedes))
+        _check_turn(decision, asked, {vote.question for vote in known})
+        own = [vote for vote in known if vote.question == decision.question]
+        vote = _insert(matchup, expert, decision, _superseded(own, decision.supersedes))
     # Read after the lock, so that a study closed while we waited is seen as closed.
     since = timezone.now() - PACE_WINDOW
-    study, progress, just_now = voting_state(study_pk=matchup.study_id, expert=expert, since=since)
+    study, progress, just_now = voting_state(study=matchup.study, expert=expert, since=since)
     if is_new:
         _check_allowed(decision, study)
         if is_paced and just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
@@ -195,6 +211,7 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
         expert=expert,
         shown_left_id=matchup.left_id,
         shown_right_id=matchup.right_id,
+        question=decision.question,
         outcome=decision.outcome,
         winner_id=winners.get(decision.outcome),
         both_miss=decision.both_miss,
@@ -226,8 +243,9 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
     if vote.matchup_id != matchup.pk:
         raise Conflict("This key belongs to another vote; make a new key for every decision.")
     old = None if vote.supersedes is None else vote.supersedes.key
-    stored = (vote.outcome, vote.both_miss, vote.strength, vote.reason, old)
-    given = (decision.outcome, decision.both_miss, decision.strength, decision.reason)
+    stored = (vote.question, vote.outcome, vote.both_miss, vote.strength, vote.reason, old)
+    given: tuple[object, ...] = (decision.question, decision.outcome, decision.both_miss)
+    given += (decision.strength, decision.reason)
     if stored != (*given, decision.supersedes):
         raise AlreadyDecided(vote.outcome)
 
@@ -237,11 +255,24 @@ def _check_open(study: Study) -> None:
         raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
 
 
+def _check_turn(decision: Decision, asked: Sequence[str], answered: Collection[str]) -> None:
+    """Raise InvalidVote for a question that the study does not ask, or not yet."""
+    question = decision.question
+    if question not in asked:
+        raise InvalidVote({"question": f"This study asks: {', '.join(asked)}."})
+    if decision.outcome == Vote.Outcome.SKIP and question != asked[0]:
+        raise InvalidVote({"question": f"A skip is of the whole pair: of {asked[0]}."})
+    for earlier in asked[: asked.index(question)]:
+        if earlier not in answered:
+            raise InvalidVote({"question": f"The study asks first: {earlier}."})
+
+
 def _check_allowed(decision: Decision, study: Study) -> None:
     """Raise where the study does not take the vote that was just written, which takes it back."""
     _check_open(study)
-    if decision.both_miss and not study.allow_both_miss:
-        raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
+    is_of_instruction = decision.question == Question.INSTRUCTION
+    if decision.both_miss and not (study.allow_both_miss and is_of_instruction):
+        raise InvalidVote({"both_miss": "Nobody is asked here whether both miss."})
     if decision.strength and not study.ask_strength:
         raise InvalidVote({"strength": "This study does not ask how clear a preference is."})
     if "replay" in decision.aids.split() and not study.allow_replay:

@@ -2,7 +2,7 @@
 
 The simulated judge is honest and noisy: it prefers the change that lies nearer the scenario's
 reference, misjudges distances a little, calls close ones equal, and now and then presses just any
-key, as people do.
+key, as people do. Every question of a study is answered so, each with noise of its own.
 """
 
 import math
@@ -51,13 +51,16 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     for matchup in shown.order_by("expert__username", "position"):
         reference = matchup.scenario.reference
         advantage = _error_m(reference, matchup.right) - _error_m(reference, matchup.left)
-        decision = decision_of(
-            matchup_code=matchup.code,
-            key=uuid5(matchup.code, "simulated"),
-            outcome=_judge(advantage, rng),
-        )
-        cast_vote(expert=matchup.expert, decision=decision)
-        cast += 1
+        for question in study.questions:
+            is_primary = question == study.questions[0]
+            decision = decision_of(
+                matchup_code=matchup.code,
+                key=uuid5(matchup.code, "simulated" if is_primary else f"simulated {question}"),
+                outcome=_judge(advantage, rng),
+                question=question,
+            )
+            cast_vote(expert=matchup.expert, decision=decision)
+            cast += 1
     if cast:
         log_event(
             actor=None,

@@ -1,0 +1,134 @@
+"""The ratings of one study's several questions side by side, and how the answers hang together.
+
+They are never averaged: a scene may be realistic and yet not what was asked for.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from arena.models import Snapshot, Standing
+from arena.rating.comparisons import Estimate, share
+from arena.results.queries.access import snapshots_of
+from arena.results.queries.votes import Filters, counted_votes
+
+FEWEST = 3
+"""Fewer contestants have no correlation worth a number."""
+
+DECIDED = ("left", "right")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoQuestions:
+    """How the answers to two questions hang together.
+
+    Attributes:
+        spearman: Of the ratings of the contestants that both rate, None for fewer than three or
+            ratings that are all equal.
+        same: The share of pairs with a preference for the same side, of those where both
+            questions have one, clustered by expert.
+        pairs: Where both have one.
+    """
+
+    one: str
+    other: str
+    spearman: float | None
+    same: Estimate
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RatedQuestions:
+    """The ratings of a study's questions.
+
+    Attributes:
+        ratings: By question in the study's order, None for one that is not rated alike.
+        lines: A contestant's name and its standing by question, in the order of the rating that
+            they are shown beside.
+    """
+
+    ratings: dict[str, Snapshot | None]
+    lines: list[tuple[str, list[Standing | None]]]
+    links: list[TwoQuestions]
+
+
+def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
+    """Return all questions of a rating's study, None where it asks only one.
+
+    Beside the rating itself stands the newest of each other question with the same method and
+    filters.
+    """
+    questions = snapshot.study.questions
+    if len(questions) == 1:
+        return None
+    found = {snapshot.question: snapshot}
+    for one in snapshots_of(snapshot.study).filter(state=Snapshot.State.READY).defer("results"):
+        if _rates_alike(one) == _rates_alike(snapshot):
+            found.setdefault(one.question, one)
+    ratings = {question: found.get(question) for question in questions}
+    rows = Standing.objects.filter(snapshot__in=found.values()).order_by("rank", "-rating", "slug")
+    by_rating: dict[int, dict[str, Standing]] = {one.pk: {} for one in found.values()}
+    for row in rows:
+        by_rating[row.snapshot_id][row.slug] = row
+    standings = {key: by_rating[one.pk] if one else {} for key, one in ratings.items()}
+    return RatedQuestions(
+        ratings=ratings,
+        lines=[
+            (row.name, [standings[question].get(slug) for question in questions])
+            for slug, row in by_rating[snapshot.pk].items()
+        ],
+        links=[
+            _link(pair, found, standings)
+            for pair in combinations(questions, 2)
+            if found.keys() >= set(pair)
+        ],
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _rates_alike(snapshot: Snapshot) -> tuple[str, Filters]:
+    filters = Filters.of_document(snapshot.filters)
+    return snapshot.method, replace(filters, question="", authors=frozenset())
+
+
+def _link(
+    pair: tuple[str, str],
+    ratings: Mapping[str, Snapshot],
+    standings: Mapping[str, Mapping[str, Standing]],
+) -> TwoQuestions:
+    one, other = pair
+    first, second = (_preferences(ratings[question]) for question in pair)
+    both = sorted(first.keys() & second.keys())
+    hits = np.array([first[matchup][1] == second[matchup][1] for matchup in both], dtype=np.bool_)
+    judges = np.array([first[matchup][0] for matchup in both], dtype=np.int64)
+    rated = [
+        (row.rating, standings[other][slug].rating)
+        for slug, row in standings[one].items()
+        if slug in standings[other]
+    ]
+    known = [(x, y) for x, y in rated if x is not None and y is not None]
+    return TwoQuestions(
+        one=one, other=other, spearman=_spearman(known), same=share(hits, judges), pairs=len(both)
+    )
+
+
+def _preferences(snapshot: Snapshot) -> dict[int, tuple[int, str]]:
+    """Return the expert and the side that is better, by matchup; ties are left out."""
+    votes = counted_votes(snapshot).filter(outcome__in=DECIDED)
+    rows = votes.values_list("matchup", "expert", "outcome")
+    return {matchup: (expert, outcome) for matchup, expert, outcome in rows}
+
+
+def _spearman(rated: Sequence[tuple[float, float]]) -> float | None:
+    if len(rated) < FEWEST:
+        return None
+    columns = [np.array(values) for values in zip(*rated, strict=True)]
+    # Equal ratings share the mean of their ranks.
+    one, other = ((v[:, None] > v).sum(1) + (v[:, None] == v).sum(1) / 2 for v in columns)
+    if not one.std() or not other.std():
+        return None
+    return float(np.corrcoef(one, other)[0, 1])

@@ -1,0 +1,152 @@
+"""Several questions about a pair: their order, when a pair is done, skips, and each its rating."""
+
+from typing import Any
+
+import pytest
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
+
+from arena.errors import AlreadyDecided, InvalidVote
+from arena.models import Study, Vote
+from arena.results.exports.votes import unrated_votes
+from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.services.ratings import rate_now
+from arena.studies.queries import progress_of
+from arena.studies.services.opening import close_study
+from arena.voting.queries.ballots import own_votes, tallies, upcoming, voting_progress
+from augment.errors import Conflict, UnknownName
+from tests.api.asking import signed_in
+from tests.study_rows import a_study, matchups_of, shown_again, vote
+
+pytestmark = pytest.mark.django_db
+
+ASKED = ["realism", "instruction", "difficulty"]
+
+
+def a_study_of_three(**more: Any) -> Study:
+    return a_study(questions=ASKED, **more)
+
+
+def test_a_pair_comes_until_its_last_question_is_answered() -> None:
+    study = a_study_of_three(votes_per_expert=2)
+    first, second = matchups_of(study, "eva")
+    seen = []
+    for question in ASKED:
+        shown = upcoming(study=study, expert=first.expert, n=2)
+        progress = voting_progress(study=study, expert=first.expert)
+        seen.append(([one.asked for one in shown], progress.voted, progress.left))
+        vote(first, question=question)
+    assert seen == [([asked, ASKED[0]], 0, 2) for asked in ASKED]
+    (left,) = upcoming(study=study, expert=first.expert, n=2)
+    assert (left, left.asked) == (second, ASKED[0])
+    (line,), (tally, _) = progress_of([study], first.expert), tallies(study)
+    progress = voting_progress(study=study, expert=first.expert)
+    for one in (line, tally, progress):
+        assert (one.voted, one.skipped, one.left) == (1, 0, 1)
+    asked_last = [one.question for one in own_votes(study, first.expert).reverse()]
+    assert asked_last == ASKED[::-1]
+
+
+def test_questions_come_in_their_order_and_only_those_of_the_study() -> None:
+    matchup = matchups_of(a_study(questions=ASKED[:2]), "eva")[0]
+    for question in ("instruction", "difficulty", "beauty"):
+        with pytest.raises(InvalidVote) as refused:
+            vote(matchup, question=question)
+        assert "question" in str(vars(refused.value))
+    assert vote(matchup).question == "realism", "the primary one where none is named"
+
+
+def test_a_change_replaces_the_answer_to_its_own_question() -> None:
+    matchup = matchups_of(a_study_of_three(), "eva")[0]
+    first, second = (vote(matchup, question=one) for one in ASKED[:2])
+    with pytest.raises(AlreadyDecided):
+        vote(matchup, "right", question="instruction", supersedes=first.key)
+    changed = vote(matchup, "right", question="instruction", supersedes=second.key)
+    assert vote(matchup, "right", question="instruction", supersedes=second.key, key=changed.key)
+    with pytest.raises(AlreadyDecided):
+        vote(matchup, "right", question="realism", supersedes=second.key, key=changed.key)
+    current = Vote.objects.filter(superseded_by=None)
+    assert sorted(current.values_list("question", "outcome")) == [
+        ("instruction", "right"),
+        ("realism", "left"),
+    ]
+
+
+def test_a_skip_ends_the_pair_and_its_other_answers_do_not_count() -> None:
+    study = a_study_of_three(votes_per_expert=1, experts=("eva", "finn"))
+    (matchup,) = matchups_of(study, "eva")
+    given = [vote(matchup, question=one) for one in ASKED[:2]]
+    with pytest.raises(InvalidVote):
+        vote(matchup, "skip", reason="other", question="difficulty")
+    skip = vote(matchup, "skip", reason="other", supersedes=given[0].key)
+    assert upcoming(study=study, expert=matchup.expert, n=1) == []
+    progress = voting_progress(study=study, expert=matchup.expert)
+    assert (progress.voted, progress.skipped, progress.left) == (0, 1, 0)
+    frozen = last_vote_of(study)
+    of_instruction = Filters(question="instruction")
+    assert vote_set(study, filters=of_instruction, last=frozen).left_out == {"skip": 1}
+    vote(matchup, supersedes=skip.key)
+    (again,) = upcoming(study=study, expert=matchup.expert, n=1)
+    assert again.asked == "difficulty"
+    assert vote_set(study, filters=of_instruction, last=frozen).left_out == {"skip": 1}
+    assert len(vote_set(study, filters=of_instruction, last=last_vote_of(study)).counted) == 1
+
+
+def test_each_question_has_a_rating_of_its_own_votes() -> None:
+    study = a_study_of_three(votes_per_expert=3, experts=("eva", "finn"))
+    outcomes = {"realism": "left", "instruction": "right", "difficulty": "equal"}
+    for matchup in [*study.matchups.all(), shown_again(matchups_of(study, "eva")[0])]:
+        for question in ASKED:
+            vote(matchup, outcomes[question], question=question)
+    close_study(study=study)
+    study.refresh_from_db()
+    for question, outcome in outcomes.items():
+        found = vote_set(study, filters=Filters(question=question), last=last_vote_of(study))
+        assert {one.outcome for one in found.counted} == {outcome}
+        assert (len(found.counted), found.left_out, len(found.repeats)) == (6, {"repeat": 1}, 1)
+    usual, other = (
+        rate_now(study=study, rounds=10, filters=filters)
+        for filters in (None, Filters(question="difficulty"))
+    )
+    assert [usual.question, other.question] == ["realism", "difficulty"]
+    assert [usual.results.trust.tie_share, other.results.trust.tie_share] == [0.0, 1.0]
+    with pytest.raises(UnknownName, match="beauty"):
+        rate_now(study=study, filters=Filters(question="beauty"))
+    rows = unrated_votes(study).rows
+    assert [row[-1] for row in rows].count("instruction") == 7
+
+
+def test_checks_are_judged_by_the_primary_question_alone() -> None:
+    study = a_study_of_three(votes_per_expert=2, experts=("eva", "finn"))
+    for row, *_ in (matchups_of(study, name) for name in ("eva", "finn")):
+        row.kind = "check"
+        row.save()
+        for question in ASKED:
+            vote(row, "left" if question == "realism" else "right", question=question)
+    found = vote_set(study, filters=Filters(question="difficulty"), last=last_vote_of(study))
+    assert [one.question for one in found.checks] == ["realism", "realism"]
+    assert found.left_out == {"check": 2}
+
+
+@pytest.mark.parametrize("asked", [[], ["instruction"] * 2, ["beauty"], ["realism", "beauty"]])
+def test_only_known_questions_each_once_can_be_asked(asked: list[str]) -> None:
+    if not asked:
+        assert a_study(questions=asked).questions == ["instruction"]
+        return
+    with pytest.raises(Conflict, match="primary one first"):
+        a_study(questions=asked)
+
+
+def test_one_vote_takes_as_many_queries_as_with_one_question() -> None:
+    counts: dict[str, int] = {}
+    for name, asked in (("Round 1", ["instruction"]), ("Round 2", ASKED)):
+        study = a_study(votes_per_expert=3) if not counts else Study.objects.get()
+        Study.objects.update(questions=asked)
+        client = signed_in("eva")
+        matchup = matchups_of(study, "eva")[len(counts)]
+        body = {"key": str(matchup.code), "matchup": str(matchup.code), "outcome": "A"}
+        with CaptureQueriesContext(connection) as asked_for:
+            answer = client.post("/api/v1/votes", body, content_type="application/json")
+        assert answer.status_code == 200
+        counts[name] = len(asked_for)
+    assert counts["Round 2"] == counts["Round 1"]
