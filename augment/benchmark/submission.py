@@ -39,6 +39,8 @@ from augment.scene.entities import Modification, apply
 _OPENING = ProcessLimits(cpu_s=16, deadline_s=120)
 MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
+MOST_CHANGED = 1_000
+"""Agents that a file may have beyond those of the source."""
 _NAMES = TypeAdapter(tuple[str, ...])
 Key = tuple[str, int]
 """A task and a sample."""
@@ -116,6 +118,8 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
             sandbox.run(submitted_file.__name__, request, name=rest[0])
         except InvalidDocument as fault:
             problem = "; ".join(text for _, text in fault.problems)
+        except RuntimeError as fault:  # a fault of ours, which must not cost the other files
+            problem = f"makes its reader fail: {str(fault).splitlines()[-1][:200]}"
         lines = told.read_bytes().split(b"\n")[:-1]
         contents = [_content_in(line) for line in lines]
         if not contents:  # it died over the first, which had all of its limits for itself
@@ -160,14 +164,14 @@ class _Checker:
         content = self.contents[files[0]]
         if content.problem:
             return replace(entry, reason=content.problem)
-        entry = replace(entry, notes=content.notes)
         try:
             modification, notes = self._change(task, content)
-            problems = list(SCENE.problems(apply(task.scene, modification)))
+            if problems := list(SCENE.problems(apply(task.scene, modification))):
+                raise InvalidDocument("modification", problems)
         except InvalidModification as fault:
             return replace(entry, reason=f"does not fit its scene: {fault}")
-        if problems:
-            return replace(entry, reason=str(InvalidDocument("modification", problems)))
+        except InvalidDocument as fault:
+            return replace(entry, reason=str(fault))
         if modification.is_empty and content.scene is None:
             text = "an empty modification: the system declines"
             return replace(entry, status=EntryStatus.REFUSED, reason=text)
@@ -181,8 +185,14 @@ class _Checker:
     def _change(
         self, task: BenchmarkTask, content: FileContent
     ) -> tuple[Modification, tuple[str, ...]]:
+        given = content.modification or Modification()
+        agents = given.changed if content.scene is None else content.scene.agents
+        most = MOST_CHANGED + len(task.scene.agents)
+        if len(agents) > most:
+            raise InvalidDocument(
+                "file", [("", f"{len(agents)} agents; at most {most} are taken")]
+            )
         if content.scene is None:
-            given = content.modification or Modification()
             if content.format == lctgen.NAME:
                 placed = place_on_lanes(replace(task.scene, agents=given.added))
                 given = replace(given, added=placed.agents)

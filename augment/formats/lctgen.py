@@ -12,6 +12,8 @@ of the ego at t0: metres, x forward, y left. Read from the released code, its ow
 Rows without any size pad a list to 32. The generated ego is left out: a scene has its own.
 """
 
+import lzma
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -26,11 +28,14 @@ from augment.geometry.frames import wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent
 
 NAME = "lctgen"
-MOST_VEHICLES = 1_000
 _COLUMNS = 7
 _TRACK_COLUMNS = [0, 1, 7, 8, 6, 3, 4, 9]
 """Where x, y, vx, vy, heading, length, width and valid stand in a track's state."""
-_BROKEN = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+_BROKEN = (
+    *(OSError, ValueError, EOFError, RuntimeError, NotImplementedError, struct.error),
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
+"""What zips raise that are broken, encrypted, or packed in ways of their own."""
 _ASIDE_M = 1.0
 """How far its ego may lie from the origin without a note: it is sampled around a lane."""
 
@@ -58,8 +63,6 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
         InvalidDocument: Neither `agent` nor `tracks`, or a row that is no vehicle.
     """
     rows = _rows(document)
-    if len(rows) > MOST_VEHICLES:
-        raise fault_at("agent", f"{len(rows)} vehicles; at most {MOST_VEHICLES} are read")
     notes = ["LCTGen says nothing of other road users than vehicles, nor what stays or goes."]
     away_m = float(np.hypot(*rows[0, :2]))
     if away_m > _ASIDE_M:
@@ -101,7 +104,7 @@ def _rows(document: object) -> FloatArray:
     tracks = parts.get("tracks")
     if not isinstance(tracks, Mapping) or not tracks:
         raise fault_at("", "expected LCTGen's `agent` or `tracks`")
-    rows = np.vstack([_first_state(track, f"tracks.{key}") for key, track in tracks.items()])
+    rows = np.vstack([_first_state(one, f"tracks[{n}]") for n, one in enumerate(tracks.values())])
     if not rows[0, -1]:
         raise fault_at("tracks", "the first is the ego, and is not there at t0")
     return np.asarray(rows[rows[:, -1] > 0.0, :_COLUMNS])
@@ -109,5 +112,5 @@ def _rows(document: object) -> FloatArray:
 
 def _first_state(track: Any, place: str) -> FloatArray:
     state = track.get("state") if isinstance(track, Mapping) else None
-    states = read_finite(() if state is None else state, f"{place[:60]}.state", 10)
+    states = read_finite(() if state is None else state, f"{place}.state", 10)
     return np.asarray(states[0, _TRACK_COLUMNS])
