@@ -150,8 +150,8 @@ def measure_agreement(
         raters: Those that know no decided pair are left out.
 
     Returns:
-        The experts with each other, the raters from the best on all votes down, a coin; then the
-        same by type, if there are several. Nothing without decided votes.
+        The experts with each other, the raters from the best on all votes down, a coin; then all
+        but the coin by type, if there are several. Nothing without decided votes.
     """
     if not any(vote.preference for vote in votes):
         return ()
@@ -173,7 +173,8 @@ def measure_agreement(
     of_types = [
         _line(numbered, *opinion, scenario_type=name)
         for name in (types if len(types) > 1 else ())
-        for _, opinion in measured
+        for line, opinion in measured
+        if line.role is not LineRole.COIN
     ]
     return (*(line for line, _ in measured), *of_types)
 

@@ -6,6 +6,7 @@ from functools import partial
 from django import template
 
 from arena.models.votes import AID_LABELS
+from arena.rating.agreement import share_text
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent, with_minus
 from arena.results.exports.tables import method_text
@@ -70,6 +71,7 @@ for _kind in _LABELS:
 register.filter("clearance", clearance_text)
 register.filter(method_text)
 register.filter("minus", with_minus)
+register.filter("share", share_text)
 register.filter(type_label)
 
 

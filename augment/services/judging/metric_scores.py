@@ -11,6 +11,7 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation, Contestant, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.services.judging.displacement import of_rows
+from augment.services.judging.realism import realism_of_rows
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.scenarios.scenes import intent_of, scene_of
 
@@ -36,8 +37,8 @@ class MetricScores:
 
 
 def metric_scores(ids: Collection[int]) -> tuple[MetricScores, ...]:
-    """Return the scores of the augmentations with these primary keys; three queries."""
-    return (_displacement(ids), _checks(ids), *_driving(ids))
+    """Return the scores of the augmentations with these primary keys; a second for a hundred."""
+    return (_displacement(ids), _checks(ids), _realism(ids), *_driving(ids))
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -85,6 +86,15 @@ def _check_scenario(scenario: Scenario, rows: Iterable[Augmentation]) -> dict[st
         found = Counter(finding.severity for finding in findings)
         scores[str(row.code)] = -found[Severity.WRONG] - min(found[Severity.DOUBTFUL], 99) / 100
     return scores
+
+
+def _realism(ids: Collection[int]) -> MetricScores:
+    found = realism_of_rows(ids)
+    codes = Augmentation.objects.filter(pk__in=found).values_list("pk", "code")
+    means = {str(code): found[pk].mean for pk, code in codes}
+    return MetricScores(
+        name="Realism", by_code={code: mean for code, mean in means.items() if mean is not None}
+    )
 
 
 def _driving(ids: Collection[int]) -> list[MetricScores]:
