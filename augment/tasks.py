@@ -31,6 +31,7 @@ from augment.services.running.intent_readings import READINGS
 from augment.services.running.judge_runs import JUDGEMENTS
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios import pictures
+from augment.services.scenarios.submissions import SUBMISSIONS
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
 
@@ -46,7 +47,7 @@ BATCH = 100
 REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
 """What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
-register(AUGMENTATIONS, DRIVES, JUDGEMENTS, READINGS, PROBES, UPLOADS, MOMENTS)
+register(AUGMENTATIONS, DRIVES, JUDGEMENTS, READINGS, PROBES, UPLOADS, MOMENTS, SUBMISSIONS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
     "scene": pictures.draw_scene,
@@ -167,6 +168,7 @@ def sender(kind: WorkKind[Any]) -> Callable[[int], int]:
 enqueue_moment = sender(MOMENTS)
 enqueue_probe = sender(PROBES)
 enqueue_reading = sender(READINGS)
+enqueue_submission = sender(SUBMISSIONS)
 enqueue_upload = sender(UPLOADS)
 enqueue_simulations = partial(enqueue, DRIVES)
 

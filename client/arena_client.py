@@ -119,6 +119,11 @@ class Arena:
                 raise TimeoutError(f"{path} is still under way after {within_s} s")
             time.sleep(every_s)
 
+    def submit(self, file: str | Path, benchmark: str, **waiting: float) -> Any:
+        """Send a submission, wait until it is read, and return it with its report."""
+        sent = self.upload("submissions", {"file": file}, benchmark=benchmark)
+        return self.wait_for(f"submissions/{sent['code']}", "checked", "failed", **waiting)
+
     def pairs(self, study: str) -> Iterator[dict[str, Any]]:
         """Yield the pairs that are left; vote on each before taking the next."""
         while waiting := self.get("matchups", study=study, n=1):

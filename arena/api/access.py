@@ -16,6 +16,7 @@ SCHEME = "bearer"
 ADMINS = ("admin",)
 STAFF = ("admin", "researcher")
 EXPERTS = ("expert",)
+ENTRANTS = ("entrant",)
 
 
 class BearerToken(BaseAuthentication):

@@ -27,6 +27,8 @@ urlpatterns: list[URLPattern] = [
     _at("uploads/<uuid:code>", scenarios.UploadView, "api-upload"),
     _at("uploads/<uuid:code>/moments", scenarios.MomentsView, "api-moments"),
     _at("moments/<uuid:code>", scenarios.MomentView, "api-moment"),
+    _at("submissions", scenarios.SubmissionsView, "api-submissions"),
+    _at("submissions/<uuid:code>", scenarios.SubmissionView, "api-submission"),
     _at("scenarios", scenarios.ScenariosView, "api-scenarios"),
     _at("endpoints", contestants.EndpointsView, "api-endpoints"),
     _at("endpoints/<uuid:code>/models", contestants.ModelsView, "api-endpoint-models"),

@@ -102,6 +102,7 @@ class Environment(BaseModel):
     ARENA_MEDIA_DIR: Folder = BASE_DIR / "media"
     ARENA_MEDIA_URL: Annotated[dict[str, Any], BeforeValidator(read_media)] = read_media("")
     ARENA_UPLOAD_MB: int = Field(200, ge=1, le=4096)
+    ARENA_SUBMISSIONS_A_DAY: int = Field(5, ge=1, le=1000)
     ARENA_DEBUG: bool = False
     ARENA_HOSTS: Annotated[list[str], Comma] = Field(
         ["localhost", "127.0.0.1", "[::1]"], min_length=1

@@ -206,6 +206,7 @@ WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 
 # Files by which somebody sends something; larger ones are let pass by unread.
 UPLOAD_MB = ENV.ARENA_UPLOAD_MB
+SUBMISSIONS_A_DAY = ENV.ARENA_SUBMISSIONS_A_DAY
 FILE_UPLOAD_HANDLERS = [
     "arena.config.uploads.BoundedUpload",
     "django.core.files.uploadhandler.MemoryFileUploadHandler",

@@ -76,7 +76,7 @@ class ApiToken(Coded):
         EXPIRED = "expired", "Expired"
         REVOKED = "revoked", "Revoked"
 
-    ROLES: ClassVar = ("admin", "researcher", "expert")
+    ROLES: ClassVar = ("admin", "researcher", "expert", "entrant")
 
     owner = models.ForeignKey(
         settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="api_tokens"
@@ -98,7 +98,7 @@ class ApiToken(Coded):
         constraints = (
             models.CheckConstraint(
                 name="api_token_role_is_known",
-                condition=Q(role__in=["admin", "researcher", "expert"]),
+                condition=Q(role__in=["admin", "researcher", "expert", "entrant"]),
             ),
         )
 

@@ -31,7 +31,7 @@ MOST_ALIVE = 50
 """So many tokens one account may have at once."""
 
 WINDOW = timedelta(minutes=1)
-REQUESTS = {"admin": 1200, "researcher": 1200, "expert": 600}
+REQUESTS = {"admin": 1200, "researcher": 1200, "expert": 600, "entrant": 600}
 """So many requests a window, by the role of the token; counted in the database, so that it holds
 for all web servers together."""
 

@@ -39,6 +39,7 @@ from arena.people.queries import (
 from arena.site.access import (
     ADMIN,
     BACKEND,
+    ENTRANT,
     EXPERT,
     FORM_METHODS,
     GONE,
@@ -56,6 +57,7 @@ ROLE_NAMES = {
     "admin": gettext_lazy("Admin"),
     "researcher": gettext_lazy("Researcher"),
     "expert": gettext_lazy("Expert"),
+    "entrant": gettext_lazy("Entrant"),
 }
 LANGUAGE_COOKIE = "django_language"
 """Django's own name for it, which its locale middleware reads."""
@@ -72,7 +74,9 @@ class AccountForm(forms.Form):
         max_length=60, required=False, label="Pseudonym (what others see)", empty_value=None
     )
     role = forms.ChoiceField(
-        choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)], label="Role"
+        choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)],
+        initial="expert",
+        label="Role",
     )
 
 
@@ -263,7 +267,7 @@ def _link_page(request: HttpRequest, user: User) -> HttpResponse:
 # --- One's own tokens --------------------------------------------------------------------------
 
 
-@form_for(ADMIN, RESEARCHER, EXPERT)
+@form_for(ADMIN, RESEARCHER, EXPERT, ENTRANT)
 @never_cache
 def tokens_page(request: HttpRequest) -> HttpResponse:
     """One's own tokens, and a form for a new one, which is shown this once."""
@@ -289,7 +293,7 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
     return render(request, "api/tokens.html", context, status=422 if form.errors else 200)
 
 
-@act_for(ADMIN, RESEARCHER, EXPERT, back="api-tokens")
+@act_for(ADMIN, RESEARCHER, EXPERT, ENTRANT, back="api-tokens")
 def revoke_token(request: HttpRequest, code: uuid.UUID) -> None:
     """Revoke one of one's own tokens."""
     user = user_of(request)

@@ -11,10 +11,10 @@ from django.db.models import Q, QuerySet
 
 from arena.models import Person
 
-ROLES = ("admin", "researcher", "expert")
-"""The groups of accounts, the most powerful first."""
+ROLES = ("admin", "researcher", "expert", "entrant")
+"""The groups of accounts, the most powerful first. Entrants submit systems and never vote."""
 
-TOKEN_ROLES = {"admin": ROLES[:2], "researcher": ROLES[1:2], "expert": ROLES[2:]}
+TOKEN_ROLES = {"admin": ROLES[:2], **{role: (role,) for role in ROLES[1:]}}
 """The roles that a token may have, by the role of its owner. Staff know too much to vote, so
 that theirs is never an expert's."""
 

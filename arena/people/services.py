@@ -45,7 +45,7 @@ def create_person(
     Args:
         username: For the login.
         password: None for an account without a password.
-        role: "expert", "researcher" or "admin".
+        role: One of `ROLES`.
         pseudonym: What others see instead of the name; "Expert 3" and so on by default.
         is_simulated: The machine votes for it, and everything that comes of it says so.
         actor: Who creates the account, for the log.

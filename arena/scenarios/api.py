@@ -12,7 +12,7 @@ from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.access import STAFF
+from arena.api.access import ENTRANTS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
     ApiView,
@@ -24,11 +24,12 @@ from arena.api.views import (
     operation,
     page_of,
 )
-from arena.scenarios.queries import OWN
+from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
-from augment.models import Scenario, SceneUpload, UploadMoment
+from augment.models import Scenario, SceneUpload, Submission, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios import uploads
+from augment.services.scenarios.benchmarks import find_benchmark
 from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
@@ -36,7 +37,8 @@ from augment.services.scenarios.scenes import (
     SLUG_LENGTH,
     add_scenario,
 )
-from augment.tasks import enqueue_moment, enqueue_scenario, enqueue_upload
+from augment.services.scenarios.submissions import keep_submission
+from augment.tasks import enqueue_moment, enqueue_scenario, enqueue_submission, enqueue_upload
 
 
 class ScenarioQuery(PageQuery):
@@ -191,11 +193,10 @@ class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
         return notes_of((row.report or {}).get("notes", ()))
 
 
-class UploadsView(ApiView):
-    """Recordings."""
+class FilesView(ApiView):
+    """Files that come by a form."""
 
     parser_classes = (MultiPartParser,)
-    writers = STAFF
 
     def initial(self, request: Request, *args: Any, **kwargs: Any) -> None:
         """Refuse a file that was cut because it is too large."""
@@ -203,6 +204,12 @@ class UploadsView(ApiView):
         _ = request.data  # parses the body
         if was_too_large(request.META):
             raise RequestDataTooBig
+
+
+class UploadsView(FilesView):
+    """Recordings."""
+
+    writers = STAFF
 
     @operation(UploadDocument, takes=UploadBody, status=202, name="sendRecording")
     def post(self, given: Given) -> tuple[SceneUpload, list[str]]:
@@ -258,3 +265,60 @@ class MomentView(ApiView):
         """
         rows = UploadMoment.objects.select_related("upload", "scene").defer("upload__tracks")
         return get_object_or_404(rows, code=code)
+
+
+class SubmissionBody(StrictSerializer):
+    """A zip of answers and the benchmark that they answer."""
+
+    file = serializers.FileField(help_text="A zip with card.json and one file a task.")
+    benchmark = TextField(max_length=100, help_text="Its name, name@version, or code.")
+
+
+class SubmissionDocument(RowDocument[Submission], WarnedDocument):
+    """A submission, and once it is read the report on it."""
+
+    benchmark = serializers.CharField(help_text="Its name@version.", read_only=True)
+    report = serializers.DictField(
+        allow_null=True, help_text="The card, an entry for each task and sample, remarks."
+    )
+    summary = serializers.DictField(
+        allow_null=True, help_text="The card, how many entries were read, displacement."
+    )
+
+    class Meta:
+        model = Submission
+        fields = (
+            *("code", "benchmark", "name", "size_bytes", "digest", "state", "reason"),
+            *("decision", "decision_reason", "decided_at", "created_at", "finished_at"),
+            *("summary", "report", "warnings"),
+        )
+
+
+class SubmissionsView(FilesView):
+    """Submissions."""
+
+    writers = (*ENTRANTS, *STAFF)
+
+    @operation(SubmissionDocument, takes=SubmissionBody, status=202, name="sendSubmission")
+    def post(self, given: Given) -> tuple[Submission, list[str]]:
+        """Send a submission; a worker reads it.
+
+        Poll it until its state is checked or failed.
+        """
+        file, benchmark = given["file"], find_benchmark(given["benchmark"])
+        keep = partial(keep_submission, benchmark, name=file.name or "", content=file)
+        return keep_and_send(partial(keep, actor=self.user), enqueue_submission)
+
+
+class SubmissionView(ApiView):
+    """One submission."""
+
+    readers = (*ENTRANTS, *STAFF)
+
+    @operation(SubmissionDocument, name="getSubmission")
+    def get(self, code: uuid.UUID) -> Submission:
+        """A submission with its report.
+
+        Entrants get their own alone.
+        """
+        return get_object_or_404(submissions_for(self.user, with_report=True), code=code)

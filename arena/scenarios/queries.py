@@ -7,9 +7,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import Count, Q, QuerySet
+from django.contrib.auth.models import User
+from django.db.models import Case, Count, Q, QuerySet, When
 
-from augment.models import Augmentation, Benchmark, Contestant, Scenario
+from arena.people.queries import role_of
+from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
 from augment.services.scenarios.benchmarks import Split, Stratum
 from augment.services.scenarios.scenes import type_choices
 
@@ -153,3 +155,30 @@ def count_tasks(tasks: Iterable[tuple[str, str]]) -> list[StratumCount]:
     ]
     practice, test = (sum(getattr(line, name) for line in lines) for name in ("practice", "test"))
     return [*lines, StratumCount(label="All", practice=practice, test=test)]
+
+
+# --- Submissions -------------------------------------------------------------------------------
+
+_AWAITED = Q(state=Submission.State.CHECKED, decision=Submission.Decision.NONE)
+
+
+def submissions_for(user: User, *, with_report: bool = False) -> QuerySet[Submission]:
+    """Return what an account may see: entrants their own, staff all, awaited ones first."""
+    role = role_of(user)
+    rows = Submission.objects.select_related("benchmark", "uploaded_by__person", "contestant")
+    rows = rows if with_report else rows.defer("report")
+    if role in ("admin", "researcher"):
+        return rows.annotate(is_awaited=Case(When(_AWAITED, then=1), default=0)).order_by(
+            "-is_awaited", "-pk"
+        )
+    return rows.filter(uploaded_by=user) if role == "entrant" else rows.none()
+
+
+def is_waiting(row: Submission) -> bool:
+    """Return whether a submission waits for a decision."""
+    return row.state == Submission.State.CHECKED and not row.is_decided
+
+
+def count_waiting() -> int:
+    """Count the submissions that wait for a decision."""
+    return Submission.objects.filter(_AWAITED).count()

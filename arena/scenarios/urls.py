@@ -2,7 +2,14 @@
 
 from django.urls import URLPattern, path
 
-from arena.scenarios.pages import augmentations, benchmarks, editor, scenarios, uploads
+from arena.scenarios.pages import (
+    augmentations,
+    benchmarks,
+    editor,
+    scenarios,
+    submissions,
+    uploads,
+)
 
 urlpatterns: list[URLPattern] = [
     path("scenes/", uploads.scenes_page, name="scenes"),
@@ -12,6 +19,11 @@ urlpatterns: list[URLPattern] = [
     path("uploads/<uuid:code>/", uploads.upload_page, name="upload"),
     path("uploads/<uuid:code>/show/", uploads.show_moment, name="upload-show"),
     path("uploads/<uuid:code>/remove/", uploads.remove, name="upload-remove"),
+    path("submissions/", submissions.submissions_page, name="submissions"),
+    path("submissions/new/", submissions.new_submission_page, name="submission-new"),
+    path("submissions/<uuid:code>/", submissions.submission_page, name="submission"),
+    path("submissions/<uuid:code>/decline/", submissions.decline, name="submission-decline"),
+    path("submissions/<uuid:code>/withdraw/", submissions.withdraw, name="submission-withdraw"),
     path("scenarios/", scenarios.scenarios_page, name="scenarios"),
     path("scenarios/load/", scenarios.load_scenarios, name="catalogue-load"),
     path("scenarios/bulk/", scenarios.bulk_page, name="scenarios-bulk"),

@@ -18,12 +18,12 @@ from augment.errors import AugmentError
 P = ParamSpec("P")
 View = Callable[Concatenate[HttpRequest, P], HttpResponseBase]
 
-ADMIN, RESEARCHER, EXPERT = "admin", "researcher", "expert"
+ADMIN, RESEARCHER, EXPERT, ENTRANT = "admin", "researcher", "expert", "entrant"
 
 STAFF = (ADMIN, RESEARCHER)
 """Who may know which contestant made what."""
 
-BENCHMARK_READERS = STAFF
+BENCHMARK_READERS = (*STAFF, ENTRANT)
 """Who may look at benchmarks and get their folders, which hold no reference of the test."""
 
 BACKEND = "arena.people.queries.AccountBackend"

@@ -20,6 +20,7 @@ from arena.people.pages import keep_language
 from arena.people.queries import Language, Theme, role_of
 from arena.people.services import keep_preference
 from arena.results.queries.access import ResultsAccess, results_access
+from arena.scenarios.queries import count_waiting, submissions_for
 from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site import demo
 from arena.site.access import ADMIN, act_for, page_for, user_of
@@ -29,7 +30,7 @@ from arena.site.listing import read_listing, read_page
 from arena.site.queries import actors, count_failed, distinct, first_steps, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
-from augment.models import Event, GenerationJob
+from augment.models import Benchmark, Event, GenerationJob
 from augment.services.running.progress import count_each
 from augment.tasks import enqueue_job
 
@@ -45,6 +46,9 @@ def home(request: HttpRequest) -> HttpResponse:
     match role_of(request.user):
         case "expert":
             return _expert(request)
+        case "entrant":
+            use_english(request)
+            return _entrant(request)
         case "researcher":
             use_english(request)
             return _researcher(request)
@@ -74,6 +78,12 @@ def _expert(request: HttpRequest) -> HttpResponse:
     return render(request, "home/expert.html", context)
 
 
+def _entrant(request: HttpRequest) -> HttpResponse:
+    own = submissions_for(user_of(request))
+    benchmarks = Benchmark.objects.filter(retired_at=None)
+    return render(request, "home/entrant.html", {"own": own[:5], "benchmarks": benchmarks})
+
+
 def _researcher(request: HttpRequest) -> HttpResponse:
     return render(request, "home/researcher.html", _studies_by_state())
 
@@ -85,6 +95,7 @@ def _admin(request: HttpRequest) -> HttpResponse:
         "following": next((step for step in steps if not step.found), None),
         "is_set_up": steps[-1].found,
         "failed": count_failed(),
+        "submissions": count_waiting(),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
         **_studies_by_state(),
     }

@@ -17,7 +17,12 @@ register = template.Library()
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({""})),
     "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads", "benchmarks"})),
-    "contestants": (_("Contestants"), frozenset({"contestants", "endpoints", "models"})),
+    "benchmarks": (_("Benchmarks"), frozenset({"benchmarks"})),
+    "contestants": (
+        _("Contestants"),
+        frozenset({"contestants", "endpoints", "models", "submissions"}),
+    ),
+    "submissions": (_("Submissions"), frozenset({"submissions"})),
     "jobs": (_("Jobs"), frozenset({"jobs", "augmentations", "drives"})),
     "studies": (_("Studies"), frozenset({"studies", "boards"})),
     "people": (_("People"), frozenset({"people", "audit"})),
@@ -25,6 +30,7 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
 """Labels, and with which words the addresses of their pages begin."""
 _MENU = {
     "expert": ("home",),
+    "entrant": ("home", "benchmarks", "submissions"),
     "researcher": ("home", "scenarios", "contestants", "jobs", "studies"),
     "admin": ("home", "scenarios", "contestants", "jobs", "studies", "people"),
 }

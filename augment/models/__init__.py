@@ -19,10 +19,12 @@ from augment.models.jobs import (
 )
 from augment.models.judging import JudgeRun, PairJudgement
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
+from augment.models.submissions import Submission
 from augment.models.work import (
     FAILED,
     AppendOnly,
     Event,
+    SentFile,
     Work,
     Worker,
     account_column,
@@ -54,7 +56,9 @@ __all__ = [
     "Probe",
     "Scenario",
     "SceneUpload",
+    "SentFile",
     "Simulation",
+    "Submission",
     "TranscriptNote",
     "UploadMoment",
     "Work",

@@ -156,6 +156,7 @@ class Contestant(models.Model):
         RULE = "rule", "Rules"
         BASELINE = "baseline", "Baseline"
         SIMULATED = "simulated", "Simulated"
+        SUBMISSION = "submission", "Submission"
         CHECK = "check", "Attention check"
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
@@ -188,6 +189,12 @@ class Contestant(models.Model):
         editable=False,
         help_text="the whole set with which it runs, fixed at its first run; null before",
     )
+    card = models.JSONField(
+        null=True,
+        blank=True,
+        editable=False,
+        help_text="of a submission: who made it and how; only results show it; null for others",
+    )
     sends = models.JSONField(
         null=True,
         blank=True,
@@ -207,6 +214,7 @@ class Contestant(models.Model):
                 condition=Q(
                     kind__in=[
                         *("reference", "human", "llm", "rule", "baseline", "simulated"),
+                        "submission",
                         "check",  # nobody to be rated: its pictures are broken on purpose
                     ]
                 ),
@@ -215,6 +223,10 @@ class Contestant(models.Model):
                 name="contestant_variant_has_endpoint_and_model",
                 condition=Q(variant="", endpoint=None, model="")
                 | (~Q(variant="") & Q(endpoint__isnull=False) & ~Q(model="")),
+            ),
+            models.CheckConstraint(
+                name="contestant_with_card_is_submission",
+                condition=Q(card__isnull=True) | Q(kind="submission", endpoint=None),
             ),
             models.CheckConstraint(
                 name="contestant_with_error_rates_is_simulated",

@@ -5,7 +5,7 @@ import uuid
 from django.db import models
 from django.db.models import Q
 
-from augment.models.work import Work, account_column
+from augment.models.work import SentFile, Work, account_column
 from augment.scene.entities import CatalogueSet, ScenarioType, TrafficDensity, TurnType
 from augment.scene.intent import IntentOrigin
 
@@ -163,8 +163,8 @@ class Scenario(models.Model):
         return self.type_label or ScenarioType(self.type).label
 
 
-class SceneUpload(Work):
-    """A file as it came; a worker finds out what it is and what it holds."""
+class SceneUpload(SentFile):
+    """A recording as it came; a worker finds out what it is and what it holds."""
 
     class State(models.TextChoices):
         QUEUED = "queued", "Waiting"
@@ -172,12 +172,6 @@ class SceneUpload(Work):
         READ = "read", "Read"
         FAILED = "failed", "Failed"
 
-    name = models.CharField(max_length=120, help_text="of the file, in plain letters")
-    stored = models.CharField(
-        max_length=120, blank=True, help_text="name in the media storage; empty once removed"
-    )
-    size_bytes = models.PositiveBigIntegerField()
-    digest = models.CharField(max_length=64, help_text="SHA-256 of the file")
     asked_format = models.CharField(max_length=40, blank=True, help_text="empty to recognise it")
     format = models.CharField(max_length=40, blank=True, help_text="as it was read")
     state = models.CharField(max_length=10, choices=State.choices, default=State.QUEUED)
@@ -185,7 +179,6 @@ class SceneUpload(Work):
         default=list, blank=True, help_text="parts with moments, as services.scenarios.uploads"
     )
     is_cut = models.BooleanField(default=False, help_text="it holds more than is offered")
-    uploaded_by = account_column(on_delete=models.SET_NULL)
 
     class Meta:
         ordering = ("-pk",)

@@ -73,6 +73,21 @@ class Work(models.Model):
         return is_waiting
 
 
+class SentFile(Work):
+    """A file as it came, and who sent it; a worker finds out what it holds."""
+
+    name = models.CharField(max_length=120, help_text="of the file, in plain letters")
+    stored = models.CharField(
+        max_length=120, blank=True, help_text="name in the media storage; empty once removed"
+    )
+    size_bytes = models.PositiveBigIntegerField()
+    digest = models.CharField(max_length=64, help_text="SHA-256 of the file")
+    uploaded_by = account_column(on_delete=models.SET_NULL)
+
+    class Meta:
+        abstract = True
+
+
 class AppendOnly(models.Model):
     """A row that is never changed or deleted: what changes it is another row.
 

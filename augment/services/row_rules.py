@@ -10,6 +10,7 @@ from typing import Any
 
 from django.db import models
 
+from augment.benchmark.report import CARD, report_from_document
 from augment.errors import InvalidDocument
 from augment.models import (
     Augmentation,
@@ -22,6 +23,7 @@ from augment.models import (
     Scenario,
     SceneUpload,
     Simulation,
+    Submission,
     UploadMoment,
 )
 from augment.scene.codec import (
@@ -76,6 +78,8 @@ def _check_endpoint(row: Endpoint) -> None:
 def _check_contestant(row: Contestant) -> None:
     check_slug(row.slug, what="contestant")
     one_line("name", row.name, what="contestant")
+    if row.card is not None:
+        CARD.from_parts(row.card)
     options_from_document(row.options)
     for role, chosen in row.roles.items():
         ModelRole(role)
@@ -92,6 +96,12 @@ def _check_augmentation(row: Augmentation) -> None:
     check_picture_name("image", row.image)
     if row.modification is not None:
         modification_from_document(row.modification)
+
+
+def _check_submission(row: Submission) -> None:
+    check_stored_name("stored", row.stored)
+    if row.report is not None:
+        report_from_document(row.report)
 
 
 def _check_reading(row: IntentReading) -> None:
@@ -123,6 +133,7 @@ RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
     Scenario: _check_scenario,
     SceneUpload: lambda row: check_stored_name("stored", row.stored),
     Simulation: _check_drive,
+    Submission: _check_submission,
     UploadMoment: lambda row: check_stored_name("picture", row.picture),
 }
 """What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""

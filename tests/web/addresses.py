@@ -14,11 +14,14 @@ from augment.models import (
     Benchmark,
     Endpoint,
     EndpointModel,
+    Scenario,
     SceneUpload,
     Simulation,
+    Submission,
     UploadMoment,
 )
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from tests.entering import entrant, read, sent
 from tests.web.cast import World
 
 STRANGER = str(uuid.uuid4())
@@ -74,10 +77,8 @@ def _code(name: str, word: str, here: World) -> object:
             )
             moment, _ = UploadMoment.objects.get_or_create(upload=upload)
             return upload.code if word == "uploads" else moment.code
-        case "benchmarks":
-            known = Benchmark.objects.first()
-            asked = BenchmarkRequest(slug="set", title="Set", scenarios=[scenario.slug])
-            return (known or make_benchmark(asked)).code
+        case "benchmarks" | "submissions":
+            return _entered(word, scenario).code
         case "boards":
             board, _ = Board.objects.get_or_create(name="City")
             board.studies.add(here.study)
@@ -101,3 +102,13 @@ def _code(name: str, word: str, here: World) -> object:
         "scenes": scenario.base_scene,
     }
     return rows[word].code if word in rows else STRANGER
+
+
+def _entered(word: str, scenario: Scenario) -> Benchmark | Submission:
+    """Return a benchmark, or a submission that was read, to one that nobody retires."""
+    known = Benchmark.objects.filter(slug=word).first()
+    asked = BenchmarkRequest(slug=word, title="Set", scenarios=[scenario.slug])
+    benchmark = known or make_benchmark(asked)
+    if word == "benchmarks":
+        return benchmark
+    return Submission.objects.first() or read(sent(benchmark, entrant()))

@@ -26,7 +26,8 @@ PAGES = _table(
             "faults augmentation transcript contestants contestant endpoints endpoint "
             "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
             "scenarios-bulk prompts correct picture studies study preregistration "
-            "results results-tab benchmarks benchmark boards board board-export"
+            "results results-tab benchmarks benchmark boards board board-export "
+            "submissions submission submission-new"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "
@@ -58,7 +59,8 @@ ACTIONS = _table(
             "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
-            "study-draft-discard study-hand-over first-step benchmark-retired board-batch"
+            "study-draft-discard study-hand-over first-step benchmark-retired board-batch "
+            "submission-decline"
         ),
         (302, 302, 403): (
             "scene-send upload-show scenarios-write study-write set-intent results-open "
@@ -71,6 +73,7 @@ ACTIONS = _table(
         (422, 422, 403): "edit-check",
         (302, 404, 403): "upload-remove",
         (404, 404, 404): "api-token-revoke",
+        (404, 404, 403): "submission-withdraw",
         (404, 403, 403): "labelling-close",
     }
 )

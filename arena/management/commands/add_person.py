@@ -12,7 +12,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """Make an expert, a researcher or an admin."""
+    """Make an account of any role."""
 
     help = (
         "Make an account. The password is asked for; where nobody can be asked it is made up and "
@@ -21,7 +21,7 @@ class Command(TerminalCommand):
 
     arguments = {
         "username": {},
-        "--role": {"required": True, "help": "expert, researcher or admin"},
+        "--role": {"required": True, "help": "expert, entrant, researcher or admin"},
         "--pseudonym": {"help": "what others see; a numbered one by default"},
     }
 

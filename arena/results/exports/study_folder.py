@@ -98,7 +98,7 @@ AUGMENTATIONS: dict[str, Value] = {
 
 _CONTESTANT: dict[str, str] = {
     **{name: name for name in ("slug", "name", "kind", "variant", "model", "roles")},
-    **{name: name for name in ("error_rates", "options", "frozen_options", "sends")},
+    **{name: name for name in ("error_rates", "options", "frozen_options", "sends", "card")},
     "endpoint": "endpoint.base_url",
 }
 _SCENARIO: dict[str, str] = {

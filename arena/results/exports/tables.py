@@ -60,6 +60,7 @@ class Row(Line):
     Attributes:
         variant: The recipe's name as it ends the contestant's name, empty without.
         options: How it asked, a JSON object with sorted names; empty for who asks no model.
+        card: Who made a submission and how; None for all others.
     """
 
     slug: str
@@ -67,6 +68,7 @@ class Row(Line):
     simulated: bool
     variant: str = ""
     options: str = ""
+    card: dict[str, Any] | None = None
 
     @property
     def model(self) -> str:
@@ -210,6 +212,7 @@ def _row(standing: Standing, part: int) -> Row:
         simulated=standing.is_simulated,
         part=part,
         options=json.dumps(fixed, sort_keys=True) if fixed else "",
+        card=who.card if who else None,
         **stored_values(standing),
     )
 

@@ -253,7 +253,8 @@ def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
     values = {column.key: column.value_of(table, row) for column in IN_JSON}
-    part = {"part": row.part} if table.has_parts else {}
+    part: dict[str, Any] = {"part": row.part} if table.has_parts else {}
+    part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {
         key: round(value, 4) if isinstance(value, float) else value
         for key, value in values.items()

@@ -139,7 +139,11 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
 
 def free_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
     """Return a slug that says how a contestant asks and that nobody has."""
-    words = "-".join((model, variant, options_from_document(options).slug()))
+    return free_slug_of("-".join((model, variant, options_from_document(options).slug())))
+
+
+def free_slug_of(words: str) -> str:
+    """Return a slug made of these words that no contestant has."""
     stem = re.sub(r"[^a-z0-9]+", "-", words.lower())
     stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
     taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))

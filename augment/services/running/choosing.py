@@ -12,16 +12,20 @@ from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.endpoints.known_endpoints import KEY_RULE, may_hold_key
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.services.scenarios.choosing import ALL
+from augment.services.scenarios.submissions import refuse_unanswered
 from augment.variants.options import ToolProtocol
 from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 
-_KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
+_MADE_HERE = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
+_KINDS = (*_MADE_HERE, Kind.SUBMISSION)
 
-RUNNABLE = Q(kind__in=_KINDS, error_rates__isnull=True) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
-"""Whom a job can run. What humans and outside baselines made is imported; the simulated errors of
-earlier versions are kept, but run no more."""
+EVERYWHERE = Q(kind__in=_MADE_HERE, error_rates__isnull=True) | Q(
+    kind=Kind.BASELINE, slug__in=PLACERS
+)
+"""Whom a job can run on any scenario. Submissions answer for those of their benchmark, what humans
+and outside baselines made is imported, the simulated errors of earlier versions run no more."""
 
 
 def find_obstacle(contestant: Contestant) -> str:
@@ -29,6 +33,8 @@ def find_obstacle(contestant: Contestant) -> str:
     is_ours = contestant.kind == Kind.BASELINE and contestant.slug in PLACERS
     if not is_ours and (contestant.kind not in _KINDS or contestant.error_rates is not None):
         return "what humans or outside programs made is imported"
+    if contestant.kind == Kind.SUBMISSION and not hasattr(contestant, "submission"):
+        return "its submission is not in this installation"
     try:
         respondents = respondents_of(contestant)
         options = options_of(contestant)
@@ -57,7 +63,9 @@ def find_obstacle(contestant: Contestant) -> str:
     return other_prompts(contestant.slug, options) or ""
 
 
-def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:
+def refuse_impossible(
+    who: Sequence[Contestant], where: Sequence[Scenario], *, samples: int = 1
+) -> None:
     """Refuse a job that can't run to its end.
 
     Raises:
@@ -78,16 +86,19 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
             f"{references[0]} can't run on scenarios without a reference modification: "
             f"{', '.join(without)}."
         )
+    for row in who:
+        if row.kind == Kind.SUBMISSION:
+            refuse_unanswered(row, [one.slug for one in where], samples=samples)
 
 
 def resolve_contestants(given: Sequence[str]) -> list[str]:
-    """Return the slugs; `all` stands for every contestant that a job can run and nobody retired.
+    """Return the slugs; `all` stands for every contestant that runs everywhere and nobody retired.
 
     Raises:
         UnknownName: There is no contestant of that slug.
     """
     if list(given) == [ALL]:
-        rows = Contestant.objects.filter(RUNNABLE, retired_at=None)
+        rows = Contestant.objects.filter(EVERYWHERE, retired_at=None)
         return list(rows.values_list("slug", flat=True))
     known = set(Contestant.objects.values_list("slug", flat=True))
     for slug in given:

@@ -77,14 +77,15 @@ def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
         InvalidDocument: The name is empty, too long or not one line; or a number can't be.
         UnknownName: A slug that nobody registered.
         Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
-            scenarios that have none, a viewer can't see, or a cap in USD meets an unknown price.
+            scenarios that have none, a submission on what it does not answer, a viewer can't see,
+            or a cap in USD meets an unknown price.
     """
     name = one_line("name", request.name, what="job")
     check_bounds(request)
     loosen_unanswered(Contestant.objects.filter(slug__in=request.contestants))
     who = _in_order(Contestant.objects.all(), request.contestants, "contestant")
     where = _in_order(Scenario.objects.all(), request.scenarios, "scenario")
-    refuse_impossible(who, where)
+    refuse_impossible(who, where, samples=request.samples)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,

@@ -15,6 +15,7 @@ from django.db import Error, OperationalError
 from django.db.models import Max, Q, QuerySet
 
 from augment.baselines.registry import PLACERS, RULE_PLACER
+from augment.benchmark.values import EntryStatus
 from augment.errors import (
     AugmentError,
     BudgetSpent,
@@ -38,6 +39,7 @@ from augment.services.running import budget, jobs, workers
 from augment.services.running.calls import RowTranscript, insist_wanted, sentence_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
+from augment.services.scenarios.submissions import find_entry
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline
@@ -50,6 +52,13 @@ logger = logging.getLogger(__name__)
 
 Kind = Contestant.Kind
 State = Augmentation.State
+SUBMITTED = {
+    EntryStatus.READ: OutcomeStatus.DONE,
+    EntryStatus.REFUSED: OutcomeStatus.REFUSED,
+    EntryStatus.UNREADABLE: OutcomeStatus.UNREADABLE,
+    EntryStatus.MISSING: OutcomeStatus.UNREADABLE,
+}
+"""What an entry of a submission is as an augmentation."""
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
 Held = Lease[Augmentation]
 
@@ -197,6 +206,12 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         if reference is None:
             raise Conflict("The scenario has no reference modification.")
         return Outcome(status=OutcomeStatus.DONE, modification=reference)
+    if contestant.kind == Kind.SUBMISSION:
+        entry = find_entry(contestant, row.scenario.slug, row.sample)
+        status, notes = SUBMITTED[entry.status], "\n".join(entry.notes)
+        return Outcome(
+            status=status, modification=entry.modification, reason=entry.reason, notes=notes
+        )
     if contestant.endpoint is not None:
         return _ask_model(row, contestant.endpoint, scene, held, connect)
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug

@@ -6,7 +6,7 @@ import hashlib
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.readers import READERS, reader_of
 from augment.formats.reading import Moment, Reading
-from augment.models import SceneUpload, UploadMoment
+from augment.models import SceneUpload, SentFile, UploadMoment
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Modification
@@ -74,27 +74,39 @@ def keep_upload(
     """
     if source:
         reader_of(source)
+    row = SceneUpload(name=plain_name(name), asked_format=source, uploaded_by=actor)
+    keep_file(row, content)
+    return row
+
+
+def keep_file(
+    row: SentFile, content: File[bytes], *, insert: Callable[[], None] | None = None
+) -> None:
+    """Store a file and insert its row, or neither.
+
+    Args:
+        row: New, with its name and whoever sent it.
+        content: Not empty.
+        insert: Inserts the row, in a transaction of its own, unless it raises.
+
+    Raises:
+        Conflict: The file is empty.
+    """
     if not content.size:
         raise Conflict("The file is empty.")
     content.seek(0)
-    row = SceneUpload(
-        name=plain_name(name),
-        size_bytes=content.size,
-        digest=hashlib.file_digest(content, "sha256").hexdigest(),
-        asked_format=source,
-        uploaded_by=actor,
-    )
+    row.size_bytes = content.size
+    row.digest = hashlib.file_digest(content, "sha256").hexdigest()
     content.seek(0)
     row.stored = default_storage.save(f"{FOLDER}/{row.code}", content)
     try:
         with transaction.atomic():
-            row.save(force_insert=True)
+            (insert or partial(row.save, force_insert=True))()
             after = {"name": row.name, "size_bytes": row.size_bytes, "digest": row.digest}
-            log_change(row, "upload", actor, after=after)
+            log_change(row, "upload", row.uploaded_by, after=after)
     except BaseException:
         default_storage.delete(row.stored)
         raise
-    return row
 
 
 @transaction.atomic
@@ -109,7 +121,14 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
 
 @contextmanager
 def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
-    """Open the file on this machine; it is gone afterwards.
+    """Open a recording on this machine; as `open_file`."""
+    with open_file(row) as path:
+        yield UntrustedInput(path=path, format=row.asked_format or None)
+
+
+@contextmanager
+def open_file(row: SentFile) -> Iterator[Path]:
+    """Copy a sent file to this machine; it is gone afterwards.
 
     Raises:
         Conflict: The file was removed.
@@ -121,7 +140,7 @@ def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
                 shutil.copyfileobj(source, file)
         except FileNotFoundError:
             raise Conflict(f"The file of “{row.name}” is gone.") from None
-        yield UntrustedInput(path=path, format=row.asked_format or None)
+        yield path
 
 
 class Uploads(WorkKind[SceneUpload]):

@@ -1,0 +1,134 @@
+"""Submissions: sent by entrants, read by workers, accepted or declined by admins."""
+
+import uuid
+
+from django import forms
+from django.contrib import messages
+from django.core.paginator import Paginator
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+
+from arena.people.queries import role_of
+from arena.scenarios.queries import is_waiting, submissions_for
+from arena.scenarios.services import was_too_large
+from arena.site.access import ADMIN, ENTRANT, STAFF, act_for, form_for, page_for, user_of
+from arena.site.acts import looks_again, refusals_in, send_later
+from arena.site.forms import RequestForm, offer
+from arena.site.listing import page_asked, read_page
+from augment.models import Benchmark, Submission
+from augment.services.endpoints.contestants import free_slug_of
+from augment.services.inputs import inputs_of, read_request
+from augment.services.running.entering import AcceptRequest, accept_submission
+from augment.services.scenarios.submissions import (
+    decline_submission,
+    entries_of,
+    keep_submission,
+    withdraw_submission,
+)
+from augment.services.scenarios.uploads import most_megabytes
+from augment.tasks import enqueue_job, enqueue_submission
+
+AT_ONCE = 50
+
+
+class SubmissionForm(forms.Form):
+    """A file, and which benchmark it answers."""
+
+    benchmark = forms.ChoiceField(label="Benchmark")
+    file = forms.FileField(label="Drop the zip here, or choose it")
+
+    def __init__(self, *args: object, **kwargs: object) -> None:
+        super().__init__(*args, **kwargs)  # type: ignore[arg-type]
+        rows = Benchmark.objects.filter(retired_at=None)
+        offer(
+            self,
+            "benchmark",
+            [(str(row.code), f"{row.title}, version {row.version}") for row in rows],
+        )
+
+
+class AcceptForm(RequestForm):
+    """How an accepted submission is called, and whether it runs at once."""
+
+    inputs = inputs_of(AcceptRequest)
+
+
+@page_for(*STAFF, ENTRANT)
+def submissions_page(request: HttpRequest) -> HttpResponse:
+    """Show staff all submissions, those that wait for them first, and entrants their own."""
+    page = read_page(request, submissions_for(user_of(request)), size=AT_ONCE)
+    look = looks_again(request, waits=any(row.state in row.UNDER_WAY for row in page.object_list))
+    return render(request, "submissions/list.html", {"page": page, "look": look})
+
+
+@form_for(*STAFF, ENTRANT)
+def new_submission_page(request: HttpRequest) -> HttpResponse:
+    """Send a submission, which a worker reads."""
+    initial = {"benchmark": request.GET.get("benchmark", "")}
+    form = SubmissionForm(request.POST or None, request.FILES or None, initial=initial)
+    if was_too_large(request.META):
+        form.add_error("file", f"At most {most_megabytes()} MB are taken.")
+    elif form.is_valid():
+        with refusals_in(form, "file"):
+            file = form.cleaned_data["file"]
+            row = keep_submission(
+                Benchmark.objects.get(code=form.cleaned_data["benchmark"]),
+                name=file.name,
+                content=file,
+                actor=user_of(request),
+            )
+            send_later(request, enqueue_submission, row.pk)
+            return redirect("submission", code=row.code)
+    context = {"form": form, "most_megabytes": most_megabytes()}
+    return render(request, "submissions/new.html", context, status=422 if form.errors else 200)
+
+
+@form_for(*STAFF, ENTRANT)
+def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show a report, rejections first; an admin accepts here."""
+    row = _find(request, code)
+    is_admin = role_of(request.user) == ADMIN
+    form = AcceptForm(request.POST if is_admin and request.method == "POST" else None)
+    if form.is_valid():
+        with refusals_in(form), transaction.atomic():
+            asked = read_request(AcceptRequest, form.cleaned_data)
+            contestant, job = accept_submission(row, asked, actor=user_of(request))
+            messages.success(request, f"“{contestant.name}” is accepted.")
+            if job is None:
+                return redirect("contestant", code=contestant.code)
+            send_later(request, enqueue_job, job.pk)
+            return redirect("job", code=job.code)
+    elif not form.is_bound:
+        form.initial = {"slug": free_slug_of(row.title), "name": row.title, "runs": True}
+    page = Paginator(entries_of(row), AT_ONCE).get_page(page_asked(request))
+    context = {
+        "submission": row,
+        "form": form if is_admin and is_waiting(row) else None,
+        "is_own": row.uploaded_by == request.user,
+        "page": page,
+        "remarks": (row.report or {}).get("remarks", ()),
+        "look": looks_again(request, waits=row.state in row.UNDER_WAY),
+    }
+    status = 422 if form.errors else 200
+    return render(request, "submissions/submission.html", context, status=status)
+
+
+@act_for(ADMIN, back="submission")
+def decline(request: HttpRequest, code: uuid.UUID) -> None:
+    """Decline a submission, with the reason that its sender reads."""
+    reason = request.POST.get("reason", "")
+    decline_submission(_find(request, code), reason=reason, actor=user_of(request))
+
+
+@act_for(*STAFF, ENTRANT, back="submission")
+def withdraw(request: HttpRequest, code: uuid.UUID) -> None:
+    """Take one's own submission back before it is decided."""
+    own = submissions_for(user_of(request)).filter(uploaded_by=user_of(request))
+    withdraw_submission(get_object_or_404(own, code=code), actor=user_of(request))
+    messages.success(request, "It is withdrawn, and its file removed.")
+
+
+def _find(request: HttpRequest, code: uuid.UUID) -> Submission:
+    """Return a submission that this account may see, or answer 404."""
+    return get_object_or_404(submissions_for(user_of(request), with_report=True), code=code)

@@ -1,0 +1,141 @@
+"""Submissions page by page and by the API: entrants send theirs, admins decide."""
+
+from collections.abc import Callable
+
+import pytest
+from django.contrib.auth.models import User
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from django.urls import reverse
+
+from augment.models import Benchmark, Contestant, GenerationJob, Submission
+from augment.services.scenarios.submissions import SUBMISSIONS
+from tests.api.tokens import program_of
+from tests.entering import ANSWERS, a_benchmark, entrant, packed, read, sent
+from tests.web.cast import people, signed_in
+
+pytestmark = pytest.mark.django_db
+NEW = "/submissions/new/"
+
+
+@pytest.fixture(autouse=True)
+def working(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is sent to a worker is done at once."""
+    for door in ("pages.submissions", "api"):
+        monkeypatch.setattr(f"arena.scenarios.{door}.enqueue_submission", SUBMISSIONS.perform)
+    monkeypatch.setattr("arena.scenarios.pages.submissions.enqueue_job", lambda _pk: 0)
+    monkeypatch.setattr("django.db.transaction.on_commit", lambda done, **_: done())
+
+
+@pytest.fixture
+def benchmark() -> Benchmark:
+    return a_benchmark()
+
+
+def zipped() -> SimpleUploadedFile:
+    return SimpleUploadedFile("ours.zip", packed(**ANSWERS).read())
+
+
+def page(client: Client, row: Submission) -> str:
+    return client.get(reverse("submission", args=[row.code])).content.decode()
+
+
+def test_an_entrant_sends_a_zip_and_reads_its_rejections_first(benchmark: Benchmark) -> None:
+    enno = signed_in(entrant())
+    assert "Enter your system" in enno.get("/").content.decode()
+    answer = enno.post(NEW, {"benchmark": str(benchmark.code), "file": zipped()}, follow=True)
+    shown = answer.content.decode()
+    assert "2 of 4 read, 1 refused, 1 unreadable; mean displacement on practice" in shown
+    rows = [shown.index(f'<th scope="row">{name}') for name in ("street-3", "street-4")]
+    assert max(rows) < shown.index('<th scope="row">street-1')
+    for said in ("street-4.json", "An admin decides next", "Withdraw", "DiffScene"):
+        assert said in shown
+    assert "Accept it" not in shown
+    assert "1 submission waits" in signed_in(people()["admin"]).get("/").content.decode()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"file": SimpleUploadedFile("empty.zip", b"")}, "empty"),
+        ({"file": ""}, "This field is required"),
+        ({"benchmark": "00000000-0000-0000-0000-000000000000"}, "Select a valid choice"),
+    ],
+)
+def test_what_can_not_be_sent_is_said_at_its_field(
+    benchmark: Benchmark, change: dict[str, object], said: str
+) -> None:
+    given = {"benchmark": str(benchmark.code), "file": zipped()} | change
+    answer = signed_in(entrant()).post(NEW, given)
+    assert answer.status_code == 422
+    assert said in answer.content.decode()
+    assert not Submission.objects.exists()
+
+
+def test_an_admin_accepts_under_a_name_and_runs_it(benchmark: Benchmark) -> None:
+    enno, admin = entrant(), signed_in(people()["admin"])
+    row = read(sent(benchmark, enno))
+    assert 'value="diffscene"' in page(admin, row)
+    here = reverse("submission", args=[row.code])
+    taken = {"slug": "Not a slug", "name": "System A", "runs": "on"}
+    assert admin.post(here, taken).status_code == 422
+    answer = admin.post(here, taken | {"slug": "system-a"}, follow=True)
+    assert "“System A” is accepted" in answer.content.decode()
+    assert GenerationJob.objects.get().augmentations.count() == 4
+    contestant = Contestant.objects.get()
+    shown = admin.get(reverse("contestant", args=[contestant.code])).content.decode()
+    assert all(word in shown for word in ("Submission.", "A. Author", "closed", "secret-net"))
+    theirs = page(signed_in(enno), row)
+    assert "It takes part in studies" in theirs
+    assert reverse("contestant", args=[contestant.code]) not in theirs
+
+
+def test_a_declined_entrant_reads_why_and_a_withdrawn_one_is_over(benchmark: Benchmark) -> None:
+    enno, admin = entrant(), signed_in(people()["admin"])
+    first, second = read(sent(benchmark, enno)), read(sent(benchmark, enno))
+    decline = reverse("submission-decline", args=[first.code])
+    assert "is empty" in admin.post(decline, {"reason": " "}, follow=True).content.decode()
+    admin.post(decline, {"reason": "These are another’s answers."})
+    assert "These are another’s answers." in page(signed_in(enno), first)
+    withdraw = reverse("submission-withdraw", args=[second.code])
+    assert admin.post(withdraw).status_code == 404, "nobody else's"
+    assert "withdrawn" in signed_in(enno).post(withdraw, follow=True).content.decode()
+
+
+Asking = Callable[[User, str], int]
+
+
+def by_page(user: User, code: str) -> int:
+    return signed_in(user).get(reverse("submission", args=[code])).status_code
+
+
+def by_program(user: User, code: str) -> int:
+    return program_of(user).get(f"/api/v1/submissions/{code}").status_code
+
+
+@pytest.mark.parametrize("ask", [by_page, by_program])
+def test_nobody_reads_anothers_submission_but_staff(ask: Asking, benchmark: Benchmark) -> None:
+    enno, accounts = entrant(), people()
+    code = str(read(sent(benchmark, enno)).code)
+    asked = (enno, entrant("fred"), accounts["expert"], accounts["researcher"])
+    assert [ask(user, code) for user in asked] == [200, 404, 403, 200]
+    assert reverse("submission", args=[code]) not in _list(entrant("greta"))
+    assert reverse("submission", args=[code]) in _list(enno)
+
+
+def _list(user: User) -> str:
+    return signed_in(user).get(reverse("submissions")).content.decode()
+
+
+def test_a_program_sends_one_and_gets_its_report(benchmark: Benchmark) -> None:
+    enno = program_of(entrant())
+    body = {"file": zipped(), "benchmark": "streets"}
+    made = enno.post("/api/v1/submissions", body)
+    assert made.status_code == 202
+    found = enno.get(f"/api/v1/submissions/{made.json()['code']}").json()
+    assert (found["state"], found["benchmark"]) == ("checked", "streets@1")
+    assert found["summary"]["entries"]["read"] == 2
+    assert [one["status"] for one in found["report"]["entries"]] == [
+        *["read", "read", "refused", "unreadable"]
+    ]
+    assert enno.post("/api/v1/submissions", body | {"benchmark": "none"}).status_code == 422
