@@ -13,6 +13,7 @@ from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now
 from arena.studies.queries import finished_scenarios, scenario_sources
 from arena.studies.services.opening import cancel_study
+from arena.studies.services.planning import rules_of
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
@@ -116,6 +117,7 @@ def test_every_pair_of_a_batch_has_a_newcomer_and_old_answers_are_shown_again(
     }
     assert set(met.values()) == {4}
     assert json.loads(batch.preregistration)["rules"]["challengers"] == ["dot", "eli"]
+    assert rules_of(batch).challengers == ("dot", "eli")
 
 
 def test_what_cannot_be_pooled_is_refused(board: Board) -> None:

@@ -37,6 +37,8 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
     answer = admin.post(reverse("board-batch", args=[board.code]), asked)
     batch = Study.objects.get(name="City, batch 1")
     assert answer.headers["Location"] == reverse("study", args=[batch.code])
+    shown = admin.get(reverse("study", args=[batch.code])).content.decode()
+    assert f'dot (a batch of <a href="{page}">City</a>)' in shown
     assert "is still open" in admin.post(publish, follow=True).content.decode()
     voted(batch, seed=2)
     assert "Table 2 is published." in admin.post(publish, follow=True).content.decode()

@@ -1,0 +1,93 @@
+"""What makes a board's tables comparable, and how one is kept."""
+
+import json
+
+import pytest
+
+from arena.rating.board_table import (
+    BoardLine,
+    BoardTableDocument,
+    PooledStudy,
+    anchor_lines,
+    spread_over,
+    table_from_document,
+    table_to_document,
+)
+from arena.rating.lines import Line
+from augment.errors import InvalidDocument
+
+
+def test_the_founders_keep_their_mean_and_all_differences_stay() -> None:
+    lines = [
+        Line(name="a", rating=900.0, lower=850.0, upper=950.0),
+        Line(name="b", rating=1000.0, upper=1100.0),
+        Line(name="new", rating=1100.0),
+        Line(name="unrated"),
+    ]
+    moved = anchor_lines(lines, {"a", "b", "unrated"})
+    assert [line.interval for line in moved] == [
+        (900.0, 950.0, 1000.0),
+        (None, 1050.0, 1150.0),
+        (None, 1150.0, None),
+        (None, None, None),
+    ]
+
+
+def test_groups_that_cannot_be_compared_stay_where_they_are() -> None:
+    lines = [Line(name="a", rating=900.0), Line(name="new", rating=1200.0, part=1)]
+    assert anchor_lines(lines, {"a"}) == lines
+    assert anchor_lines(lines[1:], {"a"}) == lines[1:]
+
+
+@pytest.mark.parametrize(
+    ("ranked", "chosen"),
+    [("", ""), ("a", "a"), ("abc", "abc"), ("abcd", "acd"), ("abcdefg", "adg")],
+)
+def test_opponents_are_the_first_the_last_and_evenly_between(ranked: str, chosen: str) -> None:
+    assert spread_over(ranked, 3) == list(chosen)
+
+
+def a_table() -> BoardTableDocument:
+    line = BoardLine(
+        name="Ann",
+        rating=1000.5,
+        slug="ann",
+        kind="submission",
+        is_simulated=False,
+        since="2026-01-01",
+        authors=("Ada", "Bo"),
+        is_open=False,
+    )
+    study = PooledStudy(
+        name="Round 1", code="1", closed_at="2026-01-01", votes=3, preregistration="0" * 64
+    )
+    return BoardTableDocument(
+        board="City",
+        number=1,
+        made_at="2026-01-01T12:00:00+00:00",
+        benchmark="city@1",
+        benchmark_sha256="0" * 64,
+        question="Which?",
+        method="Bradley-Terry",
+        answer="Nobody.",
+        lines=(line,),
+        studies=(study,),
+        founders=("ann",),
+        votes=3,
+        votes_sha256="0" * 64,
+        left_out={"skip": 1},
+        notes=("Few.",),
+        versions={"numpy": "2"},
+        includes_simulated=False,
+    )
+
+
+def test_a_table_is_read_as_it_was_kept() -> None:
+    document = json.loads(json.dumps(table_to_document(a_table())))
+    assert table_from_document(document) == a_table()
+
+
+@pytest.mark.parametrize("change", [{"format": "x"}, {"version": 2}, {"votes": "many"}])
+def test_what_is_no_table_of_this_version_is_refused(change: dict[str, object]) -> None:
+    with pytest.raises(InvalidDocument, match=next(iter(change))):
+        table_from_document(table_to_document(a_table()) | change)
