@@ -6,20 +6,19 @@ test split are in no file, and the checksum is that of what is handed out.
 
 import hashlib
 import json
-import stat
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path, PurePath
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field, TypeAdapter
 
 from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Day, Split, Stratum
-from augment.errors import InvalidDocument, InvalidModification
-from augment.formats.documents import MAX_BYTES, read_json
+from augment.errors import InvalidDocument
+from augment.formats.documents import read_json
 from augment.formats.writers import WRITERS, writer_named
-from augment.formats.writing import Cell, Loss
+from augment.formats.writing import Cell
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
@@ -28,8 +27,10 @@ from augment.scene.codec import (
     scene_from_document,
     scene_to_document,
 )
-from augment.scene.entities import Modification, ScenarioType, check_fits
+from augment.scene.entities import Modification, ScenarioType
 from augment.scene.schema import CLOSED, Codec, Text, Whole, Yes, path
+
+Read = TypeVar("Read")
 
 WHAT = "benchmark"
 MANIFEST, LOSSES, README = "benchmark.json", "losses.json", "README.txt"
@@ -41,8 +42,6 @@ FORMATS = tuple(name for name in WRITERS if name != "json")
 """What a scene is written in besides; each has a folder of that name."""
 
 MOST_TASKS = 2_000
-MOST_BYTES = 8 * MAX_BYTES
-"""Of all documents of a folder together."""
 
 
 _Slug = Annotated[Text, Field(max_length=80, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
@@ -119,7 +118,6 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
     Raises:
         InvalidDocument: A task breaks a rule of the format, or a practice task has no reference.
     """
-    _check_practice(benchmark)
     files: dict[str, bytes] = {}
     named: dict[str, dict[str, tuple[str, ...]]] = {}
     for task in benchmark.tasks:
@@ -134,8 +132,9 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
         refused = {loss.cell for loss in written.refused}
         for name, own in _share_out(written.files, [*named.keys() - refused]).items():
             named[name][form] = tuple(f"{form}/{one}" for one in own)
-        losses += _lines_of(form, written.losses, is_refused=False)
-        losses += _lines_of(form, written.refused, is_refused=True)
+        for is_refused, those in ((False, written.losses), (True, written.refused)):
+            kind = {"format": form, "is_refused": is_refused}
+            losses += [kind | asdict(loss) for loss in those]
     manifest = _manifest_of(benchmark)
     lines = tuple(replace(line, files=named[line.name]) for line in manifest.tasks)
     manifest = replace(manifest, checksum=checksum(benchmark), tasks=lines)
@@ -155,8 +154,7 @@ def read_folder(folder: Path) -> BenchmarkSet:
         InvalidDocument: A file is missing, a link, too large or breaks its format, a document
             does not fit the others, or the checksum does not; each problem names file and place.
     """
-    manifest = _CODEC.from_document(_read(folder, MANIFEST))
-    _check_size(folder, manifest)
+    manifest = _read(folder, MANIFEST, _CODEC.from_document)
     tasks = tuple(_read_task(folder, line) for line in manifest.tasks)
     benchmark = BenchmarkSet(
         name=manifest.name,
@@ -184,28 +182,14 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         name = _file_of(kind, line.name)
         if line.files[kind] != (name,):
             raise InvalidDocument(WHAT, [(f"{at}: files.{kind}", f"expected {name!r} alone")])
-        documents[kind] = _parse(_PARSERS[kind], _read(folder, name), name)
-    scene, reference = documents[SCENE], documents.get(REFERENCE)
-    if scene.provenance != line.provenance:
+        documents[kind] = _read(folder, name, _PARSERS[kind])
+    if documents[SCENE].provenance != line.provenance:
         raise InvalidDocument(WHAT, [(f"{at}: provenance", "is not that of its scene")])
-    if reference is not None:
-        try:
-            check_fits(scene, reference)
-        except InvalidModification as fault:
-            place = _file_of(REFERENCE, line.name)
-            raise InvalidDocument(WHAT, [(place, str(fault))]) from None
     return BenchmarkTask(
-        name=line.name,
-        type=line.type,
-        instruction=line.instruction,
-        language=line.language,
-        split=line.split,
-        stratum=line.stratum,
-        scene=scene,
+        scene=documents[SCENE],
         recording=documents.get(RECORDING),
-        keeps_traffic=line.keeps_traffic,
-        paraphrase_of=line.paraphrase_of,
-        reference=reference,
+        reference=documents.get(REFERENCE),
+        **_said_of(line),
     )
 
 
@@ -216,42 +200,20 @@ _PARSERS: dict[str, Any] = {
 }
 
 
-def _parse(parse: Any, document: object, name: str) -> Any:
+def _read(folder: Path, name: str, parse: Callable[[object], Read]) -> Read:
+    """Return what a plain file holds that lies in the folder itself."""
+    file = folder / name
+    is_inside = file.parent.resolve() == folder.resolve() / Path(name).parent
+    if not is_inside or file.is_symlink() or not file.is_file():
+        problem = "is missing, or is a link or special; only plain files are read"
+        raise InvalidDocument(WHAT, [(name, problem)])
     try:
-        return parse(document)
+        return parse(read_json(file, what=WHAT))
     except InvalidDocument as fault:
-        problems = [(f"{name}: {place}", text) for place, text in fault.problems]
-        raise InvalidDocument(WHAT, problems) from None
-
-
-def _read(folder: Path, name: str) -> object:
-    _size_of(folder, name)
-    return read_json(folder / name, what=WHAT)
-
-
-def _check_size(folder: Path, manifest: _Manifest) -> None:
-    kinds = [(kind, line.name) for line in manifest.tasks for kind in OWN_PARTS]
-    names = [_file_of(kind, name) for kind, name in kinds]
-    total = sum(_size_of(folder, name) for name in names if (folder / name).exists())
-    if total > MOST_BYTES:
-        raise InvalidDocument(WHAT, [("", f"{total} bytes; at most {MOST_BYTES} are read")])
-
-
-def _size_of(folder: Path, name: str) -> int:
-    """Return the size of a plain file that lies in the folder itself.
-
-    Raises:
-        InvalidDocument: It is missing, a link or special, or lies behind a link.
-    """
-    try:
-        if (folder / name).parent.resolve() != folder.resolve() / Path(name).parent:
-            raise InvalidDocument(WHAT, [(name, "lies behind a link; only plain files are read")])
-        found = (folder / name).lstat()
-    except OSError as fault:
-        raise InvalidDocument(WHAT, [(name, fault.strerror or "can't be read")]) from None
-    if not stat.S_ISREG(found.st_mode):
-        raise InvalidDocument(WHAT, [(name, "is a link or special; only plain files are read")])
-    return found.st_size
+        found = [(place.removeprefix(file.name), text) for place, text in fault.problems]
+        raise InvalidDocument(
+            WHAT, [(f"{name}: {place}" if place else name, text) for place, text in found]
+        ) from None
 
 
 # What both share
@@ -266,7 +228,10 @@ def _documents_of(task: BenchmarkTask) -> dict[str, Any]:
     documents = {SCENE: scene_to_document(task.scene)}
     if task.recording is not None:
         documents[RECORDING] = recording_to_document(task.recording)
-    if task.split is Split.PRACTICE and task.reference is not None:
+    if task.split is Split.PRACTICE:
+        if task.reference is None:
+            problem = "is for practice and has no reference to hand out"
+            raise InvalidDocument(WHAT, [(task.name, problem)])
         documents[REFERENCE] = modification_to_document(task.reference)
     return documents
 
@@ -280,31 +245,16 @@ def _manifest_of(benchmark: BenchmarkSet) -> _Manifest:
         made_on=benchmark.made_on,
         checksum="",
         tasks=tuple(
-            _TaskLine(
-                name=task.name,
-                instruction=task.instruction,
-                type=task.type,
-                language=task.language,
-                split=task.split,
-                stratum=task.stratum,
-                keeps_traffic=task.keeps_traffic,
-                paraphrase_of=task.paraphrase_of,
-                provenance=task.scene.provenance,
-                files={},
-            )
+            _TaskLine(provenance=task.scene.provenance, files={}, **_said_of(task))
             for task in benchmark.tasks
         ),
     )
 
 
-def _check_practice(benchmark: BenchmarkSet) -> None:
-    problems = [
-        (task.name, "is for practice and has no reference to hand out")
-        for task in benchmark.tasks
-        if task.split is Split.PRACTICE and task.reference is None
-    ]
-    if problems:
-        raise InvalidDocument(WHAT, problems)
+def _said_of(one: BenchmarkTask | _TaskLine) -> dict[str, Any]:
+    """Return what a task and its line in `benchmark.json` have in common."""
+    names = ("name", "instruction", "type", "language", "split", "stratum", "keeps_traffic")
+    return {name: getattr(one, name) for name in (*names, "paraphrase_of")}
 
 
 def _cell_of(benchmark: BenchmarkSet, task: BenchmarkTask) -> Cell:
@@ -333,23 +283,12 @@ def _share_out(files: Iterable[str], tasks: Sequence[str]) -> dict[str, list[str
     return shared
 
 
-def _lines_of(form: str, losses: tuple[Loss, ...], *, is_refused: bool) -> list[dict[str, Any]]:
-    return [{"format": form, "is_refused": is_refused} | asdict(loss) for loss in losses]
-
-
 def _readme(benchmark: BenchmarkSet, digest: str) -> bytes:
     text = resources.files(__package__).joinpath("readme.txt").read_text("utf-8")
-    splits = [task.split for task in benchmark.tasks]
-    return text.format(
-        title=benchmark.title,
-        name=benchmark.name,
-        version=benchmark.version,
-        checksum=digest,
-        tasks=len(splits),
-        practice=splits.count(Split.PRACTICE),
-        test=splits.count(Split.TEST),
-        formats=", ".join(FORMATS),
-    ).encode()
+    practice = sum(task.split is Split.PRACTICE for task in benchmark.tasks)
+    counts = {"practice": practice, "test": len(benchmark.tasks) - practice}
+    formats = ", ".join(FORMATS)
+    return text.format(of=benchmark, checksum=digest, formats=formats, **counts).encode()
 
 
 def _canonical(document: Any) -> bytes:

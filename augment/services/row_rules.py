@@ -15,6 +15,7 @@ from augment.errors import InvalidDocument
 from augment.models import (
     Augmentation,
     BaseScene,
+    Benchmark,
     Contestant,
     Endpoint,
     EndpointModel,
@@ -67,6 +68,11 @@ def _check_scenario(row: Scenario) -> None:
         intent_from_document(row.intent)
     if row.reference is not None:
         check_reference(scene_of(row), modification_from_document(row.reference))
+
+
+def _check_benchmark(row: Benchmark) -> None:
+    check_slug(row.slug, what="benchmark")
+    one_line("title", row.title, what="benchmark")
 
 
 def _check_endpoint(row: Endpoint) -> None:
@@ -125,6 +131,7 @@ def _check_drive(row: Simulation) -> None:
 RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
     Augmentation: _check_augmentation,
     BaseScene: _check_scene,
+    Benchmark: _check_benchmark,
     Contestant: _check_contestant,
     Endpoint: _check_endpoint,
     EndpointModel: EndpointModel.clean,

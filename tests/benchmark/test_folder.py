@@ -129,7 +129,7 @@ def grow(folder: Path) -> None:
 
 MANIFEST = "benchmark.json"
 BROKEN: dict[str, tuple[Break, str]] = {
-    "nothing": (lambda folder: (folder / MANIFEST).unlink(), "benchmark.json: No such file"),
+    "nothing": (lambda folder: (folder / MANIFEST).unlink(), "benchmark.json: is missing"),
     "not JSON": (
         lambda folder: (folder / MANIFEST).write_text("{"),
         "benchmark.json: is not JSON",
@@ -153,14 +153,17 @@ BROKEN: dict[str, tuple[Break, str]] = {
     "provenance": (edit(MANIFEST, "tasks", 0, "provenance", to="x"), "provenance: is not that"),
     "wording": (edit(MANIFEST, "tasks", 0, "instruction", to="x"), "benchmark.json: checksum"),
     "scene": (edit("scenes/far.json", "ego", "x_m", to="0"), "scenes/far.json: ego.x_m: Input"),
-    "gone": (lambda folder: (folder / "scenes" / "far.json").unlink(), "scenes/far.json: No such"),
+    "gone": (
+        lambda folder: (folder / "scenes" / "far.json").unlink(),
+        "scenes/far.json: is missing",
+    ),
     "reference": (
         edit("references/near.json", "remove", to=["Agent9"]),
-        "references/near.json: Agent9 is not in the scene",
+        "benchmark.json: checksum",
     ),
-    "link": (link, "scenes/near.json: is a link or special"),
-    "link to a folder": (link_folder, "scenes/near.json: lies behind a link"),
-    "too large": (grow, "bytes; at most"),
+    "link": (link, "scenes/near.json: is missing, or is a link"),
+    "link to a folder": (link_folder, "scenes/near.json: is missing, or is a link"),
+    "too large": (grow, "scenes/near.json: 629145600 bytes; at most"),
 }
 
 

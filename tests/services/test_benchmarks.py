@@ -110,7 +110,7 @@ def test_what_is_asked_for_is_checked(
 ) -> None:
     with pytest.raises(fault, match=reason):
         make_benchmark(asked(**changes))
-    with pytest.raises(Conflict, match="1 to 2000 scenarios, and these are 0"):
+    with pytest.raises(Conflict, match="1 to 2000 scenarios; these are 0"):
         make_benchmark(asked("paper"))
     assert not Benchmark.objects.exists()
 

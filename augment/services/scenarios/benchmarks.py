@@ -5,9 +5,9 @@ of them stays; rows that changed nevertheless no longer fit its checksum, and wh
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from uuid import UUID
 
@@ -68,17 +68,8 @@ class BenchmarkRequest:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlannedItem:
-    """A scenario with its place in a benchmark."""
-
-    scenario: Scenario
-    split: Split
-    stratum: Stratum
-
-
-def plan_benchmark(request: BenchmarkRequest) -> list[PlannedItem]:
-    """Return the tasks of a benchmark that would be made now, in their order.
+def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
+    """Return the tasks of a benchmark that would be made now, in their order; none is stored.
 
     Raises:
         UnknownName: There is no such scenario or set.
@@ -88,8 +79,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[PlannedItem]:
     check_bounds(request)
     slugs = resolve_scenarios(request.scenarios)
     if not 1 <= len(slugs) <= MOST_TASKS:
-        text = f"A benchmark holds 1 to {MOST_TASKS} scenarios, and these are {len(slugs)}."
-        raise Conflict(text)
+        raise Conflict(f"A benchmark holds 1 to {MOST_TASKS} scenarios; these are {len(slugs)}.")
     found = Scenario.objects.select_related("paraphrase_of").in_bulk(slugs, field_name="slug")
     rows = [found[slug] for slug in slugs]
     sizes = {
@@ -102,7 +92,10 @@ def plan_benchmark(request: BenchmarkRequest) -> list[PlannedItem]:
         rng=np.random.default_rng(request.seed),
     )
     return [
-        PlannedItem(scenario=row, split=splits[row.slug], stratum=strata[row.slug]) for row in rows
+        BenchmarkItem(
+            scenario=row, position=place, split=splits[row.slug], stratum=strata[row.slug]
+        )
+        for place, row in enumerate(rows, start=1)
     ]
 
 
@@ -149,16 +142,9 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
     )
     row.checksum = checksum(_set_of(row, planned))
     row.save()
-    BenchmarkItem.objects.bulk_create(
-        BenchmarkItem(
-            benchmark=row,
-            scenario=one.scenario,
-            position=position,
-            split=one.split,
-            stratum=one.stratum,
-        )
-        for position, one in enumerate(planned, start=1)
-    )
+    for item in planned:
+        item.benchmark = row
+    BenchmarkItem.objects.bulk_create(planned)
     after = {"benchmark": str(row), "tasks": len(planned), "checksum": row.checksum}
     log_change(row, "make", actor, after=after)
     return row
@@ -171,15 +157,7 @@ def benchmark_set(row: Benchmark) -> BenchmarkSet:
         Conflict: Scenarios have changed since it was made.
     """
     items = row.items.select_related("scenario__base_scene", "scenario__paraphrase_of")
-    found = _set_of(
-        row,
-        [
-            PlannedItem(
-                scenario=item.scenario, split=Split(item.split), stratum=Stratum(item.stratum)
-            )
-            for item in items
-        ],
-    )
+    found = _set_of(row, items)
     if checksum(found) != row.checksum:
         raise Conflict(
             f"Scenarios of the benchmark {row} have changed since it was made, so that its "
@@ -224,30 +202,33 @@ def refuse_handed_out(scenario: Scenario) -> None:
         )
 
 
-def _set_of(row: Benchmark, planned: Sequence[PlannedItem]) -> BenchmarkSet:
-    names = {one.scenario.slug for one in planned}
+def _set_of(row: Benchmark, items: Iterable[BenchmarkItem]) -> BenchmarkSet:
+    tasks = [_task_of(item) for item in items]
+    names = {task.name for task in tasks}
     return BenchmarkSet(
         name=row.slug,
         title=row.title,
         version=row.version,
         made_on=row.made_on,
-        tasks=tuple(_task_of(one, names) for one in planned),
+        tasks=tuple(
+            task if task.paraphrase_of in names else replace(task, paraphrase_of="")
+            for task in tasks
+        ),
     )
 
 
-def _task_of(one: PlannedItem, names: set[str]) -> BenchmarkTask:
-    row, recording = one.scenario, one.scenario.base_scene.recording
-    original = "" if row.paraphrase_of is None else row.paraphrase_of.slug
+def _task_of(item: BenchmarkItem) -> BenchmarkTask:
+    row, recording = item.scenario, item.scenario.base_scene.recording
     return BenchmarkTask(
         name=row.slug,
         type=row.type,
         instruction=row.instruction,
         language=row.language,
-        split=one.split,
-        stratum=one.stratum,
+        split=Split(item.split),
+        stratum=Stratum(item.stratum),
         scene=scenes.scene_of(row),
         recording=None if recording is None else recording_from_document(recording),
         keeps_traffic=row.keep_traffic,
-        paraphrase_of=original if original in names else "",
+        paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,
         reference=scenes.reference_of(row),
     )
