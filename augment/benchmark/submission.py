@@ -31,12 +31,10 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.formats import lctgen, sandbox
 from augment.formats.documents import parse_json
 from augment.formats.reading import place_on_lanes
-from augment.formats.sandbox import ProcessLimits
 from augment.metrics.displacement import displacement
 from augment.scene.codec import SCENE
 from augment.scene.entities import Modification, apply
 
-_OPENING = ProcessLimits(cpu_s=16, deadline_s=120)
 MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
 MOST_CHANGED = 1_000
@@ -67,7 +65,7 @@ def check_submission(benchmark: BenchmarkSet, path: Path, *, checksum: str) -> S
         folder = Path(scratch) / "unpacked"
         folder.mkdir()
         request = {"what": "open", "path": str(path), "folder": str(folder)}
-        opened = sandbox.run(submitted_file.__name__, request, name=path.name, limits=_OPENING)
+        opened = sandbox.run(submitted_file.__name__, request, name=path.name)
         card = CARD.from_parts(opened["card"])
         keys = [(task.name, n) for task in benchmark.tasks for n in range(1, card.samples + 1)]
         by_key, strangers = _sort_files(_NAMES.validate_python(opened["files"]), keys)

@@ -9,9 +9,9 @@ import numpy as np
 
 from augment.benchmark.folder import write_folder
 from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Split, Stratum
-from augment.scene.entities import Modification
+from augment.scene.entities import AgentType, Modification, Scene
 from augment.scene.recording import Recording, Track
-from tests.scenes import scene, vehicle
+from tests.scenes import cone, scene, vehicle
 
 SECRET_M = 43.2187654
 """A number that stands in references of the test alone."""
@@ -44,6 +44,30 @@ def task(name: str, **changes: Any) -> BenchmarkTask:
         "reference": Modification(added=(vehicle("Agent3", SECRET_M, 0.25, 0.1),)),
     }
     return BenchmarkTask(**(given | changes))
+
+
+KINDS = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
+
+
+def street() -> Scene:
+    """Two cars of one size, the first driving, and one of each type beside the street."""
+    others = tuple(
+        replace(vehicle(f"Agent{number}", -40.0 + 12.0 * number, -6.0, 0.3), type=kind)
+        for number, kind in enumerate(KINDS, start=4)
+    )
+    parked = vehicle("Agent3", 40.0, 3.5, 3.14)
+    return scene(agents=(replace(CAR, speed_mps=7.0), parked, *others))
+
+
+def street_set(*names: str) -> BenchmarkSet:
+    """The street as tasks of those names, the first for practice."""
+    reference = Modification(added=(vehicle("Agent12", 30.0, 0.0), cone("Agent13", 12.0, 1.0)))
+    split = {name: Split.PRACTICE if name == names[0] else Split.TEST for name in names}
+    tasks = (task(name, scene=street(), reference=reference, split=split[name]) for name in names)
+    made_on = date(2026, 11, 26)
+    return BenchmarkSet(
+        name="streets", title="Streets", version=1, made_on=made_on, tasks=tuple(tasks)
+    )
 
 
 def small_set() -> BenchmarkSet:

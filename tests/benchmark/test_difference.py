@@ -15,10 +15,11 @@ from augment.formats.writers import writer_named
 from augment.formats.writing import Cell
 from augment.metrics.displacement import are_alike
 from augment.scene.entities import AgentType, Modification, Origin, Scene, apply
-from tests.benchmark.tasks import KINDS, street, task
+from tests.benchmark.sets import KINDS, street, street_set
 from tests.properties import examples
 from tests.scenes import pose_in_parent, vehicle
 
+(TASK,) = street_set("near").tasks
 SUFFIXES = {"commonroad": "near.xml", "scenarionet": "sd_scenario_arena_1_near.pkl"}
 DRIVEN = KINDS[:3]
 BECOMES = {
@@ -94,7 +95,7 @@ def test_a_format_of_others_gives_what_it_can_say(
 ) -> None:
     content = through(name, change, tmp_path_factory.mktemp("there"))
     assert content.scene is not None
-    view = identify(show_source(task(), name), content)
+    view = identify(show_source(TASK, name), content)
     found, _ = find_difference(street(), content.scene, view)
     assert are_alike(found, said(name, change)), (found, said(name, change))
 
@@ -166,7 +167,7 @@ def test_an_ego_elsewhere_is_aligned_where_the_frames_are_the_same() -> None:
 def test_what_a_format_can_not_say_is_named_and_stays(tmp_path: Path) -> None:
     content = through("commonroad", Modification(removed=("Agent2",)), tmp_path)
     assert content.scene is not None
-    view = identify(show_source(task(), "commonroad"), content)
+    view = identify(show_source(TASK, "commonroad"), content)
     found, notes = find_difference(street(), content.scene, view)
     assert found == Modification(removed=("Agent2",))
     (barrier,) = (one.id for one in street().agents if one.type is AgentType.BARRIER)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from augment.benchmark.submission import check_submission
-from augment.benchmark.values import EntryStatus, Split, SubmittedEntry
+from augment.benchmark.values import EntryStatus, SubmittedEntry
 from augment.errors import InvalidDocument
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
-from tests.benchmark.tasks import benchmark, task
+from tests.benchmark.sets import street_set
 from tests.benchmark.test_report import CARD_PARTS
 from tests.formats.hostile_files import HOSTILE
 from tests.scenes import cone
@@ -50,9 +50,8 @@ def slug(name: str) -> str:
 
 def check(path: Path, names: tuple[str, ...]) -> dict[str, SubmittedEntry]:
     """The refused entries; the good ones must have been read."""
-    hidden = {"split": Split.TEST, "reference": None}
-    tasks = [task(name, **hidden) for name in ("a-first", *map(slug, names), "z-last")]
-    report = check_submission(benchmark(*tasks), path, checksum="ab" * 32)
+    benchmark = street_set("a-first", *map(slug, names), "z-last")
+    report = check_submission(benchmark, path, checksum="ab" * 32)
     entries = {entry.task: entry for entry in report.entries}
     for name in ("a-first", "z-last"):
         assert entries.pop(name).status is EntryStatus.READ

@@ -7,21 +7,23 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from augment.benchmark.folder import checksum, read_folder, write_folder
+from augment.benchmark.folder import checksum, read_folder
 from augment.benchmark.report import report_to_document
 from augment.benchmark.submission import check_submission
-from augment.benchmark.values import BenchmarkSet, EntryStatus, Split, SubmittedEntry
+from augment.benchmark.values import EntryStatus, SubmittedEntry
 from augment.errors import InvalidDocument
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification, apply
-from tests.benchmark.tasks import benchmark, street, task
+from tests.benchmark.sets import handed_out, on_disk, street, street_set
 from tests.benchmark.test_report import CARD_PARTS
-from tests.scenes import cone, vehicle
+from tests.scenes import cone
 
+STREETS = street_set("near", "far", "closed")
 CONE = Modification(added=(cone("mine", 12.0, 1.5),))
 
 
@@ -38,8 +40,8 @@ def write(folder: Path, name: str, document: object) -> None:
     (folder / name).write_text(json.dumps(document))
 
 
-def entries(folder: Path, given: BenchmarkSet | None = None) -> dict[str, SubmittedEntry]:
-    report = check_submission(given or benchmark(), folder, checksum="ab" * 32)
+def entries(folder: Path) -> dict[str, SubmittedEntry]:
+    report = check_submission(STREETS, folder, checksum="ab" * 32)
     return {f"{one.task}--{one.sample}": one for one in report.entries}
 
 
@@ -66,6 +68,16 @@ def test_each_task_and_sample_gets_its_status_file_and_reason(folder: Path) -> N
         assert [one.id for one in sample.modification.added] == ["Agent12"]
 
 
+def test_lctgens_vehicles_are_added_on_the_lanes_of_the_scene(folder: Path) -> None:
+    ego, oncoming = [0.0] * 5 + [4.6, 1.9], [30.0, 3.4, -6.0, 0.0, 3.1, 4.4, 1.8]
+    np.savez(folder / "far.npz", agent=np.array([ego, oncoming]))
+    found = entries(folder)["far--1"]
+    assert found.modification is not None
+    (added,) = found.modification.added
+    assert (added.id, added.lane_id, added.speed_mps) == ("Agent12", "Lane2", 6.0)
+    assert found.notes[0].startswith("LCTGen says nothing of other road users")
+
+
 def test_a_lane_that_is_not_there_does_not_fit(folder: Path) -> None:
     lost = replace(CONE.added[0], lane_id="Lane77")
     write(folder, "near.json", modification_to_document(Modification(added=(lost,))))
@@ -80,7 +92,7 @@ def test_files_of_no_task_are_remarks_and_a_zip_of_the_folder_is_read(folder: Pa
     with zipfile.ZipFile(packed, "w") as file:
         for one in folder.iterdir():
             file.write(one, f"mine/{one.name}")
-    reports = [check_submission(benchmark(), one, checksum="ab" * 32) for one in (folder, packed)]
+    reports = [check_submission(STREETS, one, checksum="ab" * 32) for one in (folder, packed)]
     assert reports[0] == reports[1]
     assert [one.partition(" ")[0] for one in reports[0].remarks] == ["README.md", "near--2.json"]
     assert [one.status for one in reports[0].entries] == [
@@ -104,32 +116,29 @@ def test_the_server_says_the_same_to_the_last_digit_and_scores_practice_alone(
     folder: Path, tmp_path: Path
 ) -> None:
     """The server knows all references, the folder that was handed out those of practice."""
-    secret = Modification(added=(vehicle("Agent12", 1 / 3, 2 / 7),))
-    served = benchmark(task(), task("far", split=Split.TEST, reference=secret))
-    for name, content in write_folder(served).items():
-        path = tmp_path / "handed-out" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    shown = on_disk(tmp_path / "shown", STREETS)
+    placed = modification_to_document(Modification(added=(cone("mine", 0.1 + 0.2, 1 / 3),)))
     for name in ("near", "far"):
-        placed = Modification(added=(cone("mine", 0.1 + 0.2, 1 / 3),))
-        write(folder, f"{name}.json", modification_to_document(placed))
-    offline = read_folder(tmp_path / "handed-out")
-    assert offline.tasks[1].reference is None
+        write(folder, f"{name}.json", placed)
+    offline = read_folder(shown)
+    assert offline == handed_out(STREETS)
     documents = [
         report_to_document(check_submission(one, folder, checksum=checksum(one)))
-        for one in (served, offline)
+        for one in (STREETS, offline)
     ]
     assert json.dumps(documents[0]) == json.dumps(documents[1])
-    assert ["displacement" in one for one in documents[0]["entries"]] == [True, False]
+    assert ["displacement" in one for one in documents[0]["entries"]] == [True, False, False]
     out = StringIO()
     call_command(  # no database: this test may not reach one
-        "check_submission", str(folder), "--benchmark", str(tmp_path / "handed-out"), stdout=out
+        "check_submission", str(folder), "--benchmark", str(shown), stdout=out
     )
     distance_m = documents[0]["entries"][0]["displacement"]["matches"][0]["distance_m"]
-    assert f"near  read        near.json  {distance_m!r} m, 1 missing, 0 surplus" in out.getvalue()
+    assert (
+        f"near    read        near.json  {distance_m!r} m, 1 missing, 0 surplus" in out.getvalue()
+    )
     (folder / "card.json").unlink()
     with pytest.raises(CommandError) as fault:
-        call_command("check_submission", str(folder), "--benchmark", str(tmp_path / "handed-out"))
+        call_command("check_submission", str(folder), "--benchmark", str(shown))
     assert str(fault.value) == (
         "The submission was not taken. This submission can't be read: card.json: is missing"
     )
