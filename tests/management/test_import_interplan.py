@@ -102,8 +102,13 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
     arguments = ("scenarios", "Round 1", "--format", "interplan", "--out", file)
     call_command("export", *map(str, arguments), stdout=StringIO(), stderr=said)
     with zipfile.ZipFile(file) as archive:
-        (name,) = (name for name in archive.namelist() if name.endswith(".yaml"))
-        assert yaml.safe_load(archive.read(name)) == wanted
+        assert yaml.safe_load(archive.read("interplan.yaml")) == wanted
+        chosen = yaml.safe_load(archive.read("scenario_filter/arena-reference.yaml"))
+    assert sorted(chosen["scenario_tokens"]) == sorted(
+        f"{token}-s{index}"
+        for token, one in wanted["modification_details_dictionary"].items()
+        for index in one["special_scenario"]
+    )
     assert "Lost" not in said.getvalue()
 
 
