@@ -12,12 +12,14 @@ from arena.rating.agreement import AgreementLine, LineRole, measure_agreement, r
 from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.votes import Filters, current_votes
 from arena.results.services.agreement import pair_votes
+from arena.results.services.ratings import rate_now
 from arena.site.demo import RATED, SIMULATED_EXPERTS, hold_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from tests.scenes import vehicle
-from tests.study_rows import contestant, expert, picture, scenario
+from tests.study_rows import a_study, contestant, expert, picture, scenario, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -58,9 +60,9 @@ def lines_of(rating: Snapshot) -> dict[str, AgreementLine]:
 def decided(rating: Snapshot) -> Iterator[tuple[Augmentation, Augmentation]]:
     """Who won and who lost, straight from the rows."""
     rows = Vote.objects.filter(matchup__study=rating.study).exclude(winner=None)
-    for vote in rows.select_related("shown_left__contestant", "shown_right__contestant"):
-        sides = [vote.shown_left, vote.shown_right]
-        yield tuple(sorted(sides, key=lambda side: side.pk != vote.winner_id))  # type: ignore[misc]
+    for row in rows.select_related("shown_left__contestant", "shown_right__contestant"):
+        sides = [row.shown_left, row.shown_right]
+        yield tuple(sorted(sides, key=lambda side: side.pk != row.winner_id))  # type: ignore[misc]
 
 
 def test_displacement_and_the_ceiling_are_those_counted_from_the_rows(rating: Snapshot) -> None:
@@ -75,9 +77,9 @@ def test_displacement_and_the_ceiling_are_those_counted_from_the_rows(rating: Sn
     )
     assert found.share.value == pytest.approx(hits / len(known))
     said: dict[frozenset[int], list[tuple[int, int]]] = {}
-    for vote in Vote.objects.filter(matchup__study=rating.study):
-        pair = frozenset((vote.shown_left_id, vote.shown_right_id))
-        said.setdefault(pair, []).append((vote.expert_id, vote.winner_id or 0))
+    for row in Vote.objects.filter(matchup__study=rating.study):
+        pair = frozenset((row.shown_left_id, row.shown_right_id))
+        said.setdefault(pair, []).append((row.expert_id, row.winner_id or 0))
     means = []
     for votes_on_pair in said.values():
         for judge, winner in votes_on_pair:
@@ -130,3 +132,27 @@ def test_the_page_says_it_first_and_every_file_has_it(rating: Snapshot) -> None:
     assert f"({coin.decided} votes, 5 experts, {coin.scenarios} scenarios)" in latex
     assert "Ceiling: experts with each other, " in latex
     assert r"floor: a coin, 50 \%. (simulated)" in latex
+
+
+def test_each_question_has_its_own_agreement() -> None:
+    """The car nearer to the reference carries out the instruction, the other is realistic."""
+    study = a_study(votes_per_expert=9, questions=("instruction", "realism"))
+    off_m = {"ann": 0.0, "bob": 1.0, "cid": 2.0}
+    study.scenarios.update(reference=document(20.0))
+    for slug, metres in off_m.items():
+        rows = Augmentation.objects.filter(contestant__slug=slug)
+        rows.update(modification=document(20.0 + metres))
+    for matchup in study.matchups.select_related("left__contestant", "right__contestant"):
+        sides = {side: off_m[getattr(matchup, side).contestant.slug] for side in ("left", "right")}
+        vote(matchup, min(sides, key=lambda side: sides[side]), question="instruction")
+        vote(matchup, max(sides, key=lambda side: sides[side]), question="realism")
+    rating = rate_now(study=close_study(study=study), rounds=50)
+    found = {
+        line.question: line.share.value
+        for line in rating.results.agreement
+        if line.rater == "Displacement"
+    }
+    assert found == {"instruction": 1.0, "realism": 0.0}
+    address = reverse("results-tab", args=[study.code, "agreement"])
+    shown = signed_in(people()["researcher"]).get(address).content.decode()
+    assert "<h2>Which image is more realistic?</h2>" in shown
