@@ -6,7 +6,7 @@ from django.urls import URLPattern, path
 from arena.contestants.urls import urlpatterns as CONTESTANTS
 from arena.jobs.urls import urlpatterns as JOBS
 from arena.people import pages as people
-from arena.results.pages import boards
+from arena.results.pages import boards, judges
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
 from arena.results.pages.comparison import comparison_page
@@ -83,6 +83,18 @@ urlpatterns: list[URLPattern] = [
         name="shown-picture",
     ),
     path("studies/<uuid:code>/results/compare/", comparison_page, name="results-compare"),
+    path("studies/<uuid:code>/results/judges/", judges.judges_page, name="results-judges"),
+    path("studies/<uuid:code>/results/judges/new/", judges.judge_start, name="judge-start"),
+    path(
+        "studies/<uuid:code>/results/judges/<uuid:judge>/cancel/",
+        judges.judge_cancel,
+        name="judge-cancel",
+    ),
+    path(
+        "studies/<uuid:code>/results/judges/<uuid:judge>.csv",
+        judges.judge_answers,
+        name="judge-answers",
+    ),
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
     path("studies/<uuid:code>/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
     path("studies/<uuid:code>/files/<slug:kind>/", studies.download, name="study-file"),

@@ -42,6 +42,7 @@ def address(name: str, here: World) -> str:
         "number": 0,
         "vote": STRANGER,
         "rating": STRANGER,
+        "judge": STRANGER,
         "matchup": shown.code,
         "side": "left",
         "tab": "grid" if name == "job-tab" else "pairs",

@@ -44,7 +44,8 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     code = [study.code]
     named = {f"tab {tab}": reverse("results-tab", args=[*code, tab]) for tab in TABS}
     named |= {
-        name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
+        name: reverse(name, args=code)
+        for name in ("study", "preregistration", "results-votes", "results-judges")
     }
     board = make_board(name="City", study=study)
     publish_table(board, write=write_table)

@@ -38,7 +38,8 @@ PAGES = _table(
             "board-file"
         ),
         (403, 403, 403): (
-            "results-votes results-votes-file shown-picture results-export results-compare"
+            "results-votes results-votes-file shown-picture results-export results-compare "
+            "results-judges judge-answers"
         ),
         (403, 403, 404): "label vote vote-practice vote-skipped",
         (200, 200, 200): "home password api-tokens",
@@ -54,7 +55,9 @@ PAGES = _table(
 ACTIONS = _table(
     {
         # before anybody looks early
-        (403, 403, 403): "study-rate rating-again results-share results-unshare",
+        (403, 403, 403): (
+            "study-rate rating-again results-share results-unshare judge-start judge-cancel"
+        ),
         (302, 403, 403): (
             "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "

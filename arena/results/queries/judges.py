@@ -15,6 +15,9 @@ from augment.services.running.judge_runs import Exchange, ShownPair, exchange, p
 
 State = PairJudgement.State
 
+WITHOUT_FAMILY = ", without its own family"
+"""Behind the name of a judge whose pairs with contestants of its own family are left out."""
+
 Preferences = Mapping[tuple[str, str], int]
 """By the codes of two augmentations, left and right: 1 left is better, 0 tie, -1 right is."""
 
@@ -66,11 +69,11 @@ class JudgeLine:
         return self.first / self.answers if self.answers else None
 
 
-def judged_pairs(study: Study) -> list[ShownPair]:
+def judged_pairs(study: Study, question: str) -> list[ShownPair]:
     """Return the main pairs on which votes of experts count, each once, as it was first shown."""
     if is_imported(study):
         return []
-    votes = current_votes(study, Filters(), last_vote_of(study))
+    votes = current_votes(study, Filters(question=question), last_vote_of(study))
     shown = {vote.matchup for vote in votes if vote.mark == COUNTED and vote.matchup is not None}
     rows = Matchup.objects.select_related("left", "right").only(
         *("left_image", "right_image", "left__image", "right__image")
@@ -88,13 +91,14 @@ def judge_lines(study: Study) -> list[JudgeLine]:
     return [_line(study, run) for run in study.judges.select_related("endpoint").order_by("-pk")]
 
 
-def judge_preferences(study: Study) -> dict[str, Preferences]:
+def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
     """Return what each judge prefers, by its name; of runs alike the newest that has answers.
 
     Where contestants ask a model of the judge's own family, it comes once more without them.
     """
     found: dict[str, Preferences] = {}
-    for run in study.judges.select_related("endpoint").order_by("-pk"):
+    runs = study.judges.filter(question=question).select_related("endpoint")
+    for run in runs.order_by("-pk"):
         name, rows = judge_name(run), answers_of(run)
         if name in found or not rows:
             continue
@@ -106,7 +110,7 @@ def judge_preferences(study: Study) -> dict[str, Preferences]:
             if own.isdisjoint((row.left.contestant.slug, row.right.contestant.slug))
         ]
         if own:
-            found[f"{name}, without its own family"] = _preferences(strangers)
+            found[name + WITHOUT_FAMILY] = _preferences(strangers)
     return found
 
 

@@ -1,4 +1,4 @@
-"""Which metrics agree with the votes of a study."""
+"""Which metrics and judge models agree with the votes of a study."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -10,15 +10,17 @@ from arena.rating.agreement import (
     NamedRater,
     PairVote,
     measure_agreement,
+    rater_by_pairs,
     rater_by_scores,
 )
+from arena.results.queries.judges import judge_preferences
 from arena.results.queries.votes import COUNTED, Filters, Judged, current_votes, is_imported
 from arena.results.services.analysis import SCORES
 from augment.services.judging.metric_scores import metric_scores
 
 
 def rater_agreement(snapshot: Snapshot) -> tuple[AgreementLine, ...]:
-    """Measure how metrics agree with the votes of a rating, for each question of its study.
+    """Measure how metrics and judge models agree with the votes of a rating, by question.
 
     Args:
         snapshot: Says which votes count. Augmentations are scored as they are now; those of votes
@@ -27,10 +29,11 @@ def rater_agreement(snapshot: Snapshot) -> tuple[AgreementLine, ...]:
     study, filters = snapshot.study, Filters.of_document(snapshot.filters)
     if is_imported(study):
         return ()
-    raters, lines = study_raters(study), []
+    metrics, lines = study_raters(study), []
     for question in study.questions:
         asked = replace(filters, question=question)
         votes = pair_votes(current_votes(study, asked, snapshot.last_vote))
+        raters = [*metrics, *judge_raters(study, question)]
         lines += [replace(line, question=question) for line in measure_agreement(votes, raters)]
     return tuple(lines)
 
@@ -52,8 +55,14 @@ def pair_votes(votes: Iterable[Judged]) -> list[PairVote]:
 
 
 def study_raters(study: Study) -> list[NamedRater]:
-    """Return whatever prefers one augmentation of a study to another, beside people."""
+    """Return the metrics by which one augmentation of a study is better than another."""
     return [
         rater_by_scores(scores.name, scores.by_code, tolerance=scores.tolerance)
         for scores in metric_scores(shown_augmentations(study))
     ]
+
+
+def judge_raters(study: Study, question: str) -> list[NamedRater]:
+    """Return the models that compared the pairs of a study by a question."""
+    judges = judge_preferences(study, question)
+    return [rater_by_pairs(name, preferences) for name, preferences in judges.items()]

@@ -1,15 +1,21 @@
-"""Judges of a study: started and cancelled; what they say is kept apart from all votes."""
+"""Judges of a study: started, and held against experts. What they say is kept apart from votes."""
+
+from collections.abc import Mapping
 
 from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import Study
+from arena.rating.agreement import AgreementLine, measure_agreement
 from arena.results.queries.judges import judged_pairs
+from arena.results.queries.votes import Filters, current_votes, last_vote_of
+from arena.results.services.agreement import judge_raters, pair_votes
+from augment.errors import UnknownName
 from augment.models import JudgeRun
-from augment.services.events import log_change
 from augment.services.running.judge_runs import (
     JudgeEstimate,
     JudgeRequest,
+    ShownPair,
     estimate_judge,
     plan_judge,
 )
@@ -19,11 +25,12 @@ def estimate_study_judge(study: Study, request: JudgeRequest) -> JudgeEstimate:
     """Return what a judge of all pairs that experts judged would use.
 
     Raises:
-        UnknownName: No such endpoint.
+        UnknownName: No such endpoint, or the study does not ask that question.
         Conflict: The model can't see pictures.
     """
     texts = study.scenarios.values_list("instruction", flat=True)
-    return estimate_judge(request, len(judged_pairs(study)), max(texts, key=len, default=""))
+    pairs = _pairs(study, request.question)
+    return estimate_judge(request, len(pairs), max(texts, key=len, default=""))
 
 
 @transaction.atomic
@@ -31,13 +38,29 @@ def start_judge(study: Study, request: JudgeRequest, actor: User | None = None) 
     """Let a model compare all pairs that experts judged; workers ask it.
 
     Raises:
-        UnknownName: No such endpoint.
+        UnknownName: No such endpoint, or the study does not ask that question.
         InvalidDocument: A cap can't be.
         Conflict: There is no such pair, the model can't see, or a cap in USD lacks a price.
     """
-    run = plan_judge(request, judged_pairs(study), actor)
+    run = plan_judge(request, _pairs(study, request.question), actor)
     study.judges.add(run)
-    log_change(
-        study, "start judge", actor, after={"judge": str(run), "pairs": run.judgements.count()}
-    )
     return run
+
+
+def judge_agreement(study: Study, question: str) -> Mapping[str, AgreementLine]:
+    """Return by its name how each judge agrees with all votes that count, with ceiling and floor.
+
+    The same is measured for a rating, whose votes are those of its time. Nothing without judges.
+    """
+    raters = judge_raters(study, question)
+    if not raters:
+        return {}
+    votes = current_votes(study, Filters(question=question), last_vote_of(study))
+    lines = measure_agreement(pair_votes(votes), raters)
+    return {line.rater: line for line in lines if not line.type}
+
+
+def _pairs(study: Study, question: str) -> list[ShownPair]:
+    if question not in study.questions:
+        raise UnknownName("question of this study", question, study.questions)
+    return judged_pairs(study, question)

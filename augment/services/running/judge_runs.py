@@ -67,15 +67,16 @@ class ShownPair(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class JudgeRequest(Caps):
-    """A new run of a judge.
-
-    Attributes:
-        question: By what it compares.
-    """
+    """A new run of a judge."""
 
     endpoint: str = input_field(InputKind.TEXT, "Endpoint", "Its label.")
     model: str = input_field(InputKind.TEXT, "Model", "Its id there.")
-    question: JudgeQuestion = JudgeQuestion.INSTRUCTION
+    question: str = input_field(
+        InputKind.CHOICE,
+        "Question",
+        choices={one.value: one.value.capitalize() for one in JudgeQuestion},
+        default=JudgeQuestion.INSTRUCTION.value,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,46 @@
+"""manage.py judge_study: have a language model compare the pairs of a study."""
+
+from typing import Any
+
+from django.core.management.base import CommandParser
+
+from arena.rating.agreement import share_text
+from arena.results.queries.judges import judge_lines
+from arena.results.services.judges import judge_agreement, start_judge
+from arena.studies.queries import study_named
+from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.running.judge_runs import JUDGEMENTS, JudgeRequest
+from augment.services.terminal import TerminalCommand
+
+
+class Command(TerminalCommand):
+    """judge_study STUDY --endpoint E --model M [--cap-usd N]."""
+
+    help = (
+        "Ask a language model about every pair that experts judged, in both orders, and print how "
+        "it agrees with them. What it says is no vote."
+    )
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Which study, and an option for all that a judge needs."""
+        parser.add_argument("study", help="its name or its code")
+        names = ("endpoint", "model")
+        for name in names:
+            parser.add_argument(f"--{name}", required=True)
+        add_options(parser, [one for one in inputs_of(JudgeRequest) if one.name not in names])
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Ask about one pair after the other; workers may help."""
+        study = study_named(options["study"])
+        run = start_judge(study, read_request(JudgeRequest, options))
+        for pk in run.judgements.values_list("pk", flat=True):
+            JUDGEMENTS.perform(pk)
+        line = next(line for line in judge_lines(study) if line.run.pk == run.pk)
+        self.stdout.write(
+            f"{line.name}: {line.run.get_state_display()}, {line.done} of {line.pairs} pairs; "
+            f"preferences kept {line.kept}, lost {line.lost}, equal {line.equal}, "
+            f"unreadable {line.unreadable}, failed {line.failed}."
+        )
+        found = judge_agreement(study, run.question).get(line.name)
+        if found is not None:
+            self.stdout.write(f"Agrees with the experts on {share_text(found.share)}.")

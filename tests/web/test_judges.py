@@ -1,0 +1,155 @@
+"""Judge models of a study: started from a page, held against experts, in no rating of anybody."""
+
+from collections.abc import Iterator
+from decimal import Decimal
+
+import pytest
+from django.core.management import call_command
+from django.test import Client
+from django.urls import reverse
+
+from arena.models import Matchup, Study, Vote
+from arena.results.queries.judges import judge_preferences, judged_pairs
+from arena.results.services.ratings import rate_now
+from arena.studies.services.opening import close_study
+from augment.fake_llm.server import running
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
+from augment.services.endpoints.known_models import model_at
+from augment.services.running.judge_runs import JUDGEMENTS
+from augment.services.scenarios.pictures import store
+from tests import study_rows
+from tests.web.cast import people, png, signed_in
+
+pytestmark = pytest.mark.django_db
+
+
+@pytest.fixture
+def study() -> Study:
+    """Two experts always prefer the picture of which more is drawn, on two scenarios."""
+    made = study_rows.a_study(votes_per_expert=6, scenarios=2)
+    for row in Augmentation.objects.all():
+        study_rows.hang(row, store(png(row.pk) + bytes(row.pk)))
+    for matchup in made.matchups.all():
+        study_rows.vote(matchup, "left" if matchup.left_id > matchup.right_id else "right")
+    return close_study(study=made)
+
+
+@pytest.fixture
+def endpoint() -> Iterator[Endpoint]:
+    with running() as server:
+        made = ensure_endpoint(EndpointRequest(label="stand-in", base_url=server.url))
+        Endpoint.objects.update(is_simulated=True)
+        for name in ("fake-good", "fake-careless"):
+            known = model_at(endpoint=made, model=name)
+            known.vision, known.price_in_usd, known.price_out_usd = True, Decimal(1), Decimal(1)
+            known.save()
+        yield made
+
+
+def start(client: Client, study: Study, model: str, **more: str) -> str:
+    judge = str(EndpointModel.objects.get(model=model).code)
+    answer = client.post(
+        reverse("judge-start", args=[study.code]), {"judge": judge, **more}, follow=True
+    )
+    assert answer.status_code == 200
+    return " ".join(answer.content.decode().split())
+
+
+def page(client: Client, study: Study) -> str:
+    answer = client.get(reverse("results-judges", args=[study.code]))
+    return " ".join(answer.content.decode().split())
+
+
+def test_a_judge_is_estimated_started_worked_and_shown(study: Study, endpoint: Endpoint) -> None:
+    admin = signed_in(people()["admin"])
+    asked = start(admin, study, "fake-good")
+    assert "Calls: 12, each pair in both orders" in asked
+    assert "Cost: at most 1." in asked
+    assert not JudgeRun.objects.exists()
+    assert "is asked about 6 pairs" in start(admin, study, "fake-good", sure="1")
+    shown = page(admin, study)
+    assert "0 of 6" in shown
+    assert "Cancel" in shown
+    run = study.judges.get()
+    for pk in run.judgements.values_list("pk", flat=True):
+        JUDGEMENTS.perform(pk)
+    shown = page(admin, study)
+    assert "Closest to the experts: Judge fake-good at stand-in (simulated), in agree" in shown
+    assert 'class="badge is-simulated"' in shown
+    assert "50 %" in shown
+    answers = admin.get(reverse("judge-answers", args=[study.code, run.code])).content.decode()
+    head, first, second, *rest = answers.splitlines()
+    assert head.split(",")[:4] == ["judge", "question", "scenario", "order"]
+    assert first.split(",")[4:6] == second.split(",")[5:3:-1]
+    assert len(rest) == 10
+
+
+def test_a_judge_can_be_cancelled_and_is_for_staff_alone(study: Study, endpoint: Endpoint) -> None:
+    accounts = people()
+    admin, researcher = signed_in(accounts["admin"]), signed_in(accounts["researcher"])
+    start(admin, study, "fake-good", sure="1")
+    run = study.judges.get()
+    assert researcher.get(reverse("results-judges", args=[study.code])).status_code == 200
+    cancelling = reverse("judge-cancel", args=[study.code, run.code])
+    assert researcher.post(cancelling).status_code == 403
+    expert = signed_in(study.experts.get(username="eva"))
+    assert expert.get(reverse("results-judges", args=[study.code])).status_code == 403
+    assert "Cancelled" in admin.post(cancelling, follow=True).content.decode()
+    Study.objects.update(state="open")
+    assert admin.get(reverse("results-judges", args=[study.code])).status_code == 403
+
+
+def test_what_is_refused_is_said_before_anything_is_asked(
+    study: Study, endpoint: Endpoint
+) -> None:
+    admin = signed_in(people()["admin"])
+    EndpointModel.objects.update(vision=False)
+    assert "can’t see pictures" in start(admin, study, "fake-good", sure="1")
+    assert "Question: Select a valid choice" in start(
+        admin, study, "fake-good", question="realism"
+    )
+    assert not JudgeRun.objects.exists()
+
+
+def test_no_rating_counts_a_judge_and_each_pair_is_asked_about_once(
+    study: Study, endpoint: Endpoint, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, votes = rate_now(study=study, rounds=50, seed=1), Vote.objects.count()
+    pairs = judged_pairs(study, "instruction")
+    shown = {frozenset(pair) for pair in Matchup.objects.values_list("left", "right")}
+    assert sorted(map(sorted, shown)) == sorted(sorted(pair[:2]) for pair in pairs)
+    call_command("judge_study", study.name, endpoint="stand-in", model="fake-good")
+    said = capsys.readouterr().out
+    assert "6 of 6 pairs; preferences kept 6, lost 0, equal 0, unreadable 0" in said
+    assert "Agrees with the experts on 100 %" in said
+    after = rate_now(study=study, rounds=50, seed=1)
+    assert Vote.objects.count() == votes
+    assert [line.rating for line in after.standings.order_by("slug")] == [
+        line.rating for line in before.standings.order_by("slug")
+    ]
+    assert after.votes_counted == before.votes_counted == votes
+    name = "Judge fake-good at stand-in (simulated)"
+    shares = {line.rater: line.share.value for line in after.results.agreement}
+    assert shares[name] == 1.0
+    assert name not in {line.rater for line in before.results.agreement}
+
+
+def test_preferences_come_with_and_without_the_judges_own_family(
+    study: Study, endpoint: Endpoint
+) -> None:
+    Contestant.objects.filter(slug="ann").update(
+        kind="llm", variant="otm", endpoint=endpoint, model="fake-other"
+    )
+    call_command("judge_study", study.name, endpoint="stand-in", model="fake-good")
+    found = judge_preferences(study, "instruction")
+    name = "Judge fake-good at stand-in (simulated)"
+    assert list(found) == [name, f"{name}, without its own family"]
+    with_all, without = found.values()
+    assert (len(with_all), len(without)) == (6, 2)
+    codes = {str(row.code): row for row in Augmentation.objects.all()}
+    for (left, right), preference in with_all.items():
+        assert preference == (1 if codes[left].pk > codes[right].pk else -1)
+    assert "ann" not in {codes[code].contestant.slug for pair in without for code in pair}
+    shown = page(signed_in(people()["researcher"]), study)
+    assert "without its own family: Ann" in shown
