@@ -61,7 +61,9 @@ def test_over_three_dates_old_tables_stay_byte_for_byte(board: Board) -> None:
 def test_a_table_rates_the_pooled_votes_on_the_scale_of_the_first_study(board: Board) -> None:
     newcomer("dot")
     first = published(board, 1).document
-    own = {row.slug: row.rating for row in rate_now(study=board.studies.get()).standings.all()}
+    snapshot = rate_now(study=board.studies.get())
+    assert first.votes_sha256 == snapshot.votes_sha256
+    own = {row.slug: row.rating for row in snapshot.standings.all()}
     assert {line.slug: line.rating for line in first.lines} == pytest.approx(own)
     voted(a_batch(board, "dot"), seed=2)
     found = {line.slug: line.rating for line in published(board, 2).document.lines}

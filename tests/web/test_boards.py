@@ -21,7 +21,8 @@ pytestmark = pytest.mark.django_db
 
 def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path: Path) -> None:
     first = voted(a_study(votes_per_expert=18))
-    newcomer("dot")
+    dot = newcomer("dot", Contestant.Kind.SUBMISSION)
+    Contestant.objects.filter(pk=dot.pk).update(card={"authors": ["Ada", "Bo"], "is_open": False})
     admin, stranger = signed_in(people()["admin"]), Client()
     admin.post(reverse("boards"), {"name": "City", "study": str(first.code)})
     board = Board.objects.get()
@@ -55,7 +56,10 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
     assert "72 votes" in public.content.decode()
     assert "eva" not in public.content.decode()
     data = stranger.get(f"{address}2.json").content
-    assert {line["slug"] for line in json.loads(data)["lines"]} == {"ann", "bob", "cid", "dot"}
+    cards = {one["slug"]: (one["authors"], one["is_open"]) for one in json.loads(data)["lines"]}
+    assert cards.keys() == {"ann", "bob", "cid", "dot"}
+    assert (cards["ann"], cards["dot"]) == (([], None), (["Ada", "Bo"], False))
+    assert "Ada, Bo (closed)" in public.content.decode()
     assert stranger.get(f"{address}1.csv").content.startswith(b"rank,contestant,elo")
     assert stranger.get(f"{address}1.html").status_code == 404
 

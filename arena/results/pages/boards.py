@@ -38,7 +38,11 @@ LOOK = forms.CheckboxSelectMultiple
 class BoardForm(forms.Form):
     """A new board."""
 
-    name = forms.CharField(max_length=LONGEST_NAME, widget=forms.TextInput({"class": "input"}))
+    name = forms.CharField(
+        max_length=LONGEST_NAME,
+        widget=forms.TextInput({"class": "input"}),
+        help_text="Experts see it in the names of batches: it should name no contestant.",
+    )
     study = forms.ModelChoiceField(
         Study.objects.filter(state=Study.State.CLOSED, vote_file=None),
         label="First study",
@@ -178,7 +182,7 @@ def shared_board_file(request: HttpRequest, token: str, number: int, form: str) 
 
 def _shown(request: HttpRequest, board: Board) -> dict[str, Any]:
     """The table that the address names, the newest unless it does."""
-    tables = list(board.tables.all())
+    tables = list(board.tables.defer("files"))
     asked = request.GET.get("table")
     shown = [one for one in tables if asked in (None, str(one.number))]
     if tables and not shown:

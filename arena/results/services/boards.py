@@ -330,7 +330,13 @@ def _answer(lines: Sequence[tuple[Line, Competitor]], pool: Pool, rated: Leaderb
 
 
 def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:
-    values = asdict(line) | {"name": who.name}
+    card = (who.contestant and who.contestant.card) or {}
     return BoardLine(
-        slug=who.slug, kind=who.kind, is_simulated=who.is_simulated, since=since, **values
+        slug=who.slug,
+        kind=who.kind,
+        is_simulated=who.is_simulated,
+        since=since,
+        authors=tuple(card.get("authors", ())),
+        is_open=card.get("is_open"),
+        **asdict(line) | {"name": who.name},
     )
