@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
+from augment.escaping import escape_controls
 from augment.formats import lctgen, sandbox
 from augment.formats.apart import ZipBounds, unpack_zip
 from augment.formats.commonroad.writer import names_in
@@ -33,6 +34,8 @@ BOUNDS = ZipBounds(entries=10_000, bytes=500_000_000)
 ENOUGH_S = 4.0
 """Of computing, after which the process stops: a file always has as much left of its limit."""
 _HEAD_BYTES = 1_000_000
+_MOST_SAID = 2_000
+"""Characters of a reason, which may quote the file."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,11 +117,13 @@ def _read_scene(reader: Reader, path: Path) -> FileContent:
 def _tell(path: Path) -> dict[str, Any]:
     """What a file says as plain JSON, which can be read again."""
     try:
-        document: dict[str, Any] = CONTENT.dump(read_file(path))
+        found = read_file(path)
+        notes = tuple(escape_controls(note) for note in found.notes)
+        document: dict[str, Any] = CONTENT.dump(replace(found, notes=notes))
         CONTENT.from_parts(document)
         return document
     except InvalidDocument as fault:
-        return {"problem": str(fault)}
+        return {"problem": escape_controls(str(fault)[:_MOST_SAID])}
     except RecursionError:
         return {"problem": "This file can't be read: it is nested too deeply"}
 

@@ -85,19 +85,16 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
     crowd = [cone(f"Agent{number}", 9.0, 2.0) for number in range(100, 1200)]
     crowded = modification_to_document(Modification(added=tuple(crowd)))
     (made / "crowd.json").write_text(json.dumps(crowded))
-    huge = {
-        "tracks": {10**5000: {"type": "VEHICLE"}},
-        "map_features": {},
-        "metadata": {},
-        "length": 2,
-    }
-    (made / "huge.pkl").write_bytes(pickle.dumps(huge))
+    for name, key in {"huge": 10**5000, "nul": "a\0b"}.items():
+        parts = {"tracks": {key: {"type": "?"}}, "map_features": {}, "metadata": {}}
+        (made / f"{name}.pkl").write_bytes(pickle.dumps(parts | {"length": 2}))
     os.symlink("/etc/passwd", made / "link.json")
-    found = check(made, ("million", "nan", "bomb", "crowd", "huge", "link"))
+    found = check(made, ("million", "nan", "bomb", "crowd", "nul", "huge", "link"))
     assert "bytes; at most" in found["million"].reason
     assert "finite number" in found["nan"].reason
     assert "memory" in found["bomb"].reason
     assert "1100 agents; at most 1010 are taken" in found["crowd"].reason
+    assert r"tracks.a\x00b.type: unknown '?'" in found["nul"].reason
     assert "makes its reader fail: ValueError: Exceeds the limit" in found["huge"].reason
     assert found["link"].reason.endswith("link.json: is a link")
 
