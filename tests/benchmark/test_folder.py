@@ -49,6 +49,12 @@ def test_the_checksum_tells_every_change_of_what_is_handed_out(what: str) -> Non
     assert checksum(CHANGES[what](small_set())) != checksum(small_set())
 
 
+def test_a_checksum_stays_what_it_is() -> None:
+    """Benchmarks that are handed out have it: another one here makes all of them unreadable."""
+    pinned = "c2c5c4094ac94f93cd736e459ad4fe27afb6717725dd2ec589c16f8d7d114e99"
+    assert checksum(small_set()) == pinned
+
+
 def test_what_is_read_again_is_what_was_handed_out(tmp_path: Path) -> None:
     benchmark = small_set()
     found = read_folder(on_disk(tmp_path, benchmark))
