@@ -101,7 +101,7 @@ def test_a_later_run_replaces_and_a_broken_one_changes_nothing(
     good = write_experiment(tmp_path / "c", [scored(second, 1.0)])
     with pytest.raises(CommandError, match="is there 2 times for the planner"):
         run(tokens, good, good)
-    with pytest.raises(CommandError, match="must be a number from 0 to 1"):
+    with pytest.raises(CommandError, match="less than or equal to 1"):
         run(tokens, good, write_experiment(tmp_path / "d", [scored(first, 2.0)]))
     assert NuplanResult.objects.count() == 1
 

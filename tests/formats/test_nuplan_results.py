@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
-from augment.formats.interplan.runs import SCRIPT, TOKENS, NuplanScenario, read_tokens
+from augment.formats.interplan.runs import SCRIPT, TOKENS, read_tokens
 from augment.formats.interplan.writer import write
 from augment.formats.nuplan_results import read_results
 from augment.formats.writing import Cell
@@ -66,11 +66,12 @@ def test_a_contestant_gets_a_filter_and_a_command(tmp_path: Path) -> None:
         "scenario_filter=arena-ann",
         "experiment_name=arena-ann",
     ]
-    assert asked[5].startswith(f"hydra.searchpath=[file://{tmp_path},pkg://interplan.planning")
+    first, second, *_, last = asked[5].removeprefix("hydra.searchpath=[").split(",")
+    assert first == f"file://{tmp_path}"
+    assert second == "pkg://interplan.planning.script.config.common"
+    assert last == "pkg://nuplan.planning.script.experiments]"
     assert len(asked) == 12
-    assert read_tokens(files[TOKENS])[f"{BASE}-s1"] == NuplanScenario(
-        scenario=f"{BASE}-s1", augmentation="code-of-bob", contestant="bob", name="street by bob"
-    )
+    assert read_tokens(files[TOKENS])[f"{BASE}-s1"] == "code-of-bob"
 
 
 def test_scenes_that_nuplan_does_not_have_are_in_no_filter() -> None:
@@ -105,11 +106,11 @@ def test_scores_and_failures_of_an_experiment_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("row", "place"),
     [
-        ({"score": 1.01}, "row 0: score: 1.01 must be a number from 0 to 1"),
-        ({"score": math.nan}, "row 0: score: None must"),
-        ({"drivable_area_compliance": math.inf}, "row 0: drivable_area_compliance: 'inf' must"),
-        ({"scenario": "a\nb"}, "row 0: scenario: must be a line"),
-        ({"planner_name": None}, "row 0: planner_name: must be a line"),
+        ({"score": 1.01}, "row 0: score: .*less than or equal to 1"),
+        ({"score": math.nan}, "row 0: score: is missing"),
+        ({"drivable_area_compliance": math.inf}, "row 0: parts.*drivable_area_compliance.*finite"),
+        ({"scenario": "a\nb"}, "row 0: scenario: .*match pattern"),
+        ({"planner_name": None}, "row 0: planner: .*string"),
     ],
 )
 def test_a_row_that_is_none_is_named(tmp_path: Path, row: dict[str, Any], place: str) -> None:
@@ -120,9 +121,7 @@ def test_a_row_that_is_none_is_named(tmp_path: Path, row: dict[str, Any], place:
 def test_what_is_no_experiment_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidDocument, match="aggregator_metric: holds no"):
         read_results(tmp_path)
-    folder = write_experiment(tmp_path / "run", [scored("a-s0", 0.5), scored("a-s0", 0.5)])
-    with pytest.raises(InvalidDocument, match="a-s0: is there twice"):
-        read_results(folder)
+    folder = write_experiment(tmp_path / "run", [scored("a-s0", 0.5)])
     (file,) = folder.glob("*/*.parquet")
     file.write_bytes(file.read_bytes()[:-20])
     with pytest.raises(InvalidDocument, match="is no Parquet file that can be read"):

@@ -61,23 +61,13 @@ def shown_realism(job: GenerationJob) -> dict[str, Any]:
 
 def answer_in_words(table: RealismTable) -> str:
     """Return who is most realistic and where that lies, as a sentence."""
-    means = {line.subject: line.mean for line in table.lines if line.mean is not None}
     best = next((one for one in table.lines if one.subject is Subject.CONTESTANT), None)
     if best is None or best.mean is None:
         return "No contestant placed anything that could be judged."
-    also = ", ".join(
-        f"{words} {means[subject]:.2f}"
-        for subject, words in (
-            (Subject.REFERENCE, "The reference has"),
-            (Subject.RANDOM, "random placement"),
-        )
-        if subject in means
-    )
-    name = shown_name(best.name, best.is_simulated)
-    there = "none" if best.recorded is None else f"{best.recorded:.2f}"
     return (
-        f"The most realistic is {name} with {best.mean:.2f} over {best.changes} changes; recorded "
-        f"traffic has {there} in the same scenes. {also}."
+        f"The most realistic is {shown_name(best.name, best.is_simulated)} with {best.mean:.2f} "
+        f"over {best.changes} changes; recorded traffic has {_printed(best.recorded)} in the same "
+        "scenes."
     )
 
 

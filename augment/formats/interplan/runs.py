@@ -47,27 +47,21 @@ def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
         by_contestant[one.contestant].append(one)
     if not by_contestant:
         return {}
-    filters = {
-        f"scenario_filter/arena-{slug}.yaml": _filter(found)
-        for slug, found in sorted(by_contestant.items())
-    }
-    commands = "".join(
-        f"run arena-{slug}   # {len(found)} scenarios\n"
-        for slug, found in sorted(by_contestant.items())
-    )
-    table = io.StringIO()
+    files, commands, table = {}, "", io.StringIO()
     rows = csv.writer(table, lineterminator="\n")
     rows.writerow(_COLUMNS)
-    for found in by_contestant.values():
+    for slug, found in sorted(by_contestant.items()):
+        files[f"scenario_filter/arena-{slug}.yaml"] = _filter(found)
+        commands += f"run arena-{slug}   # {len(found)} scenarios\n"
         rows.writerows([getattr(one, column) for column in _COLUMNS] for one in found)
-    return {**filters, SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
+    return files | {SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
 
 
-def read_tokens(content: bytes) -> dict[str, NuplanScenario]:
-    """Return what a table of tokens says, by nuPlan's name of the scenario.
+def read_tokens(content: bytes) -> dict[str, str]:
+    """Return the codes of augmentations by nuPlan's names of their scenarios.
 
     Raises:
-        InvalidDocument: It is none of ours, names a scenario twice, or is too long.
+        InvalidDocument: The table is none of ours, names a scenario twice, or is too long.
     """
     try:
         rows = list(csv.reader(io.StringIO(content.decode()), strict=True))
@@ -76,12 +70,12 @@ def read_tokens(content: bytes) -> dict[str, NuplanScenario]:
     if not rows or tuple(rows[0]) != _COLUMNS or len(rows) > MOST_TOKENS + 1:
         problem = f"needs the columns {', '.join(_COLUMNS)} and at most {MOST_TOKENS:,} lines"
         raise InvalidDocument(TOKENS, [("line 1", problem)])
-    found: dict[str, NuplanScenario] = {}
+    found: dict[str, str] = {}
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(_COLUMNS) or row[0] in found:
             problem = f"needs {len(_COLUMNS)} values and a scenario that no other line has"
             raise InvalidDocument(TOKENS, [(f"line {number}", problem)])
-        found[row[0]] = NuplanScenario(**dict(zip(_COLUMNS, row, strict=True)))
+        found[row[0]] = row[1]
     return found
 
 
@@ -115,23 +109,17 @@ _SCRIPT = """\
 # Afterwards: manage.py import nuplan_results EXPERIMENT_FOLDER ... --tokens nuplan_tokens.csv
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
+configs=$(for of in interplan tuplan_garage nuplan; do
+  for part in config.common config.simulation experiments; do
+    printf 'pkg://%s.planning.script.%s,' $of $part; done; done)
 
 run() {
-  python "${INTERPLAN_PLUGIN_ROOT:?is the folder of interPlan's code}\
-/interplan/planning/script/run_simulation.py" \\
+  python "$INTERPLAN_PLUGIN_ROOT/interplan/planning/script/run_simulation.py" \\
     +simulation=default_interplan_benchmark \\
     planner="${PLANNER:-pdm_closed_planner}" \\
     scenario_filter="$1" \\
     experiment_name="$1" \\
-    hydra.searchpath="[file://$here,\
-pkg://interplan.planning.script.config.common,\
-pkg://interplan.planning.script.config.simulation,\
-pkg://interplan.planning.script.experiments,\
-pkg://tuplan_garage.planning.script.config.common,\
-pkg://tuplan_garage.planning.script.config.simulation,\
-pkg://nuplan.planning.script.config.common,\
-pkg://nuplan.planning.script.config.simulation,\
-pkg://nuplan.planning.script.experiments]"
+    hydra.searchpath="[file://$here,${configs%,}]"
 }
 
 """

@@ -10,7 +10,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import InvalidDocument
-from augment.formats.interplan.runs import TOKENS, NuplanScenario, read_tokens
+from augment.formats.interplan.runs import TOKENS, read_tokens
 from augment.formats.nuplan_results import NuplanDrive, read_results
 from augment.models import Augmentation, GenerationJob, NuplanResult
 from augment.services.events import log_change
@@ -50,7 +50,7 @@ def import_results(
     scenarios = read_tokens(tokens.read_bytes())
     drives = [drive for folder in folders for drive in read_results(folder)]
     _check_once(drives)
-    codes = {name: code for name, one in scenarios.items() if (code := _code_of(one))}
+    codes = {name: code for name, text in scenarios.items() if (code := _code_of(text))}
     rows = Augmentation.objects.filter(code__in=set(codes.values())).defer("modification")
     by_code = {row.code: row for row in rows}
     by_scenario = {name: by_code[code] for name, code in codes.items() if code in by_code}
@@ -84,9 +84,9 @@ def _check_once(drives: Sequence[NuplanDrive]) -> None:
             raise InvalidDocument("nuPlan results", [(scenario, problem)])
 
 
-def _code_of(scenario: NuplanScenario) -> UUID | None:
+def _code_of(text: str) -> UUID | None:
     try:
-        return UUID(scenario.augmentation)
+        return UUID(text)
     except ValueError:
         return None
 

@@ -114,18 +114,18 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
         reference = reference_of(scenario)
         pattern = reference or next(filter(None, answers.values()), Modification())
         recorded = judged.recording(pattern)
-        here = {
-            (Subject.RECORDING, 0): [recorded],
-            (Subject.REFERENCE, 0): [] if reference is None else [judged.of(reference)],
-            (Subject.RANDOM, 0): judged.random(pattern),
-        }
-        for row, change in answers.items():
-            if row.contestant.kind != Contestant.Kind.REFERENCE:
-                here.setdefault((Subject.CONTESTANT, row.contestant_id), []).append(
-                    judged.of(change)
-                )
-        for key, ones in here.items():
-            found[key] += [(one, recorded) for one in ones]
+        here = [
+            (Subject.RECORDING, 0, recorded),
+            *((Subject.REFERENCE, 0, judged.of(one)) for one in [reference] if one is not None),
+            *((Subject.RANDOM, 0, one) for one in judged.random(pattern)),
+            *(
+                (Subject.CONTESTANT, row.contestant_id, judged.of(change))
+                for row, change in answers.items()
+                if row.contestant.kind != Contestant.Kind.REFERENCE
+            ),
+        ]
+        for subject, contestant, realism in here:
+            found[subject, contestant].append((realism, recorded))
     contestants = Contestant.objects.in_bulk({pk for _, pk in found if pk})
     lines = [_line(subject, contestants.get(pk), ones) for (subject, pk), ones in found.items()]
     return RealismTable(
@@ -135,14 +135,12 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
 
 def realism_of_rows(ids: Collection[int]) -> dict[int, Realism]:
     """Return the realism of the augmentations with these keys; without what can't be judged."""
-    learned, found = _Recorded(), {}
+    learned = _Recorded()
+    found: dict[int, Realism | None] = {}
     for scenario, rows in _by_scenario(Augmentation.objects.filter(pk__in=ids)):
         judged = _Judged(scenario, learned)
-        for row in rows:
-            realism = judged.of(_change_of(row))
-            if realism is not None:
-                found[row.pk] = realism
-    return found
+        found |= {row.pk: judged.of(_change_of(row)) for row in rows}
+    return {pk: realism for pk, realism in found.items() if realism is not None}
 
 
 # --- Private -----------------------------------------------------------------------------------
