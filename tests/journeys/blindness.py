@@ -111,6 +111,8 @@ def secrets_of(study: Study) -> list[str]:
     told = ["llama", "otm", "hosted"]
     for contestant in study.contestants.all():
         told += [contestant.slug, str(contestant.code)]
+        card = contestant.card or {}
+        told += [card.get("name", ""), card.get("method", ""), *card.get("models", ())]
     for row in Augmentation.objects.select_related("job"):
         told += [str(row.code), str(row.job.code), row.image, row.image.split("/")[-1]]
         told += [agent["id"] for agent in (row.modification or {}).get("add", ())]

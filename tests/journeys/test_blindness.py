@@ -20,6 +20,7 @@ from arena.models import LabellingRound, Matchup, Study
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from augment.services.scenarios.pictures import store
+from tests.entering import CARD
 from tests.journeys.blindness import Answer, answer_of, crawl, leaks, vote_through, word_leaks
 from tests.study_rows import a_study, hang
 from tests.web.cast import png
@@ -43,6 +44,7 @@ def study() -> Study:
         model="llama-3.1-70b",
         endpoint=endpoint,
     )
+    Contestant.objects.filter(slug="quixotic").update(kind=Contestant.Kind.SUBMISSION, card=CARD)
     for number, row in enumerate(Augmentation.objects.order_by("pk")):
         hang(row, store(png(number, width=1200, height=800)))
     job = GenerationJob.objects.filter(augmentations__contestant__slug="zanzibar").first()

@@ -10,6 +10,7 @@ from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
 from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now as rate
+from augment.models import Submission
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world
@@ -32,7 +33,11 @@ def pages_of_an_open_study() -> list[ShownPage]:
     named = {name: address(name, here) for name in (*PAGES, "study-close")}
     staff = _shown(admin, named)
     own = {name: url for name, url in named.items() if name.startswith(("home", "vote"))}
-    return staff + _shown(here.expert, own)
+    sender = Submission.objects.get().uploaded_by
+    assert sender is not None
+    entered = [name for name in named if name.startswith(("home", "submission", "benchmark"))]
+    theirs = _shown(sender, {name: named[name] for name in entered})
+    return staff + _shown(here.expert, own) + theirs
 
 
 def pages_of_a_rated_study() -> list[ShownPage]:

@@ -1,0 +1,149 @@
+"""An entrant who tries every address gets what is theirs, and no reference of the test split."""
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from django.http.response import HttpResponseBase
+from django.test import Client
+from django.urls import URLPattern, URLResolver, get_resolver
+
+from arena.models import Study
+from arena.studies.services.opening import close_study
+from augment.models import Augmentation, Benchmark, Scenario, Submission
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import Modification
+from augment.services.running.entering import AcceptRequest, accept_submission
+from augment.services.scenarios.pictures import store
+from tests.api.tokens import program_of
+from tests.entering import a_benchmark, entrant, packed, read, sent
+from tests.scenes import cone
+from tests.study_rows import a_study, hang
+from tests.web.cast import people, png
+
+pytestmark = pytest.mark.django_db
+
+OWN = {
+    *("home", "password", "api-tokens", "submissions", "submission-new", "submission"),
+    *("benchmarks", "benchmark", "benchmark-file", "api-submission"),
+    *("login", "first", "healthz", "readyz"),
+}
+"""What may answer with content."""
+SECRETS = (b"zanzibar", b"23.4567", b"quixotic", b"xylophone")
+"""Parts of the references of the test split; another's system; a contestant of studies."""
+
+
+@pytest.fixture
+def benchmark() -> Benchmark:
+    """Its test references have telling ids and places."""
+    made = a_benchmark()
+    of_test = made.items.filter(split="test").values("scenario")
+    telling = Modification(added=(cone("zanzibar", 23.4567, 0.0),))
+    assert Scenario.objects.filter(pk__in=of_test).update(
+        reference=modification_to_document(telling)
+    )
+    return made
+
+
+@pytest.fixture
+def study(benchmark: Benchmark) -> Study:
+    """A study that is open and one that is closed, with pictures."""
+    study = a_study(contestants=("xylophone", "bob", "cid"))
+    for number, row in enumerate(Augmentation.objects.all()):
+        hang(row, store(png(number)))
+    return study
+
+
+@pytest.fixture
+def own(benchmark: Benchmark) -> Submission:
+    """One's own; beside it another's, which was accepted."""
+    theirs = read(sent(benchmark, entrant("fred"), packed({"name": "Quixotic"}, street_1=_ONE)))
+    accept_submission(
+        theirs, AcceptRequest(slug="quixotic", name="Quixotic", runs=True), actor=people()["admin"]
+    )
+    return read(sent(benchmark, entrant(), packed(street_1=_ONE)))
+
+
+_ONE = modification_to_document(Modification(added=(cone("Agent9", 21.0, 0.0),)))
+
+
+def views(entries: list[URLPattern | URLResolver], before: str = "") -> Iterator[tuple[str, str]]:
+    """The name and the address of each view, with its parameters open."""
+    for entry in entries:
+        here = before + str(entry.pattern)
+        if isinstance(entry, URLResolver):
+            yield from views(entry.url_patterns, here)
+        else:
+            yield entry.name or "", "/" + here
+
+
+def codes_of(study: Study) -> set[str]:
+    """Codes of a row of each kind, and the token of a picture."""
+    row = study.matchups.earliest("pk")
+    theirs = Augmentation.objects.filter(contestant__slug="quixotic").earliest("pk")
+    scenario = Scenario.objects.filter(benchmark_items__split="test").earliest("pk")
+    found: list[Any] = [
+        study,
+        row,
+        theirs,
+        theirs.job,
+        theirs.contestant,
+        scenario,
+        scenario.base_scene,
+    ]
+    found += [*Submission.objects.all(), *Benchmark.objects.all(), row.expert.person]
+    return {str(one.code) for one in found}
+
+
+def filled(address: str, code: str, study: Study) -> str:
+    token = study.matchups.earliest("pk").left_token
+    named = {"form": "csv", "tab": "pairs", "side": "left", "kind": "augmentation"}
+    named |= {"name": "leaderboard", "digest": "0" * 64, "key": "0" * 16, "token": token}
+
+    def value(found: re.Match[str]) -> str:
+        if found[1] == "uuid":
+            return code
+        return "0" if found[1] == "int" else named[found[2]]
+
+    return re.sub(r"<(\w+):(\w+)>", value, address)
+
+
+def told(answer: HttpResponseBase) -> bytes:
+    """All that an answer says, and what is packed in it."""
+    body = answer.getvalue()
+    if not zipfile.is_zipfile(io.BytesIO(body)):
+        return body.lower()
+    with zipfile.ZipFile(io.BytesIO(body)) as archive:
+        return b"\n".join(archive.read(name) for name in archive.namelist()).lower()
+
+
+@pytest.mark.parametrize("is_closed", [False, True])
+def test_every_address_answers_an_entrant_with_their_own_alone(
+    study: Study, own: Submission, is_closed: bool
+) -> None:
+    if is_closed:
+        close_study(study=study)
+    assert own.uploaded_by is not None
+    page, program = Client(), program_of(own.uploaded_by)
+    page.force_login(own.uploaded_by)
+    answered = set()
+    for name, address in views(get_resolver().url_patterns):
+        for code in codes_of(study):
+            here = filled(address, code, study)
+            asked = [page.get(here), program.get(here)]
+            if name not in ("logout", "submission-withdraw"):
+                asked += [program.post(here)]
+            for answer in asked:
+                said = told(answer)
+                assert not [secret for secret in SECRETS if secret in said], here
+            if 200 in [answer.status_code for answer in asked[:2]]:
+                answered.add(name)
+                assert name in OWN, here
+            if "<uuid" not in address or all(one.status_code == 403 for one in asked):
+                break  # roles are asked before any row
+    assert {"home", "submissions", "submission", "api-submission", "benchmark"} <= answered
+    own.refresh_from_db()
+    assert not own.is_decided
