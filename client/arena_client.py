@@ -125,7 +125,10 @@ class Arena:
         return self.wait_for(f"submissions/{sent['code']}", "checked", "failed", **waiting)
 
     def pairs(self, study: str) -> Iterator[dict[str, Any]]:
-        """Yield the pairs that are left; vote on each before taking the next."""
+        """Yield the pairs that are left; vote on each before taking the next.
+
+        A pair comes once for each question of the study.
+        """
         while waiting := self.get("matchups", study=study, n=1):
             yield from waiting
 
@@ -139,6 +142,8 @@ class Arena:
         Retries send the same key, so that the vote counts once.
         """
         key = str(uuid.uuid4())
+        if outcome != "skip":  # which is of the whole pair
+            more = {"question": pair["question"], **more}
         return self.post("votes", key=key, matchup=pair["matchup"], outcome=outcome, **more)
 
     # --- Private -------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ from itertools import combinations
 import numpy as np
 
 from arena.models import Snapshot, Standing
-from arena.rating.comparisons import Estimate, share
+from arena.rating.agreement import two_way_share
+from arena.rating.comparisons import Estimate
 from arena.results.queries.access import snapshots_of
 from arena.results.queries.votes import Filters, counted_votes
 
@@ -28,7 +29,7 @@ class TwoQuestions:
         spearman: Of the ratings of the contestants that both rate, None for fewer than three or
             ratings that are all equal.
         same: The share of pairs with a preference for the same side, of those where both
-            questions have one, clustered by expert.
+            questions have one, clustered by expert and scenario.
         pairs: Where both have one.
     """
 
@@ -103,8 +104,8 @@ def _link(
     one, other = pair
     first, second = (_preferences(ratings[question]) for question in pair)
     both = sorted(first.keys() & second.keys())
-    hits = np.array([first[matchup][1] == second[matchup][1] for matchup in both], dtype=np.bool_)
-    judges = np.array([first[matchup][0] for matchup in both], dtype=np.int64)
+    hits = np.array([first[matchup][0] == second[matchup][0] for matchup in both], np.float64)
+    clusters = np.array([first[matchup][1:] for matchup in both], np.int64).reshape(-1, 2)
     rated = [
         (row.rating, standings[other][slug].rating)
         for slug, row in standings[one].items()
@@ -112,15 +113,19 @@ def _link(
     ]
     known = [(x, y) for x, y in rated if x is not None and y is not None]
     return TwoQuestions(
-        one=one, other=other, spearman=_spearman(known), same=share(hits, judges), pairs=len(both)
+        one=one,
+        other=other,
+        spearman=_spearman(known),
+        same=two_way_share(hits, *clusters.T),
+        pairs=len(both),
     )
 
 
-def _preferences(snapshot: Snapshot) -> dict[int, tuple[int, str]]:
-    """Return the expert and the side that is better, by matchup; ties are left out."""
+def _preferences(snapshot: Snapshot) -> dict[int, tuple[str, int, int]]:
+    """Return the better side with expert and scenario, by matchup; ties are left out."""
     votes = counted_votes(snapshot).filter(outcome__in=DECIDED)
-    rows = votes.values_list("matchup", "expert", "outcome")
-    return {matchup: (expert, outcome) for matchup, expert, outcome in rows}
+    rows = votes.values_list("matchup", "outcome", "expert", "matchup__scenario")
+    return {matchup: (outcome, expert, scenario) for matchup, outcome, expert, scenario in rows}
 
 
 def _spearman(rated: Sequence[tuple[float, float]]) -> float | None:
