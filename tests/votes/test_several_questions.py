@@ -147,7 +147,7 @@ def test_one_vote_takes_as_many_queries_as_with_one_question() -> None:
         body = {"key": str(matchup.code), "matchup": str(matchup.code), "outcome": "A"}
         with CaptureQueriesContext(connection) as asked_for:
             answer = client.post("/api/v1/votes", body, content_type="application/json")
-        (following, *_) = answer.json()["next"]
-        assert (following["matchup"] == body["matchup"]) == (len(asked) > 1)
+        coming = [one["matchup"] for one in answer.json()["next"]]
+        assert (body["matchup"] in coming) == (len(asked) > 1)
         counts[name] = len(asked_for)
     assert counts["Round 2"] == counts["Round 1"]

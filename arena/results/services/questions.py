@@ -8,10 +8,13 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from django.db.models import F
 
 from arena.models import Snapshot, Standing
+from arena.models.ratings import stored_values
 from arena.rating.agreement import two_way_share
 from arena.rating.comparisons import Estimate
+from arena.rating.lines import Line
 from arena.results.queries.access import snapshots_of
 from arena.results.queries.votes import Filters, counted_votes
 
@@ -46,12 +49,11 @@ class RatedQuestions:
 
     Attributes:
         ratings: By question in the study's order, None for one that is not rated alike.
-        lines: A contestant's name and its standing by question, in the order of the rating that
-            they are shown beside.
+        lines: Each contestant by question, the best first in the rating that they stand beside.
     """
 
     ratings: dict[str, Snapshot | None]
-    lines: list[tuple[str, list[Standing | None]]]
+    lines: list[tuple[str, list[Line | None]]]
     links: list[TwoQuestions]
 
 
@@ -69,10 +71,10 @@ def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
         if _rates_alike(one) == _rates_alike(snapshot):
             found.setdefault(one.question, one)
     ratings = {question: found.get(question) for question in questions}
-    rows = Standing.objects.filter(snapshot__in=found.values()).order_by("rank", "-rating", "slug")
-    by_rating: dict[int, dict[str, Standing]] = {one.pk: {} for one in found.values()}
-    for row in rows:
-        by_rating[row.snapshot_id][row.slug] = row
+    rows = Standing.objects.filter(snapshot__in=found.values())
+    by_rating: dict[int, dict[str, Line]] = {one.pk: {} for one in found.values()}
+    for row in rows.order_by(F("rating").desc(nulls_last=True), "slug"):
+        by_rating[row.snapshot_id][row.slug] = Line(name=row.name, **stored_values(row))
     standings = {key: by_rating[one.pk] if one else {} for key, one in ratings.items()}
     return RatedQuestions(
         ratings=ratings,
@@ -99,7 +101,7 @@ def _rates_alike(snapshot: Snapshot) -> tuple[str, Filters]:
 def _link(
     pair: tuple[str, str],
     ratings: Mapping[str, Snapshot],
-    standings: Mapping[str, Mapping[str, Standing]],
+    standings: Mapping[str, Mapping[str, Line]],
 ) -> TwoQuestions:
     one, other = pair
     first, second = (_preferences(ratings[question]) for question in pair)
