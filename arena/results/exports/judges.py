@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from arena.exports.formats import TEXT, Columns, csv_of
+from arena.exports.formats import Value, csv_of
 from arena.results.queries.judges import answers_of, judge_name
 from augment.models import Augmentation, JudgeRun
 from augment.services.running.judge_runs import exchange
@@ -23,20 +23,20 @@ class JudgeAnswerLine(NamedTuple):
     reason: str
 
 
-COLUMNS: Columns = {
-    **{name: (name, TEXT) for name in ("judge", "question", "scenario", "order")},
-    "picture_a": ("a.contestant.slug", TEXT),
-    "picture_b": ("b.contestant.slug", TEXT),
-    "augmentation_a": ("a.code", TEXT),
-    "augmentation_b": ("b.code", TEXT),
-    **{name: (name, TEXT) for name in ("answer", "exchange", "reason")},
+COLUMNS: dict[str, Value] = {
+    **{name: name for name in ("judge", "question", "scenario", "order")},
+    "picture_a": "a.contestant.slug",
+    "picture_b": "b.contestant.slug",
+    "augmentation_a": "a.code",
+    "augmentation_b": "b.code",
+    **{name: name for name in ("answer", "exchange", "reason")},
 }
 """`exchange` says of both answers about a pair whether their preference was kept."""
 
 
 def judge_answers_csv(run: JudgeRun) -> bytes:
     """Return all answers of a judge in the order of their pairs."""
-    return csv_of({name: value for name, (value, _) in COLUMNS.items()}, _lines(run))
+    return csv_of(COLUMNS, _lines(run))
 
 
 def _lines(run: JudgeRun) -> Iterator[JudgeAnswerLine]:

@@ -5,8 +5,6 @@ reference, misjudges distances a little, calls close ones equal, and now and the
 key, as people do. Every question of a study is answered so, each with noise of its own.
 """
 
-import math
-from typing import Any
 from uuid import uuid5
 
 import numpy as np
@@ -17,9 +15,7 @@ from arena.voting.services.casting import cast_vote, decision_of
 from augment.errors import Conflict
 from augment.models import Augmentation
 from augment.services.events import log_event
-
-MISS_M = 10.0
-"""What an object counts that is missing, too many, or further off than this."""
+from augment.services.judging.displacement import of_augmentation
 
 NOISE_M = 1.5
 TIE_M = 1.0
@@ -47,10 +43,9 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     rng = np.random.default_rng(seed)
     cast = 0
     waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
-    shown = waiting.select_related("expert__person", "scenario", "left", "right")
+    shown = waiting.select_related("expert__person", "left__scenario", "right__scenario")
     for matchup in shown.order_by("expert__username", "position"):
-        reference = matchup.scenario.reference
-        advantage = _error_m(reference, matchup.right) - _error_m(reference, matchup.left)
+        advantage = _error_m(matchup.right) - _error_m(matchup.left)
         for question in study.questions:
             is_primary = question == study.questions[0]
             decision = decision_of(
@@ -82,33 +77,7 @@ def _judge(advantage_m: float, rng: np.random.Generator) -> str:
     return Vote.Outcome.LEFT if perceived_m > 0 else Vote.Outcome.RIGHT
 
 
-def _error_m(reference: dict[str, Any] | None, augmentation: Augmentation) -> float:
-    """Mean distance of what was changed from the reference, nearest pairs first.
-
-    Objects match within their type; one without a partner counts as a miss.
-    """
-    wanted, made = _changed(reference), _changed(augmentation.modification)
-    if not wanted and not made:
-        return 0.0
-    distances = sorted(
-        (math.dist((a["x_m"], a["y_m"]), (b["x_m"], b["y_m"])), i, j)
-        for i, a in enumerate(wanted)
-        for j, b in enumerate(made)
-        if a["type"] == b["type"]
-    )
-    used_wanted: set[int] = set()
-    used_made: set[int] = set()
-    total = 0.0
-    for distance_m, i, j in distances:
-        if i not in used_wanted and j not in used_made:
-            used_wanted.add(i)
-            used_made.add(j)
-            total += min(distance_m, MISS_M)
-    objects = max(len(wanted), len(made))
-    return (total + MISS_M * (objects - len(used_wanted))) / objects
-
-
-def _changed(modification: dict[str, Any] | None) -> list[dict[str, Any]]:
-    if modification is None:
-        return []
-    return [*modification.get("add", []), *modification.get("move", [])]
+def _error_m(augmentation: Augmentation) -> float:
+    """How far off a change is; 0 where nobody can say."""
+    found = of_augmentation(augmentation).displacement
+    return 0.0 if found is None else found.error_m
