@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.benchmark.difference import SourceView, find_difference, number_added
+from augment.benchmark.difference import SourceView, find_difference
 from augment.benchmark.source_views import identify, show_source
 from augment.benchmark.submitted_file import FileContent, read_file
 from augment.formats.writers import writer_named
@@ -172,9 +172,3 @@ def test_what_a_format_can_not_say_is_named_and_stays(tmp_path: Path) -> None:
     assert found == Modification(removed=("Agent2",))
     (barrier,) = (one.id for one in street().agents if one.type is AgentType.BARRIER)
     assert notes == (f"{barrier}: not said in this format, taken to stay.",)
-
-
-def test_new_agents_get_the_next_free_names_of_the_scene() -> None:
-    own = (vehicle("lctgen-1", 1.0, 2.0), vehicle("gpt", 3.0, 4.0))
-    found = number_added(street(), Modification(added=own))
-    assert [one.id for one in found.added] == ["Agent12", "Agent13"]
