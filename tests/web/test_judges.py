@@ -9,11 +9,11 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Study, Vote
-from arena.results.queries.judges import judge_preferences, judged_pairs
+from arena.results.queries.judges import judge_preferences, judged_pairs, models_of
 from arena.results.services.ratings import rate_now
 from arena.studies.services.opening import close_study
 from augment.fake_llm.server import running
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun, Submission
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.running.judge_runs import JUDGEMENTS
@@ -153,3 +153,12 @@ def test_preferences_come_with_and_without_the_judges_own_family(
     assert "ann" not in {codes[code].contestant.slug for pair in without for code in pair}
     shown = page(signed_in(people()["researcher"]), study)
     assert "without its own family: Ann" in shown
+
+
+def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:
+    asking = Contestant(model="gpt-4o", roles={"viewer": {"endpoint": "e", "model": "gemini"}})
+    sent = Contestant(kind="submission")
+    Submission(contestant=sent, summary={"card": {"models": ["Llama 3.1"]}})
+    assert [models_of(row) for row in (asking, sent, Contestant())] == [
+        *(["gpt-4o", "gemini"], ["Llama 3.1"], [])
+    ]

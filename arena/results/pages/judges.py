@@ -16,7 +16,7 @@ from arena.models import Study
 from arena.rating.agreement import AgreementLine, agreement_sentence, share_text
 from arena.results.exports.judges import judge_answers_csv
 from arena.results.pages.ratings import get_readable_study
-from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines, judged_pairs
+from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines
 from arena.results.queries.votes import is_imported
 from arena.results.services.judges import estimate_study_judge, judge_agreement, start_judge
 from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
@@ -72,13 +72,14 @@ def judges_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = get_readable_study(request, code)
     lines = judge_lines(study)
     is_moving = any(line.run.state == MOVING for line in lines)
-    agreement = {name: judge_agreement(study, name) for name in study.questions}
+    # A page that reloads itself measures nothing.
+    asked = [] if is_moving else study.questions
+    agreement = {name: judge_agreement(study, name) for name in asked}
     context = {
         "study": study,
         "lines": _with_agreement(lines, agreement),
         "answers": [agreement_sentence(list(one.values())) for one in agreement.values() if one],
         "form": JudgeForm(study),
-        "pairs": len(judged_pairs(study, study.questions[0])),
         "imported": is_imported(study),
         "look": looks_again(request, waits=is_moving),
         "workforce": workforce() if is_moving else None,
@@ -141,7 +142,7 @@ def _with_agreement(
     """
     told, shown = [], set()
     for line in lines:
-        known, key = found[line.run.question], (line.run.question, line.name)
+        known, key = found.get(line.run.question, {}), (line.run.question, line.name)
         names = line.name, line.name + WITHOUT_FAMILY
         is_measured = bool(line.done) and key not in shown
         shares = [share_text(known[n].share) if is_measured and n in known else "" for n in names]

@@ -9,7 +9,7 @@ from django.db.models.functions import Coalesce
 
 from arena.models import Matchup, Study
 from arena.results.queries.votes import COUNTED, Filters, current_votes, is_imported, last_vote_of
-from augment.models import JudgeRun, ModelCall, PairJudgement
+from augment.models import Contestant, JudgeRun, ModelCall, PairJudgement
 from augment.services.endpoints.known_models import family_of
 from augment.services.running.judge_runs import Exchange, ShownPair, exchange, preference_of
 
@@ -33,7 +33,7 @@ class JudgeLine:
         unreadable: Pairs with an answer that nobody could read; ties, like those two.
         answers: Single answers that prefer a picture, and `first` those that prefer picture A.
         usd: What one pair cost, in both orders; None where a price is unknown.
-        own_family: Names of contestants that ask a model of the judge's own family.
+        own_family: Names of contestants that use a model of the judge's own family.
     """
 
     run: JudgeRun
@@ -119,6 +119,15 @@ def judge_name(run: JudgeRun) -> str:
     return f"Judge {run}{' (simulated)' if run.endpoint.is_simulated else ''}"
 
 
+def models_of(contestant: Contestant) -> list[str]:
+    """Return the models that a contestant asks, in any role, or that its card names."""
+    asked = [contestant.model, *(role["model"] for role in contestant.roles.values())]
+    if contestant.kind == Contestant.Kind.SUBMISSION:
+        summary = contestant.submission.summary or {}
+        asked += summary["card"]["models"]
+    return [model for model in asked if model]
+
+
 def answers_of(run: JudgeRun) -> list[PairJudgement]:
     """Return the pairs with both answers, with their contestants and scenarios."""
     rows: QuerySet[PairJudgement] = run.judgements.filter(state=State.DONE).order_by("pk")
@@ -166,17 +175,13 @@ def _usd_per_pair(run: JudgeRun, pairs: int) -> float | None:
 
 
 def _own_family(study: Study, run: JudgeRun) -> dict[str, str]:
-    """Return names of the contestants, by slug, that ask a model of the judge's family."""
+    """Return names of the contestants, by slug, that use a model of the judge's family."""
     family = family_of(run.model)
     return {
         row.slug: row.name
-        for row in study.contestants.exclude(model="").order_by("name")
-        if family in {family_of(model) for model in (row.model, *_models_of_roles(row.roles))}
+        for row in study.contestants.select_related("submission").order_by("name")
+        if family in map(family_of, models_of(row))
     }
-
-
-def _models_of_roles(roles: Mapping[str, Mapping[str, str]]) -> list[str]:
-    return [role["model"] for role in roles.values()]
 
 
 def _preferences(rows: list[PairJudgement]) -> dict[tuple[str, str], int]:
