@@ -11,6 +11,15 @@ others. So each contestant's own square is drawn towards what all of them have i
 the more they differ (moderated variances, Smyth 2004), and Student's t gets the degrees of freedom
 of what it then rests on (Satterthwaite 1946). docs/rating.md has how often the truth is inside.
 
+Squares of pulls after the fit are too small. Let w be the share of a contestant's information that
+comes from each cluster, S2 the sum of w², S3 that of w³, t² the variance of the clusters' effects
+and b the variance by single votes. The rating then errs by t² S2 + b, while the pulls r have
+
+    E sum r² = t² S2 (1 - 2 S3/S2 + S2) + b (1 - S2),
+
+so t² = (sum r² - b (1 - S2)) / (S2 - 2 S3 + S2²). The common t² is the mean over contestants,
+weighted by 1/b²; where pairs are judged at once, it is at least 0.
+
 Notation: R rows, C contestants, K parameters (C strengths, and what a model has besides), G
 clusters. Strengths are logarithms of odds, covariances squared Elo points.
 """

@@ -83,13 +83,11 @@ class Realism:
 
     Attributes:
         scores: 0 to 1 by the names in `SCORES`; without what nothing says anything about.
-        judged: How many objects count.
-        unjudged: How many do not, since too little of their class was recorded.
+        judged: How many objects count: those of whose class enough was recorded.
     """
 
     scores: Mapping[str, float]
     judged: int
-    unjudged: int
 
     @property
     def mean(self) -> float | None:
@@ -164,7 +162,7 @@ def judge(objects: Sequence[PlacedObject], recorded: RecordedCounts) -> Realism:
             scores[feature.value] = math.exp(float(np.mean(logs)))
     if known:
         scores[COLLISION] = float(np.mean([not one.collides for one in known]))
-    return Realism(scores=scores, judged=len(known), unjudged=len(objects) - len(known))
+    return Realism(scores=scores, judged=len(known))
 
 
 def place_at_random(

@@ -54,7 +54,7 @@ def test_a_score_is_the_geometric_mean_of_the_shares_of_the_bins() -> None:
         }
     )
     assert found.mean == pytest.approx(sum(found.scores.values()) / 3)
-    assert (found.judged, found.unjudged) == (3, 0)
+    assert found.judged == 3
 
 
 def test_a_collision_lowers_the_mean_by_its_share_of_the_objects() -> None:
@@ -70,7 +70,7 @@ def test_classes_of_which_too_little_was_recorded_are_not_judged() -> None:
     assert LEAST_RECORDED == 10
     assert judge([car()], enough).mean is not None
     found = judge([car()], fewer)
-    assert (found.mean, found.scores, found.judged, found.unjudged) == (None, {}, 0, 1)
+    assert (found.mean, found.scores, found.judged) == (None, {}, 0)
 
 
 STREET = Ground.of(scene())

@@ -39,9 +39,7 @@ def realism_notes(table: RealismTable) -> list[str]:
         f"objects at random are placed {RANDOM_DRAWS} times in the picture's window.": True,
         "Recorded traffic is the ceiling and random placement the floor of a fair comparison; "
         "objects that all stand in the most usual way can lie above.": True,
-        "Not judged: answers without an object, and classes that were hardly recorded.": any(
-            line.left_out or line.unjudged for line in table.lines
-        ),
+        "Not judged: answers without an object, and classes that were hardly recorded.": True,
         SIMULATED_NOTE: any(line.is_simulated for line in table.lines),
     }
     return [note for note, holds in notes.items() if holds]
@@ -83,7 +81,7 @@ COLUMNS: Columns = {
     "realism": ("mean", NUMBER),
     "recorded_there": ("recorded", NUMBER),
     **{name: (partial(_score, name), NUMBER) for name in SCORES},
-    **{name: (name, WHOLE) for name in ("changes", "left_out", "objects", "unjudged")},
+    **{name: (name, WHOLE) for name in ("changes", "left_out", "objects")},
 }
 
 

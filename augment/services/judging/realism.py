@@ -62,7 +62,7 @@ class RealismLine:
         changes: How many could be judged; the scores are means over them.
         left_out: Further ones: unreadable, refused, without an object, or of classes alone of
             which too little was recorded.
-        objects, unjudged: Of those judged, how many objects count and how many do not.
+        objects: How many objects of those judged count.
         scores: By the names in `SCORES`.
         mean: None without a change that could be judged.
         recorded: The mean of what was recorded in the same scenes.
@@ -73,7 +73,6 @@ class RealismLine:
     changes: int
     left_out: int
     objects: int
-    unjudged: int
     scores: dict[str, float]
     mean: float | None
     recorded: float | None
@@ -237,7 +236,6 @@ def _line(
         changes=len(judged),
         left_out=len(found) - len(judged),
         objects=sum(one.judged for one in judged),
-        unjudged=sum(one.unjudged for one in judged),
         scores={
             name: fmean(values)
             for name in SCORES
