@@ -4,16 +4,15 @@ In: the lines of a rating. Out: the same lines on the scale of the board's first
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from arena.rating.lines import Line
 from augment.errors import InvalidDocument
 
-FORMAT, VERSION = "scenario-arena/board-table", 1
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
 
@@ -75,6 +74,8 @@ class BoardTableDocument:
         versions: Of what the numbers depend on, by name.
     """
 
+    format: Literal["scenario-arena/board-table"] = "scenario-arena/board-table"
+    version: Literal[1] = 1
     board: str
     number: int
     made_at: str
@@ -99,25 +100,14 @@ class BoardTableDocument:
         return self.made_at[:10]
 
 
-def table_to_document(table: BoardTableDocument) -> dict[str, Any]:
-    """Return a table as a JSON object."""
-    return {"format": FORMAT, "version": VERSION, **asdict(table)}
-
-
 def table_from_document(document: Mapping[str, Any]) -> BoardTableDocument:
-    """Return the table of a JSON object.
+    """Return the table of a JSON object, which is the table's fields by their names.
 
     Raises:
         InvalidDocument: It is none that this version knows.
     """
-    head = {"format": FORMAT, "version": VERSION}
-    for name, wanted in head.items():
-        if document.get(name) != wanted:
-            raise InvalidDocument("board table", [(name, f"{wanted!r} is allowed")])
     try:
-        return _adapter().validate_python(
-            {name: value for name, value in document.items() if name not in head}
-        )
+        return _adapter().validate_python(document)
     except ValidationError as error:
         faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
         raise InvalidDocument("board table", faults) from error

@@ -116,8 +116,8 @@ urlpatterns: list[URLPattern] = [
     path("boards/<uuid:code>/export.zip", boards.board_export, name="board-export"),
     path("boards/<uuid:code>/publish/", boards.publish, name="board-publish"),
     path("boards/<uuid:code>/batch/", boards.start_batch, name="board-batch"),
-    path("boards/<uuid:code>/share/", boards.share, name="board-share"),
-    path("boards/<uuid:code>/unshare/", boards.unshare, name="board-unshare"),
+    path("boards/<uuid:code>/share/", boards.share, {"is_shared": True}, name="board-share"),
+    path("boards/<uuid:code>/unshare/", boards.share, {"is_shared": False}, name="board-unshare"),
     path("boards/<uuid:code>/<int:number>.<slug:form>", boards.board_file, name="board-file"),
     path("shared/boards/<str:token>/", boards.shared_board, name="shared-board"),
     path(

@@ -6,7 +6,7 @@ published; the folder has them as they were.
 """
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from arena.exports.formats import (
     sheet_of,
 )
 from arena.models import Board
-from arena.rating.board_table import BoardTableDocument, table_to_document
+from arena.rating.board_table import BoardTableDocument
 from arena.rating.lines import Line
 from arena.results.exports.charts import rows_chart
 from arena.results.exports.tables import Row
@@ -57,7 +57,7 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
     simulated = " (simulated)" if table.includes_simulated else ""
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
     return {
-        "json": json_bytes(table_to_document(table)).decode(),
+        "json": json_bytes(asdict(table)).decode(),
         "csv": sheet_csv(sheet_of(table.lines, _COLUMNS, name="board-table")).decode(),
         "svg": chart.decode(),
         "html": render_to_string("boards/frozen.html", _shown(table)),

@@ -17,13 +17,7 @@ from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
 from arena.results.exports.board_files import board_folder, rows_of, write_table
 from arena.results.pages.plots import plot
-from arena.results.services.boards import (
-    LONGEST_NAME,
-    make_board,
-    publish_table,
-    share_board,
-    stop_sharing_board,
-)
+from arena.results.services.boards import LONGEST_NAME, make_board, publish_table, share_board
 from arena.site.access import ADMIN, STAFF, act_for, form_for, keep_secret, page_for, user_of
 from arena.site.acts import refusals_in, tell_errors
 from arena.site.forms import RequestForm, offer
@@ -148,15 +142,10 @@ def start_batch(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
 
 
 @act_for(*STAFF, back="board")
-def share(request: HttpRequest, code: uuid.UUID) -> None:
-    """Make the link by which anybody reads the tables."""
-    share_board(get_object_or_404(Board, code=code), actor=user_of(request))
-
-
-@act_for(*STAFF, back="board")
-def unshare(request: HttpRequest, code: uuid.UUID) -> None:
-    """Take it back."""
-    stop_sharing_board(get_object_or_404(Board, code=code), actor=user_of(request))
+def share(request: HttpRequest, code: uuid.UUID, *, is_shared: bool) -> None:
+    """Make the link by which anybody reads the tables, or take it back."""
+    board = get_object_or_404(Board, code=code)
+    share_board(board, is_shared=is_shared, actor=user_of(request))
 
 
 # --- For whoever has the link ------------------------------------------------------------------

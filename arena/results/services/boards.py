@@ -3,10 +3,9 @@
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 
-import numpy as np
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 from django.utils import timezone
@@ -20,16 +19,10 @@ from arena.rating.lines import Line, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
 from arena.rating.verdict import verdict
-from arena.results.queries.votes import (
-    AUTOMATIC,
-    Competitor,
-    Filters,
-    Judged,
-    last_vote_of,
-    vote_set,
-)
+from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, last_vote_of, vote_set
 from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import software_versions
+from arena.results.services.trust import board_remarks
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.studies.queries import authors_of
 from arena.studies.services.opening import preregistration_sha256, product_version
@@ -91,39 +84,14 @@ def board_named(name_or_code: str) -> Board:
 
 
 @transaction.atomic
-def share_board(board: Board, *, actor: User | None = None) -> None:
-    """Make the link by which anybody reads the board's tables; one that is there stays."""
-    if Board.objects.filter(pk=board.pk, token=None).update(token=fresh_token()):
-        log_change(board, "share results", actor)
-
-
-@transaction.atomic
-def stop_sharing_board(board: Board, *, actor: User | None = None) -> None:
-    """Take the link back for good; a later one is another."""
-    if Board.objects.filter(pk=board.pk, token__isnull=False).update(token=None):
-        log_change(board, "stop sharing results", actor)
+def share_board(board: Board, *, is_shared: bool, actor: User | None = None) -> None:
+    """Make the link by which anybody reads the board's tables, or take it back for good."""
+    changed = Board.objects.filter(pk=board.pk, token__isnull=is_shared)
+    if changed.update(token=fresh_token() if is_shared else None):
+        log_change(board, "share results" if is_shared else "stop sharing results", actor)
 
 
 # --- Tables ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pool:
-    """The votes of all closed studies of a board.
-
-    Attributes:
-        competitors: Of all studies, by slug.
-        votes: Those that count, study by study.
-        founders: Slugs of the first study's contestants.
-        question: What the experts were asked.
-    """
-
-    competitors: tuple[Competitor, ...]
-    votes: tuple[Judged, ...]
-    studies: tuple[PooledStudy, ...]
-    founders: tuple[str, ...]
-    left_out: dict[str, int]
-    question: str
 
 
 def publish_table(
@@ -142,16 +110,14 @@ def publish_table(
         Conflict: No study was closed since the newest table, no vote counts, the studies can't be
             pooled, or somebody else published meanwhile.
     """
-    newest = board.tables.first()
-    pool = pool_votes(board)
-    known = {study.code for study in newest.document.studies} if newest else set()
-    if known >= {study.code for study in pool.studies}:
-        raise Conflict("No study of the board was closed since its newest table.")
-    if not pool.votes:
-        raise Conflict("No study of the board has votes that count.")
-    number, now = (newest.number if newest else 0) + 1, now or timezone.now()
+    studies, newest = require_poolable(board), board.tables.first()
     before = newest.document if newest else None
-    document = make_document(board, pool, before, number=number, now=now)
+    if before and {one.code for one in before.studies} >= {str(row.code) for row in studies}:
+        raise Conflict("No study of the board was closed since its newest table.")
+    number, now = (before.number if before else 0) + 1, now or timezone.now()
+    document = make_document(board, studies, before, number=number, now=now)
+    if not document.votes:
+        raise Conflict("No study of the board has votes that count.")
     files = write(document)
     try:
         with transaction.atomic():
@@ -161,36 +127,6 @@ def publish_table(
     except IntegrityError:
         raise Conflict(f"Table {number} has just been published by somebody else.") from None
     return table
-
-
-def pool_votes(board: Board) -> Pool:
-    """Read the votes of all studies that were closed; who was cancelled has no results.
-
-    Raises:
-        StudyStillOpen: One of them takes votes.
-        Conflict: They show different scenarios.
-    """
-    studies = require_poolable(board)
-    competitors: dict[str, Competitor] = {}
-    votes: list[Judged] = []
-    left_out: Counter[str] = Counter()
-    pooled = []
-    for study in studies:
-        filters = Filters(authors=authors_of(study))
-        found = vote_set(study, filters=filters, last=last_vote_of(study))
-        competitors |= {one.slug: one for one in found.competitors}
-        votes += found.counted
-        left_out.update(found.left_out)
-        pooled.append(_pooled(study, len(found.counted)))
-    founders = studies[0].contestants.order_by("slug").values_list("slug", flat=True)
-    return Pool(
-        competitors=tuple(competitors[slug] for slug in sorted(competitors)),
-        votes=tuple(votes),
-        studies=tuple(pooled),
-        founders=tuple(founders),
-        left_out=dict(sorted(left_out.items())),
-        question=str(Question(studies[0].questions[0]).label),
-    )
 
 
 def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
@@ -229,45 +165,62 @@ def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
 
 
 def make_document(
-    board: Board, pool: Pool, before: BoardTableDocument | None, *, number: int, now: datetime
+    board: Board,
+    studies: Sequence[Study],
+    before: BoardTableDocument | None,
+    *,
+    number: int,
+    now: datetime,
 ) -> BoardTableDocument:
-    """Rate a pool; experts and scenarios are clusters over all of its studies.
+    """Rate the votes of closed studies; experts and scenarios are clusters over all of them.
 
     Args:
-        board: Whose votes these are.
-        pool: All of them.
+        board: Whose studies these are.
+        studies: In order, the first one first.
         before: The newest table so far, which knows since when who is listed.
         number: Of the new table.
         now: When it is made.
     """
-    rated = rate(vote_arrays(pool.competitors, pool.votes).comparisons)
-    lines, is_ranked = _lines_of(pool, rated)
-    since = {line.slug: line.since for line in before.lines} if before else {}
+    found = [
+        vote_set(study, filters=Filters(authors=authors_of(study)), last=last_vote_of(study))
+        for study in studies
+    ]
+    votes = [vote for one in found for vote in one.counted]
+    by_slug = {who.slug: who for one in found for who in one.competitors}
+    competitors = [by_slug[slug] for slug in sorted(by_slug)]
+    founders = tuple(who.slug for who in found[0].competitors)
+    rated = rate(vote_arrays(competitors, votes).comparisons)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
-    judges = {vote.judge: vote.judge_name for vote in pool.votes}
+    since = {line.slug: line.since for line in before.lines} if before else {}
+    lines = tuple(
+        _board_line(line, by_slug[line.name], since.get(line.name, made_at[:10]))
+        for line in anchor_lines(_without_equal_ranks(rated.standings), founders)
+    )
+    left_out = sum((Counter(one.left_out) for one in found), Counter[str]())
+    judges = {vote.judge: vote.judge_name for vote in votes}
+    not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
     return BoardTableDocument(
         board=board.name,
         number=number,
         made_at=made_at,
         benchmark=str(board.benchmark or ""),
         benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
-        question=pool.question,
+        question=str(Question(studies[0].questions[0]).label),
         method=f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, "
         f"clustered by {UNIT_TEXTS[rated.unit]}",
-        answer=_answer(lines, pool, rated),
-        lines=tuple(
-            _board_line(line, competitor, since.get(competitor.slug, made_at[:10]))
-            for line, competitor in lines
+        answer=_answer(lines, rated, sum(vote.kind != AUTOMATIC for vote in votes)),
+        lines=lines,
+        studies=tuple(
+            _pooled(study, len(one.counted)) for study, one in zip(studies, found, strict=True)
         ),
-        studies=pool.studies,
-        founders=pool.founders,
-        votes=len(pool.votes),
-        votes_sha256=digest_of(votes_csv(vote_rows(pool.votes, judges))),
-        left_out=pool.left_out,
-        notes=(*rated.reasons, *rated.warnings, *([] if is_ranked else [NOT_RANKED])),
-        versions={"scenario-arena": product_version(), "realism": str(REALISM_VERSION)}
-        | {name: str(version) for name, version in software_versions().items()},
-        includes_simulated=any(one.is_simulated for one in pool.competitors + pool.votes),
+        founders=founders,
+        votes=len(votes),
+        votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
+        left_out=dict(sorted(left_out.items())),
+        notes=(*rated.reasons, *rated.warnings, *not_ranked),
+        versions=_versions(),
+        includes_simulated=any(who.is_simulated for who in competitors)
+        or any(vote.is_simulated for vote in votes),
     )
 
 
@@ -307,26 +260,25 @@ def _pooled(study: Study, votes: int) -> PooledStudy:
     )
 
 
-def _lines_of(pool: Pool, rated: Leaderboard) -> tuple[list[tuple[Line, Competitor]], bool]:
-    """Return the lines with whose they are, best first, and whether they have ranks."""
-    lines = anchor_lines(rated.lines, pool.founders)
-    is_ranked = not says_no_order(lines)
-    if not is_ranked:
-        lines = [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
-    return [(lines[place], pool.competitors[place]) for place in rated.order], is_ranked
+def _versions() -> dict[str, str]:
+    """Of what the numbers depend on, and of the metrics that have one of their own."""
+    ours = {"scenario-arena": product_version(), "realism": REALISM_VERSION}
+    return {name: str(version) for name, version in (ours | software_versions()).items()}
 
 
-def _answer(lines: Sequence[tuple[Line, Competitor]], pool: Pool, rated: Leaderboard) -> str:
+def _without_equal_ranks(lines: Sequence[Line]) -> list[Line]:
+    """The lines; without ranks where all of these are the same."""
+    if not says_no_order(lines):
+        return list(lines)
+    return [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
+
+
+def _answer(lines: Sequence[BoardLine], rated: Leaderboard, cast: int) -> str:
     """The table in one sentence."""
-    place_of = {old: new for new, old in enumerate(rated.order)}
-    apart = rated.told_apart
-    pairs = (
-        None
-        if apart is None
-        else [(place_of[a], place_of[b]) for a, b in np.argwhere(apart.above).tolist()]
-    )
-    cast = sum(vote.kind != AUTOMATIC for vote in pool.votes)
-    return verdict([replace(line, name=who.name) for line, who in lines], cast, pairs)
+    above = board_remarks(rated).above
+    place = {line.slug: number for number, line in enumerate(lines)}
+    apart = None if above is None else [(place[a], place[b]) for a, b in above]
+    return verdict(lines, cast, apart)
 
 
 def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:
