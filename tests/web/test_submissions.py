@@ -1,5 +1,6 @@
 """Submissions page by page and by the API: entrants send theirs, admins decide."""
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -8,10 +9,15 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import leaderboard_json
+from arena.results.services.ratings import rate_now as rate
+from arena.studies.services.opening import close_study
 from augment.models import Benchmark, Contestant, GenerationJob, Submission
 from augment.services.scenarios.submissions import SUBMISSIONS
 from tests.api.tokens import program_of
-from tests.entering import ANSWERS, a_benchmark, entrant, packed, read, sent
+from tests.entering import ANSWERS, CARD, a_benchmark, entrant, packed, read, sent
+from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -139,3 +145,23 @@ def test_a_program_sends_one_and_gets_its_report(benchmark: Benchmark) -> None:
         *["read", "read", "refused", "unreadable"]
     ]
     assert enno.post("/api/v1/submissions", body | {"benchmark": "none"}).status_code == 422
+
+
+def test_its_card_stands_in_results_and_their_files_alone() -> None:
+    study = a_study()
+    Contestant.objects.filter(slug="ann").update(kind="submission", card=CARD)
+    vote(study.matchups.earliest("pk"), "left")
+    admin = signed_in(people()["admin"])
+    here = reverse("study", args=[study.code])
+    assert "A. Author" not in admin.get(here).content.decode()
+    close_study(study=study)
+    study.refresh_from_db()
+    snapshot = rate(study=study, rounds=20)
+    shown = admin.get(reverse("results", args=[study.code])).content.decode()
+    assert "Ann: Submission" in shown
+    assert all(word in shown for word in ("A. Author", "closed", "1.50 USD", "2026-11-20"))
+    lines = json.loads(leaderboard_json(leaderboard_table(snapshot)))["standings"]
+    assert {line["slug"]: line.get("card") for line in lines} == {
+        **{"ann": CARD, "bob": None, "cid": None}
+    }
+    assert {line["kind"] for line in lines if line["slug"] == "ann"} == {"submission"}
