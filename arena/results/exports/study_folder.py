@@ -29,7 +29,7 @@ from arena.results.services.stored_rows import (
 )
 from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256
-from augment.models import Augmentation, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 File = tuple[str, bytes]
@@ -98,7 +98,7 @@ AUGMENTATIONS: dict[str, Value] = {
 
 _CONTESTANT: dict[str, str] = {
     **{name: name for name in ("slug", "name", "kind", "variant", "model", "roles")},
-    **{name: name for name in ("error_rates", "options", "frozen_options", "sends", "card")},
+    **{name: name for name in ("error_rates", "options", "frozen_options", "sends")},
     "endpoint": "endpoint.base_url",
 }
 _SCENARIO: dict[str, str] = {
@@ -254,7 +254,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
     contestants = sorted(
         closure.contestants.select_related("endpoint"), key=lambda row: str(row.slug)
     )
-    yield "contestants.json", _json([_document(row, _CONTESTANT) for row in contestants])
+    yield "contestants.json", _json([_contestant_document(row) for row in contestants])
     if frozen := study.preregistration.encode():
         yield FILE_NAME, frozen
     named = closure.named_scenarios.select_related("base_scene", "paraphrase_of")
@@ -302,6 +302,11 @@ def _pairs(study: Study) -> bytes:
         judged = [[read_value(vote, value) for value in _JUDGED.values()] for vote in votes]
         rows += [[*shown, *cells] for cells in judged or [[None] * len(_JUDGED)]]
     return csv_text([*_SHOWN, *_JUDGED], rows).encode()
+
+
+def _contestant_document(row: Contestant) -> dict[str, Any]:
+    """Return a contestant; of a submission with its card."""
+    return _document(row, _CONTESTANT) | ({"card": row.card} if row.card else {})
 
 
 def _document(row: Any, columns: dict[str, str]) -> dict[str, Any]:
