@@ -53,8 +53,6 @@ ORDERS = 2
 """So often each pair is asked about."""
 LONGEST_WHY = 1000
 
-CANCELLED = JudgeRun.objects.filter(state=RunState.CANCELLED)
-
 
 class ShownPair(NamedTuple):
     """A pair as experts saw it: keys of two augmentations, and names of their pictures."""
@@ -222,16 +220,8 @@ class Judgements(WorkKind[PairJudgement]):
         """Finish the run."""
         finish_judges()
 
-    def outcome_of_loss(self, row: PairJudgement) -> Settlement | None:
-        """Cancel a row of a cancelled run."""
-        if CANCELLED.filter(pk=row.run_id).exists():
-            return Settlement(state=State.CANCELLED)
-        return super().outcome_of_loss(row)
-
     def tidy(self, now: Moment) -> None:
-        """Cancel what was given back in a cancelled run; finish the runs that are over."""
-        orphans = self.rows.filter(state=State.QUEUED, run__in=CANCELLED)
-        change_all(orphans, state=State.CANCELLED, finished_at=now)
+        """Finish the runs that are over."""
         finish_judges(now=now)
 
 
