@@ -7,7 +7,8 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Case, Count, Exists, OuterRef, Q, QuerySet, Value, When
+from django.db.models import Case, Count, Exists, IntegerField, OuterRef, Q, QuerySet, When
+from django.db.models.expressions import RawSQL
 from django.utils import timezone
 
 from arena.errors import NotYours
@@ -99,16 +100,8 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """
     if study.state != Study.State.OPEN:
         return []
-    rows = Matchup.objects.filter(study=study, expert=expert)
-    *earlier, last = study.questions
-    if earlier:
-        own = Vote.objects.filter(matchup=OuterRef("pk"))
-        skips = own.filter(outcome=Vote.Outcome.SKIP, superseded_by=None)
-        rows = rows.exclude(Exists(own.filter(question=last))).exclude(Exists(skips))
-        turns = [When(~Exists(own.filter(question=key)), then=Value(key)) for key in earlier]
-        rows = rows.annotate(turn=Case(*turns, default=Value(last)))
-    else:
-        rows = rows.filter(votes=None).annotate(turn=Value(last))
+    rows = Matchup.objects.filter(study=study, expert=expert).annotate(answered=_ANSWERED)
+    rows = rows.filter(answered__lt=len(study.questions))
     needed = (
         *("code", "study_id", "expert_id", "position", "kind", "view"),
         *("left_token", "right_token", "original_token"),
@@ -117,8 +110,25 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     )
     found = rows.select_related("scenario").only(*needed).order_by("position")[:n]
     for matchup in found:
-        matchup.asked = matchup.turn
+        matchup.asked = study.questions[matchup.answered]
     return list(found)
+
+
+# Built once, as _STATE is. Questions are answered in their order, so that their number says which.
+_ANSWERED = RawSQL(
+    """
+CASE WHEN EXISTS (
+    SELECT 1 FROM arena_vote skipped WHERE skipped.matchup_id = arena_matchup.id
+    AND skipped.outcome = 'skip' AND NOT EXISTS (
+      SELECT 1 FROM arena_vote later WHERE later.supersedes_id = skipped.id))
+THEN 99 ELSE (
+    SELECT COUNT(DISTINCT vote.question) FROM arena_vote vote
+    WHERE vote.matchup_id = arena_matchup.id)
+END
+""",
+    (),
+    output_field=IntegerField(),
+)
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
