@@ -7,11 +7,13 @@ import pytest
 from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
+from pytest_django import DjangoCaptureOnCommitCallbacks
 
 from arena.models import Matchup, Study, Vote
 from arena.results.queries.judges import judge_preferences, judged_pairs, models_of
 from arena.results.services.ratings import rate_now
 from arena.studies.services.opening import close_study
+from augment import tasks
 from augment.fake_llm.server import running
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun, Submission
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
@@ -19,6 +21,7 @@ from augment.services.endpoints.known_models import model_at
 from augment.services.running.judge_runs import JUDGEMENTS
 from augment.services.scenarios.pictures import store
 from tests import study_rows
+from tests.brokers import Broker
 from tests.web.cast import people, png, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -61,19 +64,26 @@ def page(client: Client, study: Study) -> str:
     return " ".join(answer.content.decode().split())
 
 
-def test_a_judge_is_estimated_started_worked_and_shown(study: Study, endpoint: Endpoint) -> None:
+def test_a_judge_is_estimated_started_worked_and_shown(
+    study: Study,
+    endpoint: Endpoint,
+    broker: Broker,
+    django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
+) -> None:
     admin = signed_in(people()["admin"])
     asked = start(admin, study, "fake-good")
     assert "Calls: 12, each pair in both orders" in asked
     assert "Cost: at most 1." in asked
     assert not JudgeRun.objects.exists()
-    assert "is asked about 6 pairs" in start(admin, study, "fake-good", sure="1")
+    with django_capture_on_commit_callbacks(execute=True):
+        assert "is asked about 6 pairs" in start(admin, study, "fake-good", sure="1")
+    assert len(broker) == 6
     shown = page(admin, study)
     assert "0 of 6" in shown
     assert "Cancel" in shown
     run = study.judges.get()
     for pk in run.judgements.values_list("pk", flat=True):
-        JUDGEMENTS.perform(pk)
+        tasks.work.run(JUDGEMENTS.name, pk)
     shown = page(admin, study)
     assert "Closest to the experts: Judge fake-good at stand-in (simulated), in agree" in shown
     assert 'class="badge is-simulated"' in shown
