@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from django.contrib.auth.models import User
 from django.http.response import HttpResponseBase
 from django.test import Client
-from django.urls import URLPattern, URLResolver, get_resolver
+from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
-from arena.models import Study
+from arena.models import BenchmarkFile, Study
+from arena.scenarios.exports import BENCHMARK_FILES
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Benchmark, Scenario, Submission
 from augment.scene.codec import modification_to_document
@@ -38,13 +40,14 @@ SECRETS = (b"zanzibar", b"23.4567", b"quixotic", b"xylophone")
 
 @pytest.fixture
 def benchmark() -> Benchmark:
-    """Its test references have telling ids and places."""
+    """Its test references have telling ids and places; its zip is written."""
     made = a_benchmark()
     of_test = made.items.filter(split="test").values("scenario")
     telling = Modification(added=(cone("zanzibar", 23.4567, 0.0),))
     assert Scenario.objects.filter(pk__in=of_test).update(
         reference=modification_to_document(telling)
     )
+    assert BENCHMARK_FILES.perform(BenchmarkFile.objects.create(benchmark=made).pk)
     return made
 
 
@@ -144,6 +147,11 @@ def test_every_address_answers_an_entrant_with_their_own_alone(
                 assert name in OWN, here
             if "<uuid" not in address or all(one.status_code == 403 for one in asked):
                 break  # roles are asked before any row
-    assert {"home", "submissions", "submission", "api-submission", "benchmark"} <= answered
+    whole = {"submissions", "submission", "api-submission", "benchmark", "benchmark-file"}
+    assert {"home"} | whole <= answered
     own.refresh_from_db()
     assert not own.is_decided
+    staff, of_test = Client(), Scenario.objects.filter(benchmark_items__split="test")
+    staff.force_login(User.objects.get(username="the-admin"))
+    page_of_staff = staff.get(reverse("scenario", args=[of_test.earliest("pk").code]))
+    assert SECRETS[0] in told(page_of_staff), "else nothing was proved"

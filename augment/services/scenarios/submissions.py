@@ -44,7 +44,7 @@ def keep_submission(
     Args:
         benchmark: Whose tasks it answers.
         name: As the sender called the file; kept in plain letters.
-        content: A zip, or a single file.
+        content: A zip of its folder.
         actor: Who sends it.
 
     Raises:
