@@ -18,11 +18,13 @@ from arena.results.services.ratings import plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
 from augment.models import (
+    Benchmark,
     Event,
     JudgeRun,
     PairJudgement,
     SceneUpload,
     Simulation,
+    Submission,
     UploadMoment,
     Work,
 )
@@ -44,6 +46,12 @@ MINUTE = timedelta(minutes=1)
 
 def an_upload(**columns: Any) -> SceneUpload:
     return SceneUpload.objects.create(name="log.zip", size_bytes=1, digest="0", **columns)
+
+
+def a_submission() -> Work:
+    benchmark = Benchmark.objects.create(slug="b", title="B", version=1, made_on=NOON.date())
+    sent: dict[str, Any] = {"name": "files.zip", "size_bytes": 1, "digest": "0"}
+    return Submission.objects.create(benchmark=benchmark, **sent)
 
 
 def a_drive() -> Work:
@@ -92,6 +100,7 @@ WAITING: dict[str, Callable[[], Work]] = {
     "simulation": a_drive,
     "snapshot": lambda: plan_snapshot(study=close_study(study=a_study()), rounds=10),
     "studyfile": lambda: StudyFile.objects.create(study=a_study(), kind="study"),
+    "submission": a_submission,
     "uploadmoment": lambda: UploadMoment.objects.create(upload=an_upload(state="read")),
 }
 """How a row of each kind comes to wait."""
