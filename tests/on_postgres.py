@@ -23,7 +23,8 @@ FILES = (
     "services/test_work",
     *("studies/test_enrolments", "studies/test_replanning"),
     *("votes/test_cast_vote", "votes/test_concurrency", "votes/test_handing_over"),
-    *("votes/test_long_writes", "votes/test_vote_lists", "votes/test_waiting"),
+    *("votes/test_long_writes", "votes/test_several_questions"),
+    *("votes/test_vote_lists", "votes/test_waiting"),
 )
 """About locks, leases, budgets, triggers, raw SQL, backups and study folders: what the two
 databases do differently. The rest of the product meets PostgreSQL as it meets SQLite."""
