@@ -160,7 +160,7 @@ def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
 
 
 def get_snapshot(request: HttpRequest, study: Study) -> Snapshot:
-    """The rating that the address names, else the newest one.
+    """The rating that the address names, else that of `latest_snapshot`.
 
     Raises:
         Http404: There is none.
@@ -188,9 +188,10 @@ def _asked_rating(request: HttpRequest) -> uuid.UUID | None:
 
 
 def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snapshot | None:
-    """The rating that the address names, else the newest one that is ready; with its results."""
-    ready = [rating.code for rating in ratings if rating.state == Snapshot.State.READY]
-    code = _asked_rating(request) or next(iter(ready), None)
+    """The rating that the address names, else that of `latest_snapshot`; with its results."""
+    ready = [rating for rating in ratings if rating.state == Snapshot.State.READY]
+    ready.sort(key=lambda rating: rating.question != study.questions[0])
+    code = _asked_rating(request) or next((rating.code for rating in ready), None)
     if code is None:
         return None
     rows = Snapshot.objects.select_related("study__vote_file", "made_by__person", "shared")

@@ -4,10 +4,10 @@ from enum import StrEnum
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import Q, QuerySet
+from django.db.models import Case, Q, QuerySet, When
 
 from arena.errors import NoSnapshot, NotYours, StudyStillOpen
-from arena.models import EarlyLook, Snapshot, Study
+from arena.models import EarlyLook, Question, Snapshot, Study
 from arena.people.queries import role_of
 from augment.models import Event
 
@@ -70,8 +70,18 @@ def votes_in(user: User, study: Study) -> bool:
 
 
 def latest_snapshot(study: Study) -> Snapshot | None:
-    """The study's newest rating, None before the first."""
-    return snapshots_of(study).filter(state=Snapshot.State.READY).first()
+    """The rating that is shown unless another is asked for, None before the first."""
+    return ready_snapshots(study).first()
+
+
+def ready_snapshots(study: Study) -> QuerySet[Snapshot]:
+    """Ratings that are ready: those of the primary question first, of these the newest."""
+    primary = study.questions[0]
+    is_primary = Q(filters__question=primary)
+    if primary == Question.INSTRUCTION:  # ratings of before know of no other
+        is_primary |= Q(filters__question__isnull=True)
+    rank = Case(When(is_primary, then=0), default=1)
+    return study.snapshots.filter(state=Snapshot.State.READY).order_by(rank, "-made_at", "-pk")
 
 
 def snapshots_of(study: Study) -> QuerySet[Snapshot]:
@@ -80,14 +90,14 @@ def snapshots_of(study: Study) -> QuerySet[Snapshot]:
 
 
 def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
-    """The rating with that code, the newest without one.
+    """The rating with that code, without one that of `latest_snapshot`.
 
     Raises:
         NoSnapshot: The study has not been rated yet, or not by that rating, or was cancelled.
     """
     if study.state == Study.State.CANCELLED:
         raise NoSnapshot(f"The study {study.name!r} was cancelled: it has votes, but no results.")
-    ready = snapshots_of(study).filter(state=Snapshot.State.READY)
+    ready = ready_snapshots(study)
     snapshot = (ready if code is None else ready.filter(code=code)).first()
     if snapshot is None:
         what = "no rating yet" if code is None else f"no rating {code}"
