@@ -7,7 +7,7 @@ import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, StrEnum
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 from uuid import UUID
@@ -20,8 +20,23 @@ from augment.errors import UnknownName
 Table = TypeVar("Table")
 Named = TypeVar("Named")
 
-TEXT, WHOLE, NUMBER, YES_NO = "string", "int64", "double", "bool"
-"""What a column of a Parquet file can hold; every cell may be empty."""
+
+class Dtype(StrEnum):
+    """What a column of a Parquet file can hold; every cell may be empty."""
+
+    TEXT = "string"
+    WHOLE = "int64"
+    NUMBER = "double"
+    YES_NO = "bool"
+
+    def columns(self, *names: str, of: str = "") -> "Columns":
+        """Return columns of this type, called like the attributes that they show.
+
+        Args:
+            names: Of columns and attributes.
+            of: The path to what has them, if that is not the line itself.
+        """
+        return {name: (f"{of}.{name}" if of else name, self) for name in names}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +130,7 @@ def download(
 
 Value = str | Callable[[Any], object]
 """A dotted path of attributes or keys, or a function of a line."""
-Columns = Mapping[str, tuple[Value, str]]
+Columns = Mapping[str, tuple[Value, Dtype]]
 """By name: the value, and what the column holds."""
 
 
@@ -133,7 +148,7 @@ class Sheet:
 
     name: str
     key: str = "rows"
-    columns: Mapping[str, str]
+    columns: Mapping[str, Dtype]
     rows: Sequence[Sequence[object]]
     number: str = ""
     facts: Mapping[str, object] = field(default_factory=dict)

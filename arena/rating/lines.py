@@ -4,8 +4,9 @@ A snapshot stores the fields that `arena.models.Standing` has as well; files, pa
 show them.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 UNKNOWN = "--"
 MINUS = "\N{MINUS SIGN}"
@@ -154,6 +155,32 @@ def latex_table(
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
+
+
+ValueColumns = Mapping[str, Callable[[Any], object]]
+"""The value of a line, by the head of its column."""
+
+
+def latex_values(
+    lines: Iterable[Any], columns: ValueColumns, *, number: str = ".2f", **more: Any
+) -> bytes:
+    """Return a LaTeX table of plain values, those that are unknown as dashes.
+
+    Args:
+        lines: One row each.
+        columns: What each shows of a line.
+        number: The format of floats.
+        more: As in `latex_table`.
+    """
+
+    def print_value(value: object) -> str:
+        if value is None:
+            return UNKNOWN
+        return format(value, number) if isinstance(value, float) else str(value)
+
+    printed = ([print_value(value(line)) for value in columns.values()] for line in lines)
+    rows = ([escape(first), *others] for first, *others in printed)
+    return latex_table(rows, heads=list(columns), **more).encode()
 
 
 def align_cells(rows: Sequence[Sequence[str]]) -> list[str]:

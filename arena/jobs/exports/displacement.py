@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    YES_NO,
     Columns,
+    Dtype,
     Sheet,
     drawings,
     join_numbers,
@@ -108,18 +105,17 @@ def name_of(contestant: Contestant) -> str:
 
 
 GROUPS: Columns = {
-    "group": ("heading", TEXT),
-    "contestant": (lambda group: name_of(group.contestant), TEXT),
-    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
-    "simulated": ("contestant.is_simulated", YES_NO),
-    **{name: (f"summary.{name}", WHOLE) for name in ("augmentations", "n", "missing", "surplus")},
-    **{
-        name: (f"summary.box.{name}", NUMBER)
-        for name in ("median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m")
-    },
+    "group": ("heading", Dtype.TEXT),
+    "contestant": (lambda group: name_of(group.contestant), Dtype.TEXT),
+    **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
+    "simulated": ("contestant.is_simulated", Dtype.YES_NO),
+    **Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
+    **Dtype.NUMBER.columns(
+        "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", of="summary.box"
+    ),
     "outliers_m": (
         lambda group: join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
-        TEXT,
+        Dtype.TEXT,
     ),
 }
 
@@ -134,7 +130,7 @@ def group_sheet(table: DisplacementTable) -> Sheet:
         "notes": [f"{table.types_text}.", *table.remarks],
         "not_measured": table.left_out,
     }
-    columns: Columns = {**GROUPS, "types": (lambda group: types, TEXT)}
+    columns: Columns = {**GROUPS, "types": (lambda group: types, Dtype.TEXT)}
     return sheet_of(
         table.groups, columns, name="displacement", key="groups", number=".3f", facts=facts
     )
@@ -144,26 +140,25 @@ def group_sheet(table: DisplacementTable) -> Sheet:
 
 
 WHOSE: Columns = {
-    "scenario": ("row.scenario.slug", TEXT),
-    "type": ("row.scenario.type", TEXT),
-    "contestant": ("row.contestant.slug", TEXT),
-    **{name: (f"row.contestant.{name}", TEXT) for name in ("name", "model", "variant")},
-    "simulated": ("row.contestant.is_simulated", YES_NO),
+    "scenario": ("row.scenario.slug", Dtype.TEXT),
+    "type": ("row.scenario.type", Dtype.TEXT),
+    "contestant": ("row.contestant.slug", Dtype.TEXT),
+    **Dtype.TEXT.columns("name", "model", "variant", of="row.contestant"),
+    "simulated": ("row.contestant.is_simulated", Dtype.YES_NO),
 }
 OBJECTS: Columns = {
     **WHOSE,
-    "augmentation": ("row.code", TEXT),
-    "state": ("row.state", TEXT),
-    "object": ("object", TEXT),
-    "class": ("class", TEXT),
-    "reference": ("reference.id", TEXT),
-    "reference_x_m": ("reference.x_m", NUMBER),
-    "reference_y_m": ("reference.y_m", NUMBER),
-    "generated": ("generated.id", TEXT),
-    "x_m": ("generated.x_m", NUMBER),
-    "y_m": ("generated.y_m", NUMBER),
-    "distance_m": ("distance_m", NUMBER),
-    "sample": ("row.sample", WHOLE),
+    "augmentation": ("row.code", Dtype.TEXT),
+    "state": ("row.state", Dtype.TEXT),
+    **Dtype.TEXT.columns("object", "class"),
+    "reference": ("reference.id", Dtype.TEXT),
+    "reference_x_m": ("reference.x_m", Dtype.NUMBER),
+    "reference_y_m": ("reference.y_m", Dtype.NUMBER),
+    "generated": ("generated.id", Dtype.TEXT),
+    "x_m": ("generated.x_m", Dtype.NUMBER),
+    "y_m": ("generated.y_m", Dtype.NUMBER),
+    **Dtype.NUMBER.columns("distance_m"),
+    "sample": ("row.sample", Dtype.WHOLE),
 }
 """`object` is matched, missing or surplus; places are in the ego frame."""
 

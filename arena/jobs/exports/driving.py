@@ -3,19 +3,9 @@
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Columns,
-    Sheet,
-    formats,
-    sheet_of,
-    table_formats,
-)
+from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.rating.lines import escape, latex_table
+from arena.rating.lines import ValueColumns, escape, latex_values
 from arena.results.exports.tables import shown_name
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
 from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
@@ -74,19 +64,18 @@ def _percent_of(kind: str, line: DrivingLine) -> float | None:
 
 
 COLUMNS: Columns = {
-    "scenarios": (lambda line: shown_name(line.name, line.is_simulated), TEXT),
-    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
-    "simulated": ("is_simulated", YES_NO),
-    "score_percent": (lambda line: _percent(line.mean), NUMBER),
-    "before_percent": (lambda line: _percent(line.before), NUMBER),
-    "lowered_percent": (lambda line: _percent(line.lowered), NUMBER),
-    "drives": ("drives", WHOLE),
-    "failed": ("failed", WHOLE),
-    "least_clearance_m": ("least_clearance_m", NUMBER),
-    "closer_than_0_3_m": ("close", WHOLE),
-    "collided": ("collided", WHOLE),
-    "emergency_braked": ("braked", WHOLE),
-    "driven_in_nuplan_by": ("driven_by", TEXT),
+    "scenarios": (lambda line: shown_name(line.name, line.is_simulated), Dtype.TEXT),
+    **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    "score_percent": (lambda line: _percent(line.mean), Dtype.NUMBER),
+    "before_percent": (lambda line: _percent(line.before), Dtype.NUMBER),
+    "lowered_percent": (lambda line: _percent(line.lowered), Dtype.NUMBER),
+    **Dtype.WHOLE.columns("drives", "failed"),
+    **Dtype.NUMBER.columns("least_clearance_m"),
+    "closer_than_0_3_m": ("close", Dtype.WHOLE),
+    **Dtype.WHOLE.columns("collided"),
+    "emergency_braked": ("braked", Dtype.WHOLE),
+    "driven_in_nuplan_by": ("driven_by", Dtype.TEXT),
 }
 
 
@@ -94,7 +83,9 @@ def driving_sheet(table: DrivingScores) -> Sheet:
     """Return one row a contestant, then a column for each scenario type."""
     driven = (kind for line in table.lines for kind in line.by_type)
     kinds = in_type_order([*ScenarioType, *driven])
-    types: Columns = {f"{kind}_percent": (partial(_percent_of, kind), NUMBER) for kind in kinds}
+    types: Columns = {
+        f"{kind}_percent": (partial(_percent_of, kind), Dtype.NUMBER) for kind in kinds
+    }
     facts = {
         "title": table.title,
         "score": table.score,
@@ -109,34 +100,24 @@ def driving_sheet(table: DrivingScores) -> Sheet:
 
 def driving_latex(table: DrivingScores) -> bytes:
     """Return the paper's table with a second column for the scenes before the change."""
-    heads = ("Scenarios", "Mean Driving Score [%]", "n", "Before [%]", "Clearance below 0.3 m")
-    rows = (
-        (
-            escape(shown_name(line.name, line.is_simulated)),
-            *(
-                _printed(line.mean),
-                str(line.drives),
-                _printed(line.before),
-                "--" if line.close is None else str(line.close),
-            ),
-        )
-        for line in table.lines
-    )
+    columns: ValueColumns = {
+        "Scenarios": lambda line: shown_name(line.name, line.is_simulated),
+        "Mean Driving Score [%]": lambda line: _percent(line.mean),
+        "n": lambda line: line.drives,
+        "Before [%]": lambda line: _percent(line.before),
+        "Clearance below 0.3 m": lambda line: line.close,
+    }
     planner = escape(table.options.planner)
     but = ", unless a row says otherwise" * any(line.driven_by for line in table.lines)
     caption = f"Mean driving score of {planner} in Scenario Arena's own simulator{but}; n: drives."
-    text = latex_table(
-        rows,
-        heads=heads,
+    return latex_values(
+        table.lines,
+        columns,
+        number=".1f",
         comments=driving_notes(table),
         caption=caption,
         label="tab:driving_score",
     )
-    return text.encode()
 
 
 FORMATS = table_formats(driving_sheet) | formats(latex=driving_latex)
-
-
-def _printed(share: float | None) -> str:
-    return "--" if share is None else f"{100.0 * share:.1f}"

@@ -3,24 +3,16 @@
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from django.db.models import Count, Q
 
-from arena.exports.formats import (
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Columns,
-    Sheet,
-    formats,
-    sheet_of,
-    table_formats,
-)
+from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
 from arena.jobs.exports.displacement import name_of
 from arena.models import FaultLabel
-from arena.rating.lines import UNKNOWN, escape, latex_table
+from arena.rating.lines import ValueColumns, latex_values
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
@@ -88,13 +80,13 @@ def fault_table(job: GenerationJob) -> FaultTable:
 
 COUNTS = ("all", "position", "heading", "logic")
 COLUMNS: Columns = {
-    "contestant": ("shown_name", TEXT),
-    "slug": ("slug", TEXT),
-    "simulated": ("is_simulated", YES_NO),
-    **{name: (name, WHOLE) for name in COUNTS},
-    "augmentations_labelled": ("labelled", WHOLE),
-    "labels": ("labels", WHOLE),
-    "without_modification": ("missed", WHOLE),
+    "contestant": ("shown_name", Dtype.TEXT),
+    **Dtype.TEXT.columns("slug"),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    **Dtype.WHOLE.columns(*COUNTS),
+    "augmentations_labelled": ("labelled", Dtype.WHOLE),
+    **Dtype.WHOLE.columns("labels"),
+    "without_modification": ("missed", Dtype.WHOLE),
 }
 
 
@@ -115,21 +107,15 @@ def fault_latex(table: FaultTable) -> bytes:
         f"themselves {_printed(line['alpha'])} (pictures={line['pictures']})"
         for line in table.agreement
     ]
-    rows = (
-        (
-            escape(line["shown_name"]),
-            *(UNKNOWN if line[name] is None else str(line[name]) for name in COUNTS),
-            *(str(line["missed"]), str(line["counted"])),
-        )
-        for line in table.lines
-        if line["counted"]
-    )
-    heads = ("Model", "All", "Position", "Heading", "Logic", "No answer", "n")
-    caption = "Error Count per Category."
-    text = latex_table(
-        rows, heads=heads, comments=comments, caption=caption, label="tab:manual_eval"
-    )
-    return text.encode()
+    columns: ValueColumns = {
+        "Model": itemgetter("shown_name"),
+        **{name.capitalize(): itemgetter(name) for name in COUNTS},
+        "No answer": itemgetter("missed"),
+        "n": itemgetter("counted"),
+    }
+    counted = [line for line in table.lines if line["counted"]]
+    caption, label = "Error Count per Category.", "tab:manual_eval"
+    return latex_values(counted, columns, comments=comments, caption=caption, label=label)
 
 
 FORMATS = table_formats(fault_sheet) | formats(latex=fault_latex)

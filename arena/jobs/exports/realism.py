@@ -3,19 +3,9 @@
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Columns,
-    Sheet,
-    formats,
-    sheet_of,
-    table_formats,
-)
+from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.rating.lines import escape, latex_table
+from arena.rating.lines import ValueColumns, latex_values
 from arena.results.exports.tables import shown_name
 from augment.models import GenerationJob
 from augment.services.judging.realism import (
@@ -62,11 +52,15 @@ def answer_in_words(table: RealismTable) -> str:
     best = next((one for one in table.lines if one.subject is Subject.CONTESTANT), None)
     if best is None or best.mean is None:
         return "No contestant placed anything that could be judged."
+    recorded = "--" if best.recorded is None else f"{best.recorded:.2f}"
     return (
-        f"The most realistic is {shown_name(best.name, best.is_simulated)} with {best.mean:.2f} "
-        f"over {best.changes} changes; recorded traffic has {_printed(best.recorded)} in the same "
-        "scenes."
+        f"The most realistic is {_name(best)} with {best.mean:.2f} over {best.changes} changes; "
+        f"recorded traffic has {recorded} in the same scenes."
     )
+
+
+def _name(line: RealismLine) -> str:
+    return shown_name(line.name, line.is_simulated)
 
 
 def _score(name: str, line: RealismLine) -> float | None:
@@ -74,14 +68,14 @@ def _score(name: str, line: RealismLine) -> float | None:
 
 
 COLUMNS: Columns = {
-    "row": ("subject", TEXT),
-    "name": (lambda line: shown_name(line.name, line.is_simulated), TEXT),
-    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
-    "simulated": ("is_simulated", YES_NO),
-    "realism": ("mean", NUMBER),
-    "recorded_there": ("recorded", NUMBER),
-    **{name: (partial(_score, name), NUMBER) for name in SCORES},
-    **{name: (name, WHOLE) for name in ("changes", "left_out", "objects")},
+    "row": ("subject", Dtype.TEXT),
+    "name": (_name, Dtype.TEXT),
+    **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    "realism": ("mean", Dtype.NUMBER),
+    "recorded_there": ("recorded", Dtype.NUMBER),
+    **{name: (partial(_score, name), Dtype.NUMBER) for name in SCORES},
+    **Dtype.WHOLE.columns("changes", "left_out", "objects"),
 }
 
 
@@ -93,41 +87,26 @@ def realism_sheet(table: RealismTable) -> Sheet:
         "scenes": table.scenes,
         "notes": realism_notes(table),
     }
-    columns: Columns = {**COLUMNS, "version": (lambda line: table.version, WHOLE)}
+    columns: Columns = {**COLUMNS, "version": (lambda line: table.version, Dtype.WHOLE)}
     return sheet_of(table.lines, columns, name="realism", key="lines", number=".4f", facts=facts)
 
 
 def realism_latex(table: RealismTable) -> bytes:
     """Return the same as a LaTeX table."""
-    rows = (
-        (
-            escape(shown_name(line.name, line.is_simulated)),
-            *(
-                _printed(value)
-                for value in (line.mean, line.recorded, *map(line.scores.get, SCORES))
-            ),
-            str(line.changes),
-        )
-        for line in table.lines
-    )
-    text = latex_table(
-        rows,
-        heads=(
-            "Changes",
-            "Realism",
-            "Recorded there",
-            *(name.capitalize() for name in SCORES),
-            "n",
-        ),
+    columns: ValueColumns = {
+        "Changes": _name,
+        "Realism": lambda line: line.mean,
+        "Recorded there": lambda line: line.recorded,
+        **{name.capitalize(): partial(_score, name) for name in SCORES},
+        "n": lambda line: line.changes,
+    }
+    return latex_values(
+        table.lines,
+        columns,
         comments=realism_notes(table),
         caption=f"Realism (version {table.version}), 0 to 1; n: changes.",
         label="tab:realism",
     )
-    return text.encode()
 
 
 FORMATS = table_formats(realism_sheet) | formats(latex=realism_latex)
-
-
-def _printed(value: float | None) -> str:
-    return "--" if value is None else f"{value:.2f}"

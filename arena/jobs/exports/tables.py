@@ -5,17 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import (
-    NUMBER,
-    TABLE_FORMATS,
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Columns,
-    Export,
-    Sheet,
-    sheet_of,
-)
+from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, sheet_of
 from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
@@ -49,69 +39,68 @@ def _options(line: Any) -> str | None:
 
 AUGMENTATIONS: Columns = {
     **displacement.WHOSE,
-    "sample": ("row.sample", WHOLE),
-    "options": (_options, TEXT),
-    "augmentation": ("row.code", TEXT),
-    "state": ("row.state", TEXT),
-    "matched": (_count("matches"), WHOLE),
-    "missing": (_count("missing"), WHOLE),
-    "surplus": (_count("surplus"), WHOLE),
-    "displacement_mean_m": ("displacement.mean_m", NUMBER),
-    "wrong": ("wrong", WHOLE),
-    "doubtful": ("doubtful", WHOLE),
-    "realism": ("realism", NUMBER),
-    "calls": ("spending.calls", WHOLE),
-    "tokens": ("spending.tokens", WHOLE),
-    "cost_usd": ("spending.usd", NUMBER),
-    "reason": ("row.reason", TEXT),
+    "sample": ("row.sample", Dtype.WHOLE),
+    "options": (_options, Dtype.TEXT),
+    "augmentation": ("row.code", Dtype.TEXT),
+    "state": ("row.state", Dtype.TEXT),
+    "matched": (_count("matches"), Dtype.WHOLE),
+    "missing": (_count("missing"), Dtype.WHOLE),
+    "surplus": (_count("surplus"), Dtype.WHOLE),
+    "displacement_mean_m": ("displacement.mean_m", Dtype.NUMBER),
+    **Dtype.WHOLE.columns("wrong", "doubtful"),
+    **Dtype.NUMBER.columns("realism"),
+    "calls": ("spending.calls", Dtype.WHOLE),
+    "tokens": ("spending.tokens", Dtype.WHOLE),
+    "cost_usd": ("spending.usd", Dtype.NUMBER),
+    "reason": ("row.reason", Dtype.TEXT),
 }
 """`contestant` is the slug, `options` a JSON object; `wrong` and `doubtful` count findings."""
 
 REPEATS: Columns = {
-    **{name: (name, TEXT) for name in ("contestant", "name")},
-    "simulated": ("simulated", YES_NO),
-    "samples": ("samples", WHOLE),
+    **Dtype.TEXT.columns("contestant", "name"),
+    **Dtype.YES_NO.columns("simulated"),
+    **Dtype.WHOLE.columns("samples"),
     **{
-        f"{name}_{part}": (f"{name}_{part}", TEXT if part == "values" else NUMBER)
+        f"{name}_{part}": (f"{name}_{part}", Dtype.TEXT if part == "values" else Dtype.NUMBER)
         for name in ("displacement_m", "missed", "usd")
         for part in ("mean", "sd", "values")
     },
-    "displacement_within_scenario_sd_m": ("within_m", NUMBER),
+    "displacement_within_scenario_sd_m": ("within_m", Dtype.NUMBER),
 }
 """`sd` is between samples, `values` has one number a sample; see `repeatability`."""
 
 TOOL_CALLS: Columns = {
-    **{name: (name, TEXT) for name in ("contestant", "name", "scenario", "augmentation")},
-    "simulated": ("is_simulated", YES_NO),
-    **{name: (name, WHOLE) for name in ("attempted", "understood", "mended")},
+    **Dtype.TEXT.columns("contestant", "name", "scenario", "augmentation"),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    **Dtype.WHOLE.columns("attempted", "understood", "mended"),
 }
 
-_WHO: Columns = {"contestant": ("contestant", TEXT), "simulated": ("simulated", YES_NO)}
+_WHO: Columns = {**Dtype.TEXT.columns("contestant"), **Dtype.YES_NO.columns("simulated")}
 ANALYSIS_COLUMNS: dict[str, Columns] = {
     "pairs": {
-        **{name: (name, TEXT) for name in ("first", "second")},
-        "scenarios": ("scenarios", WHOLE),
-        "median_difference_m": ("median_m", NUMBER),
-        **{name: (name, NUMBER) for name in ("low_m", "high_m")},
-        "p_wilcoxon": ("p", NUMBER),
-        "p_holm": ("p_holm", NUMBER),
+        **Dtype.TEXT.columns("first", "second"),
+        **Dtype.WHOLE.columns("scenarios"),
+        "median_difference_m": ("median_m", Dtype.NUMBER),
+        **Dtype.NUMBER.columns("low_m", "high_m"),
+        "p_wilcoxon": ("p", Dtype.NUMBER),
+        **Dtype.NUMBER.columns("p_holm"),
     },
     "wordings": {
         **_WHO,
-        **{name: (name, WHOLE) for name in ("scenarios", "wordings")},
-        "within_m": ("within_m", NUMBER),
+        **Dtype.WHOLE.columns("scenarios", "wordings"),
+        **Dtype.NUMBER.columns("within_m"),
     },
     "refusals": {
         **_WHO,
-        **{name: (name, WHOLE) for name in ("right", "wrong", "overlooked")},
-        **{name: (name, NUMBER) for name in ("precision", "recall")},
+        **Dtype.WHOLE.columns("right", "wrong", "overlooked"),
+        **Dtype.NUMBER.columns("precision", "recall"),
     },
 }
 
 
 def augmentation_sheet(job: GenerationJob) -> Sheet:
     """Return a job's augmentations with one row each."""
-    columns: Columns = {"job": (lambda line: job.name, TEXT), **AUGMENTATIONS}
+    columns: Columns = {"job": (lambda line: job.name, Dtype.TEXT), **AUGMENTATIONS}
     name = "augmentations"
     return sheet_of(augmentation_lines(job), columns, name=name, key=name)
 

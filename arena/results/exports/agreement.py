@@ -2,16 +2,7 @@
 
 from collections.abc import Sequence
 
-from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    Columns,
-    Sheet,
-    formats,
-    sheet_of,
-    table_formats,
-)
+from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
 from arena.models import Question, Snapshot
 from arena.rating.agreement import AgreementLine, LineRole, agreement_sentence, share_text
 from arena.rating.lines import UNKNOWN, escape, latex_table
@@ -24,12 +15,12 @@ METHOD = (
 )
 _COUNTS = ("decided", "agrees", "ties", "differs", "unknown", "experts", "scenarios")
 COLUMNS: Columns = {
-    **{name: (name, TEXT) for name in ("question", "rater", "role", "type")},
+    **Dtype.TEXT.columns("question", "rater", "role", "type"),
     **{
-        name: (f"share.{part}", NUMBER)
+        name: (f"share.{part}", Dtype.NUMBER)
         for name, part in (("share", "value"), ("lower", "lower"), ("upper", "upper"))
     },
-    **{name: (name, WHOLE) for name in _COUNTS},
+    **Dtype.WHOLE.columns(*_COUNTS),
 }
 """`type` is empty in lines on all scenario types; shares go from 0 to 1."""
 

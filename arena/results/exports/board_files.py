@@ -14,16 +14,7 @@ from typing import Any
 from django.template.loader import render_to_string
 
 from arena.exports.files import write_whole
-from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Columns,
-    json_bytes,
-    sheet_csv,
-    sheet_of,
-)
+from arena.exports.formats import Columns, Dtype, json_bytes, sheet_csv, sheet_of
 from arena.models import Board
 from arena.rating.board_table import BoardTableDocument
 from arena.rating.lines import Line
@@ -33,21 +24,18 @@ from arena.results.exports.tables import Row
 STYLE, INDEX = "board.css", "index.html"
 
 _COLUMNS: Columns = {
-    "rank": ("rank", WHOLE),
-    "contestant": ("name", TEXT),
-    "elo": ("rating", NUMBER),
-    "lower": ("lower", NUMBER),
-    "upper": ("upper", NUMBER),
-    **{name: (name, WHOLE) for name in ("votes", "wins", "ties", "losses")},
-    "slug": ("slug", TEXT),
-    "kind": ("kind", TEXT),
-    "simulated": ("is_simulated", YES_NO),
-    "since": ("since", TEXT),
-    "authors": (lambda line: "; ".join(line.authors), TEXT),
-    "open": ("is_open", YES_NO),
-    "note": ("note", TEXT),
-    "rank_best": ("rank_best", WHOLE),
-    "rank_worst": ("rank_worst", WHOLE),
+    **Dtype.WHOLE.columns("rank"),
+    "contestant": ("name", Dtype.TEXT),
+    "elo": ("rating", Dtype.NUMBER),
+    **Dtype.NUMBER.columns("lower", "upper"),
+    **Dtype.WHOLE.columns("votes", "wins", "ties", "losses"),
+    **Dtype.TEXT.columns("slug", "kind"),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    **Dtype.TEXT.columns("since"),
+    "authors": (lambda line: "; ".join(line.authors), Dtype.TEXT),
+    "open": ("is_open", Dtype.YES_NO),
+    **Dtype.TEXT.columns("note"),
+    **Dtype.WHOLE.columns("rank_best", "rank_worst"),
 }
 
 

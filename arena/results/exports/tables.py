@@ -10,7 +10,7 @@ from typing import Any
 
 from django.db.models import F
 
-from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO
+from arena.exports.formats import Dtype
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
 from arena.rating.lines import Line, notes_by_reason, says_no_order
@@ -235,7 +235,7 @@ class Column:
     """
 
     name: str = ""
-    kind: str = TEXT
+    kind: Dtype = Dtype.TEXT
     field: str
     key: str = ""
     printed: str = ""
@@ -251,34 +251,34 @@ class Column:
         return str(getattr(row, self.text_field or self.field))
 
 
-def _column(name: str, kind: str = TEXT, **more: Any) -> Column:
+def _column(name: str, kind: Dtype = Dtype.TEXT, **more: Any) -> Column:
     """Return a column that unless said otherwise is called the same everywhere."""
     return Column(**{"field": name, "name": name, "kind": kind, "key": name} | more)
 
 
 COLUMNS = (
-    _column("rank", WHOLE, printed="Rank", text_field="rank_text"),
+    _column("rank", Dtype.WHOLE, printed="Rank", text_field="rank_text"),
     _column("model", printed="Model", identifies=True),
-    Column(
-        name="elo", kind=NUMBER, field="rating", key="rating", printed="Elo", text_field="elo_text"
+    _column(
+        "elo", Dtype.NUMBER, field="rating", key="rating", printed="Elo", text_field="elo_text"
     ),
-    _column("lower", NUMBER),
-    _column("upper", NUMBER),
+    _column("lower", Dtype.NUMBER),
+    _column("upper", Dtype.NUMBER),
     Column(field="interval_text", printed="95% CI"),
-    _column("votes", WHOLE, printed="Votes"),
-    _column("wins", WHOLE),
-    _column("ties", WHOLE),
-    _column("losses", WHOLE),
+    _column("votes", Dtype.WHOLE, printed="Votes"),
+    _column("wins", Dtype.WHOLE),
+    _column("ties", Dtype.WHOLE),
+    _column("losses", Dtype.WHOLE),
     _column("slug", identifies=True),
     _column("kind", identifies=True),
-    _column("simulated", YES_NO, identifies=True),
+    _column("simulated", Dtype.YES_NO, identifies=True),
     _column("note"),
     _column("study", key=""),
     _column("method", key="", field="method_text"),
-    _column("study_simulated", YES_NO, key="", field="is_simulated"),
-    _column("early", YES_NO, key=""),
-    _column("rank_best", WHOLE),
-    _column("rank_worst", WHOLE),
+    _column("study_simulated", Dtype.YES_NO, key="", field="is_simulated"),
+    _column("early", Dtype.YES_NO, key=""),
+    _column("rank_best", Dtype.WHOLE),
+    _column("rank_worst", Dtype.WHOLE),
     _column("preregistration", key=""),
     Column(field="ranks_text", printed="95% ranks"),
     _column("options"),

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from arena.exports.cells import csv_parts
-from arena.exports.formats import TEXT, WHOLE, YES_NO, Sheet, formats, sheet_csv, sheet_parquet
+from arena.exports.formats import Dtype, Sheet, formats, sheet_csv, sheet_parquet
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
@@ -19,7 +19,7 @@ from arena.results.services.vote_files import (
     vote_rows,
 )
 
-_KINDS = {"ms_visible": WHOLE, "simulated": YES_NO, "position": WHOLE}
+_KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
 LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
 """Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
@@ -52,7 +52,7 @@ def _sheet(rows: Iterator[Row], version: int) -> Sheet:
     names = vote_columns(version)
     return Sheet(
         name="votes",
-        columns={name: _KINDS.get(name, TEXT) for name in names},
+        columns={name: _KINDS.get(name, Dtype.TEXT) for name in names},
         rows=[row[: len(names)] for row in rows],
     )
 
