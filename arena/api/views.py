@@ -26,6 +26,7 @@ from rest_framework.views import APIView
 
 from arena.api.access import RoleAllowed
 from arena.api.fields import SoundJSONParser, StrictSerializer
+from arena.exports.formats import Export
 from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)
@@ -291,19 +292,23 @@ def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[s
 
 
 def file_operation(
-    *, name: str, types: Iterable[str], words: Mapping[str, Iterable[str]] | None = None
+    *, name: str, types: Iterable[str] = (), exports: Mapping[str, Export] | None = None
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Describe an operation that answers with a file, by its docstring.
 
     Args:
         name: Operation id.
         types: Content types that it can have.
-        words: By part of the path, its allowed values.
+        exports: What the `name` and the `form` in its path choose from.
     """
+    exports = exports or {}
+    formats = {name: form for one in exports.values() for name, form in one.formats.items()}
     parts = [
-        OpenApiParameter(part, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(set(allowed)))
-        for part, allowed in (words or {}).items()
+        OpenApiParameter(part, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(allowed))
+        for part, allowed in (("name", exports), ("form", formats))
+        if exports
     ]
+    types = (*types, *(form.content_type for form in formats.values()))
     kinds = sorted({kind.partition(";")[0] for kind in types})
     responses = {(200, kind): OpenApiTypes.BINARY for kind in kinds}
 

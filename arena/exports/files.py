@@ -9,6 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
+from arena.errors import ArenaError
+
 
 def write_whole(path: Path, content: bytes, *, mode: int = 0o644) -> None:
     """Write beside the place and rename: a reader never sees half a file.
@@ -57,6 +59,24 @@ def _beside(path: Path, pieces: Iterable[bytes]) -> Iterator[Path]:
         yield Path(name)
     finally:
         Path(name).unlink(missing_ok=True)
+
+
+@contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """Yield a folder to fill, which then stands at the path: whole, or not at all.
+
+    Raises:
+        ArenaError: Something is there.
+        OSError: It can't be written; nothing is left of it.
+    """
+    if path.exists():
+        raise ArenaError(f"{path} is there already; an export overwrites nothing.")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as scratch:
+        beside = Path(scratch, path.name)
+        beside.mkdir()
+        yield beside
+        beside.rename(path)
 
 
 CONTENT_TYPE = "application/zip"

@@ -119,11 +119,14 @@ def download(
     """
     if name not in known:
         raise Http404
-    return HttpResponse(
-        known[name].write(table),
-        content_type=known[name].content_type,
-        headers={"Content-Disposition": f'attachment; filename="{stem}.{known[name].suffix}"'},
-    )
+    chosen = known[name]
+    return attach(chosen.write(table), chosen.content_type, f"{stem}.{chosen.suffix}")
+
+
+def attach(content: bytes | str, content_type: str, name: str) -> HttpResponse:
+    """Return a file to be saved under a name."""
+    disposition = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return HttpResponse(content, content_type=content_type, headers=disposition)
 
 
 # --- Tables with one line a row ----------------------------------------------------------------

@@ -197,16 +197,7 @@ class JobExportView(FileView):
 
     readers = STAFF
 
-    @file_operation(
-        types=[
-            one.content_type for table in JOB_TABLES.values() for one in table.formats.values()
-        ],
-        name="exportJob",
-        words={
-            "name": JOB_TABLES,
-            "form": [form for table in JOB_TABLES.values() for form in table.formats],
-        },
-    )
+    @file_operation(name="exportJob", exports=JOB_TABLES)
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
         """A table of a job as a file.
 

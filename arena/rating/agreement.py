@@ -12,7 +12,7 @@ Notation: V votes, U pairs of augmentations.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
@@ -278,27 +278,22 @@ class _Numbered:
 
 
 def _number(votes: Sequence[PairVote]) -> _Numbered:
-    pairs: dict[tuple[str, str], int] = {}
-    numbers: tuple[dict[str, int], dict[str, int]] = ({}, {})
-    rows = []
-    for vote in votes:
-        swapped = vote.left > vote.right
-        pair = (vote.right, vote.left) if swapped else (vote.left, vote.right)
-        who, what = (
-            known.setdefault(name, len(known))
-            for known, name in zip(numbers, (vote.judge, vote.item), strict=True)
-        )
-        sign = -vote.preference if swapped else vote.preference
-        rows.append((pairs.setdefault(pair, len(pairs)), who, what, sign))
-    pair_of, expert, scenario, sign = np.array(rows, dtype=np.int64).T
+    pairs = [(min(vote.left, vote.right), max(vote.left, vote.right)) for vote in votes]
+    signs = [vote.preference if vote.left <= vote.right else -vote.preference for vote in votes]
     return _Numbered(
-        pairs=list(pairs),
-        pair_of=pair_of,
-        expert=expert,
-        scenario=scenario,
-        sign=sign.astype(np.float64),
+        pairs=list(dict.fromkeys(pairs)),
+        pair_of=_places(pairs),
+        expert=_places([vote.judge for vote in votes]),
+        scenario=_places([vote.item for vote in votes]),
+        sign=np.array(signs, dtype=np.float64),
         types=[vote.type for vote in votes],
     )
+
+
+def _places(names: Sequence[Hashable]) -> IntArray:
+    """Number names in the order in which they first appear."""
+    place_of = {name: place for place, name in enumerate(dict.fromkeys(names))}
+    return np.array([place_of[name] for name in names], dtype=np.int64)
 
 
 def _opinion(votes: _Numbered, rater: NamedRater) -> tuple[FloatArray, FloatArray]:

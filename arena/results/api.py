@@ -161,16 +161,7 @@ class SnapshotExportView(FileView):
 
     readers = STAFF
 
-    @file_operation(
-        types=[
-            form.content_type for one in RATING_FILES.values() for form in one.formats.values()
-        ],
-        name="exportSnapshot",
-        words={
-            "name": RATING_FILES,
-            "form": [form for one in RATING_FILES.values() for form in one.formats],
-        },
-    )
+    @file_operation(name="exportSnapshot", exports=RATING_FILES)
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
         """A rating as a file.
 

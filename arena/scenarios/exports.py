@@ -1,12 +1,10 @@
 """Benchmarks as folders and zips: what entrants get."""
 
-import tempfile
 from pathlib import Path
 
 from django.core.files.base import ContentFile
 
-from arena.errors import ArenaError
-from arena.exports.files import zip_bytes
+from arena.exports.files import new_folder, zip_bytes
 from arena.jobs.exports.files import WARNING
 from arena.models import BenchmarkFile
 from arena.results.services.written_files import FileWork, MadeFile
@@ -27,16 +25,11 @@ def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
         Conflict: The benchmark's scenarios have changed.
         OSError: It can't be written; nothing is left of it.
     """
-    if out.exists():
-        raise ArenaError(f"{out} is there already; an export overwrites nothing.")
     files, sources = _files_of(row)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as folder:
-        beside = Path(folder, out.name)
+    with new_folder(out) as folder:
         for name, content in files.items():
-            (beside / name).parent.mkdir(parents=True, exist_ok=True)
-            (beside / name).write_bytes(content)
-        beside.rename(out)
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
     return list_warnings(sources)
 
 

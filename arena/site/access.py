@@ -10,7 +10,7 @@ from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect
 from django.urls import NoReverseMatch
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.people.queries import role_of
 from augment.errors import AugmentError
@@ -60,7 +60,7 @@ def form_for(*roles: str) -> Callable[[View[P]], View[P]]:
 
 
 def act_for(
-    *roles: str, back: str, asks_first: bool = False
+    *roles: str, back: str
 ) -> Callable[[Callable[Concatenate[HttpRequest, P], HttpResponseBase | None]], View[P]]:
     """Decorate a POST: what a service refuses becomes a message on the page it came from.
 
@@ -68,7 +68,6 @@ def act_for(
         roles: Who may do it.
         back: The name of that page, which has the same `code` in its address, or none. A view
             that returns None leads there as well.
-        asks_first: Whether the address also shows a question before the act.
     """
 
     def wrap(view: Callable[Concatenate[HttpRequest, P], HttpResponseBase | None]) -> View[P]:
@@ -81,8 +80,7 @@ def act_for(
                 messages.error(request, str(error))
             return answer or _lead_to(back, kwargs.get("code"))
 
-        methods = FORM_METHODS if asks_first else ["POST"]
-        return allow_only(*roles)(require_http_methods(methods)(act))
+        return allow_only(*roles)(require_POST(act))
 
     return wrap
 

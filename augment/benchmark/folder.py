@@ -126,7 +126,7 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
         files |= {_file_of(kind, task.name): _text(one) for kind, one in documents.items()}
         named[task.name] = {kind: (_file_of(kind, task.name),) for kind in documents}
     losses: list[dict[str, Any]] = []
-    cells = [_cell_of(benchmark, task) for task in benchmark.tasks]
+    cells = [replace(cell_of(task), made_on=benchmark.made_on) for task in benchmark.tasks]
     for form in FORMATS:
         written = writer_named(form)(cells)
         files |= {f"{form}/{name}": content for name, content in written.files.items()}
@@ -258,8 +258,8 @@ def _said_of(one: BenchmarkTask | _TaskLine) -> dict[str, Any]:
     return {name: getattr(one, name) for name in (*names, "paraphrase_of")}
 
 
-def _cell_of(benchmark: BenchmarkSet, task: BenchmarkTask) -> Cell:
-    """Return the scene as it is, before anybody changes it."""
+def cell_of(task: BenchmarkTask) -> Cell:
+    """Return the scene of a task as writers take it, before anybody changes it."""
     return Cell(
         name=task.name,
         stem=task.name,
@@ -267,7 +267,6 @@ def _cell_of(benchmark: BenchmarkSet, task: BenchmarkTask) -> Cell:
         type=ScenarioType(task.type) if task.type in list(ScenarioType) else None,
         modification=Modification(),
         keeps_traffic=task.keeps_traffic,
-        made_on=benchmark.made_on,
         recording=task.recording,
     )
 

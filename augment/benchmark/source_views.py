@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from augment.benchmark.difference import SourceView
+from augment.benchmark.folder import cell_of
 from augment.benchmark.submitted_file import FileContent
 from augment.benchmark.values import BenchmarkTask
 from augment.formats.commonroad.writer import names_in
 from augment.formats.readers import reader_of
 from augment.formats.roads import RADIUS_M
 from augment.formats.writers import writer_named
-from augment.formats.writing import Cell
-from augment.scene.entities import Modification
 
 COMMONROAD, SCENARIONET = "commonroad", "scenarionet"
 _SUFFIXES = {COMMONROAD: ".xml", SCENARIONET: ".pkl"}
@@ -47,16 +46,7 @@ def show_source(task: BenchmarkTask, format_name: str) -> ShownSource:
     suffix = _SUFFIXES.get(format_name)
     if suffix is None:
         return ShownSource(view=plain)
-    cell = Cell(
-        name=task.name,
-        stem=task.name,
-        scene=scene,
-        type=None,
-        modification=Modification(),
-        keeps_traffic=task.keeps_traffic,
-        recording=task.recording,
-    )
-    written = writer_named(format_name)([cell]).files
+    written = writer_named(format_name)([cell_of(task)]).files
     blocks = [one for name, one in written.items() if name.endswith(f"{task.name}{suffix}")]
     if not blocks:  # the scene can't be said in the format
         return ShownSource(view=plain)

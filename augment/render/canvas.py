@@ -103,24 +103,11 @@ class Canvas:
         for piece in _in_pixels(pieces[seen]).reshape(-1, 4).tolist():
             self._pen.line(piece, fill=_INKS[colour], width=max(1, round(width * DENSITY)))
 
-    def disc(
-        self,
-        centre: Spot,
-        radius: float,
-        colour: Colour,
-        *,
-        outline: Colour | None = None,
-        outline_px: float = 0.0,
-    ) -> None:
-        """Draw a circle; its outline lies inside the radius."""
+    def disc(self, centre: Spot, radius: float, colour: Colour) -> None:
+        """Draw a circle."""
         x, y = centre
         box = np.array([[x - radius, y - radius], [x + radius, y + radius]])
-        self._pen.ellipse(
-            _fine(box),
-            fill=_INKS[colour],
-            outline=_INKS[outline] if outline else None,
-            width=round(outline_px * DENSITY) if outline else 0,
-        )
+        self._pen.ellipse(_fine(box), fill=_INKS[colour], width=0)
 
     def plate(self, box: Box, colour: Colour, outline: Colour | None, radius: float) -> None:
         """Draw a rectangle (left, top, right, bottom) with round corners and a thin outline."""
@@ -170,14 +157,9 @@ class Canvas:
         inside[within] = np.isin(pixels, [_INKS[colour] for colour in colours])
         return inside
 
-    def png(self, *, halved: bool = False) -> bytes:
-        """Return the finished picture: the same drawing gives the same bytes, and no metadata.
-
-        Args:
-            halved: Give one pixel for each of the picture's, blended, in full colour: for those
-                who pay by the pixel.
-        """
-        return _packed(self._halved() if halved else self._finished())
+    def png(self) -> bytes:
+        """Return the finished picture: the same drawing gives the same bytes, and no metadata."""
+        return _packed(self._finished())
 
     def _finished(self) -> Image.Image:
         finished = self.copy()
@@ -186,6 +168,7 @@ class Canvas:
         return finished._image
 
     def _halved(self) -> Image.Image:
+        """One pixel for each four, blended, in full colour: for those who pay by the pixel."""
         return self._finished().convert("RGB").reduce(DENSITY)
 
     def _smooth(self, at: Spot, text: str, size: int, anchor: str) -> None:
@@ -206,7 +189,7 @@ class Canvas:
 
 
 def stack_png(above: Canvas, below: Canvas) -> bytes:
-    """Return two pictures of one width, one above the other, halved as `Canvas.png` says."""
+    """Return two pictures of one width, one above the other, at half their density."""
     first, second = above._halved(), below._halved()
     whole = Image.new("RGB", (first.width, first.height + second.height), palette.PAPER)
     whole.paste(first, (0, 0))

@@ -198,13 +198,10 @@ class LaneGraph:
         best = best_aligned(covering, heading_rad)
         return None if best is None else best.lane_id
 
-    def nearest(
-        self, x_m: float, y_m: float, *, among: Iterable[str] | None = None
-    ) -> tuple[str, Projection] | None:
+    def nearest(self, x_m: float, y_m: float) -> tuple[str, Projection] | None:
         """Return the lane whose centreline comes nearest to the point, None without lanes."""
         projections = [
-            (lane_id, self.lanes[lane_id].centerline.project(x_m, y_m))
-            for lane_id in (self.lanes if among is None else among)
+            (lane_id, lane.centerline.project(x_m, y_m)) for lane_id, lane in self.lanes.items()
         ]
         return min(projections, key=lambda item: item[1].distance_m, default=None)
 

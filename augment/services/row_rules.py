@@ -8,25 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from django.db import models
+from django.db.models import Model
 
+from augment import models
 from augment.benchmark.report import CARD, report_from_document
 from augment.errors import InvalidDocument
-from augment.models import (
-    Augmentation,
-    BaseScene,
-    Benchmark,
-    Contestant,
-    Endpoint,
-    EndpointModel,
-    GenerationJob,
-    IntentReading,
-    Scenario,
-    SceneUpload,
-    Simulation,
-    Submission,
-    UploadMoment,
-)
 from augment.scene.codec import (
     intent_from_document,
     modification_from_document,
@@ -51,7 +37,7 @@ LONGEST_TRACE = 1 << 26
 """Of a drive to look at, unpacked: some hundred times what 15 s take."""
 
 
-def _check_scene(row: BaseScene) -> None:
+def _check_scene(row: models.BaseScene) -> None:
     check_slug(row.slug, what="scene")
     scene_from_document(row.document)
     notes_of(row.notes)
@@ -59,7 +45,7 @@ def _check_scene(row: BaseScene) -> None:
         recording_from_document(row.recording)
 
 
-def _check_scenario(row: Scenario) -> None:
+def _check_scenario(row: models.Scenario) -> None:
     check_slug(row.slug, what="scenario")
     label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
@@ -70,18 +56,18 @@ def _check_scenario(row: Scenario) -> None:
         check_reference(scene_of(row), modification_from_document(row.reference))
 
 
-def _check_benchmark(row: Benchmark) -> None:
+def _check_benchmark(row: models.Benchmark) -> None:
     check_slug(row.slug, what="benchmark")
     one_line("title", row.title, what="benchmark")
 
 
-def _check_endpoint(row: Endpoint) -> None:
+def _check_endpoint(row: models.Endpoint) -> None:
     check_slug(row.label, what="endpoint")
     names = [field.name for field in fields(EndpointFacts)]
     check_facts(EndpointFacts(**{name: getattr(row, name) for name in names}))
 
 
-def _check_contestant(row: Contestant) -> None:
+def _check_contestant(row: models.Contestant) -> None:
     check_slug(row.slug, what="contestant")
     one_line("name", row.name, what="contestant")
     if row.card is not None:
@@ -92,30 +78,30 @@ def _check_contestant(row: Contestant) -> None:
         one_line(f"roles.{role}", chosen["model"], what="contestant")
 
 
-def _check_job(row: GenerationJob) -> None:
+def _check_job(row: models.GenerationJob) -> None:
     one_line("name", row.name, what="job")
     if not 1 <= row.samples <= MOST_SAMPLES:
         raise InvalidDocument("job", [("samples", f"goes from 1 to {MOST_SAMPLES}")])
 
 
-def _check_augmentation(row: Augmentation) -> None:
+def _check_augmentation(row: models.Augmentation) -> None:
     check_picture_name("image", row.image)
     if row.modification is not None:
         modification_from_document(row.modification)
 
 
-def _check_submission(row: Submission) -> None:
+def _check_submission(row: models.Submission) -> None:
     check_stored_name("stored", row.stored)
     if row.report is not None:
         report_from_document(row.report)
 
 
-def _check_reading(row: IntentReading) -> None:
+def _check_reading(row: models.IntentReading) -> None:
     if row.document is not None:
         intent_from_document(row.document)
 
 
-def _check_drive(row: Simulation) -> None:
+def _check_drive(row: models.Simulation) -> None:
     if row.offsets not in OFFSETS_M:
         raise InvalidDocument("drive", [("offsets", f"one of {', '.join(OFFSETS_M)}")])
     if row.trace is not None:
@@ -128,19 +114,19 @@ def _check_drive(row: Simulation) -> None:
             raise InvalidDocument("drive", [("trace", f"more than {LONGEST_TRACE} bytes")])
 
 
-RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
-    Augmentation: _check_augmentation,
-    BaseScene: _check_scene,
-    Benchmark: _check_benchmark,
-    Contestant: _check_contestant,
-    Endpoint: _check_endpoint,
-    EndpointModel: EndpointModel.clean,
-    GenerationJob: _check_job,
-    IntentReading: _check_reading,
-    Scenario: _check_scenario,
-    SceneUpload: lambda row: check_stored_name("stored", row.stored),
-    Simulation: _check_drive,
-    Submission: _check_submission,
-    UploadMoment: lambda row: check_stored_name("picture", row.picture),
+RULES: Mapping[type[Model], Callable[[Any], None]] = {
+    models.Augmentation: _check_augmentation,
+    models.BaseScene: _check_scene,
+    models.Benchmark: _check_benchmark,
+    models.Contestant: _check_contestant,
+    models.Endpoint: _check_endpoint,
+    models.EndpointModel: models.EndpointModel.clean,
+    models.GenerationJob: _check_job,
+    models.IntentReading: _check_reading,
+    models.Scenario: _check_scenario,
+    models.SceneUpload: lambda row: check_stored_name("stored", row.stored),
+    models.Simulation: _check_drive,
+    models.Submission: _check_submission,
+    models.UploadMoment: lambda row: check_stored_name("picture", row.picture),
 }
 """What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""

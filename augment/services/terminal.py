@@ -12,6 +12,7 @@ from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from augment.errors import AugmentError
 from augment.escaping import escape_controls
+from augment.services.inputs import add_options, inputs_of
 
 
 class TerminalOutput(OutputWrapper):
@@ -39,17 +40,21 @@ class TerminalCommand(BaseCommand):
 
     Attributes:
         arguments: What argparse's `add_argument` takes, by the argument's name or flag.
+        request: A dataclass of inputs, each of which becomes an option; None for none.
         failure: What that sentence begins with, such as "Nothing was restored."; a command that
             sets it reports errors of the file system as well.
     """
 
     arguments: Mapping[str, Mapping[str, Any]] = {}
+    request: type | None = None
     failure = ""
 
     def add_arguments(self, parser: CommandParser) -> None:
         """Add the arguments that the class lists."""
         for name, options in self.arguments.items():
             parser.add_argument(name, **options)
+        if self.request is not None:
+            add_options(parser, inputs_of(self.request))
 
     # Django sets both again when it is called with streams of its own.
 

@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-from augment.llm.client import ChatClient, Patience
+from augment.llm.client import ChatClient
 from augment.llm.costs import Price, worst_case
 from augment.llm.messages import Request
 from augment.prompts.fill import JudgeQuestion, judge_messages
@@ -57,7 +57,6 @@ def ask_judge(
     client: ChatClient,
     model: str,
     transcript: Transcript,
-    patience: Patience | None = None,
 ) -> JudgeAnswer:
     """Ask once which of two pictures (PNG, A first) is better.
 
@@ -70,7 +69,6 @@ def ask_judge(
     respondents = Respondents(
         clients={ModelRole.MODIFIER: RespondentClient(client=client, model=model)},
         transcript=transcript,
-        patience=patience or Patience(),
         sampling=Sampling(temperature=0.0),
         max_tokens=JUDGE_TOKENS,
         re_asks=0,

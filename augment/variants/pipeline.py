@@ -129,12 +129,7 @@ def run(
 
 
 def ask_for_intent(
-    instruction: str,
-    *,
-    client: ChatClient,
-    model: str,
-    transcript: Transcript,
-    patience: Patience | None = None,
+    instruction: str, *, client: ChatClient, model: str, transcript: Transcript
 ) -> Intent:
     """Return what a model reads out of a sentence, which is all that it is shown.
 
@@ -149,7 +144,6 @@ def ask_for_intent(
     respondents = Respondents(
         clients={ModelRole.MODIFIER: RespondentClient(client=client, model=model)},
         transcript=transcript,
-        patience=patience or Patience(),
         max_tokens=READER_TOKENS,
     )
     messages = fill.reader_messages(instruction)

@@ -8,7 +8,6 @@ counts them too.
 import json
 import math
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
@@ -72,7 +71,6 @@ def shown_prompt(
     modification: Modification,
     *,
     native_tools: bool = False,
-    questions: Sequence[str] = EXAMPLE_QUESTIONS,
 ) -> Shown:
     """Return what that role is asked first.
 
@@ -83,7 +81,6 @@ def shown_prompt(
         instruction: The user's wish.
         modification: What reviewers judge.
         native_tools: Whether the modifier calls natively.
-        questions: What the viewer is asked.
     """
     if role is ModelRole.MODIFIER:
         form = form_of(recipe, native_tools=native_tools)
@@ -94,7 +91,7 @@ def shown_prompt(
         )
     if role is ModelRole.VIEWER:
         images = pictures(scene, modification, width_px=recipe.limits.picture_px)
-        return Shown(messages=fill.viewer_messages(questions, images))
+        return Shown(messages=fill.viewer_messages(EXAMPLE_QUESTIONS, images))
     radius_m = recipe.limits.radius_m
     return Shown(
         messages=fill.review_messages(role, scene, instruction, modification, radius_m=radius_m)

@@ -13,7 +13,7 @@ from django.utils.text import slugify
 from arena.exports.files import zip_bytes
 from arena.exports.formats import Format, formats, json_bytes
 from arena.models import ScenarioFile
-from arena.results.services.vote_files import digest_of
+from arena.results.services.vote_files import describe_files
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
@@ -51,10 +51,7 @@ def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
         "missing": [asdict(loss) for loss in exported.missing],
         "versions": {"python": platform.python_version()}
         | {name: metadata.version(name) for name in WRITTEN_WITH},
-        "files": {
-            name: {"sha256": digest_of(content), "bytes": len(content)}
-            for name, content in files.items()
-        },
+        "files": describe_files(files),
     }
     return json_bytes(document, sort_keys=True)
 

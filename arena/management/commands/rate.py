@@ -2,15 +2,13 @@
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import plain_text
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import log_early_look
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.queries import study_named
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.inputs import read_request
 from augment.services.terminal import TerminalCommand
 
 
@@ -19,13 +17,11 @@ class Command(TerminalCommand):
 
     help = "Rate the contestants of a study by its votes and keep the result."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which study, and an option for all that a rating asks for."""
-        parser.add_argument("study", help="its name or its code")
-        add_options(parser, inputs_of(RatingRequest))
-        parser.add_argument(
-            "--early", action="store_true", help="rate an open study; this is logged"
-        )
+    arguments = {
+        "study": {"help": "its name or its code"},
+        "--early": {"action": "store_true", "help": "rate an open study; this is logged"},
+    }
+    request = RatingRequest
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print the table."""

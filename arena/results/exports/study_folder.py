@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +13,7 @@ from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
+from arena.exports.files import new_folder
 from arena.exports.formats import Value, csv_of, read_value, sheet_csv
 from arena.jobs.exports.displacement import object_sheet
 from arena.models import Snapshot, Study
@@ -130,19 +130,12 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
         Conflict: The votes of a rating are not what they were.
         OSError: It can't be written; nothing is left of it.
     """
-    if out.exists():
-        raise ArenaError(f"{out} is there already; an export overwrites nothing.")
     if study.state == Study.State.OPEN:
         raise ArenaError(f"The study {study.name!r} is open; close it before it is exported.")
     if study.state == Study.State.CANCELLED:
         raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as folder:
-        beside = Path(folder, out.name)
-        beside.mkdir()
-        with frozen_rows():
-            _fill(study, beside, say)
-        beside.rename(out)
+    with new_folder(out) as folder, frozen_rows():
+        _fill(study, folder, say)
 
 
 class _Folder:

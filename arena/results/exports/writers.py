@@ -22,8 +22,7 @@ from arena.exports.formats import (
     drawings,
     formats,
     json_bytes,
-    sheet_csv,
-    sheet_parquet,
+    table_formats,
 )
 from arena.models import Snapshot
 from arena.rating.lines import align_cells, caption_text, escape, latex_table
@@ -40,7 +39,7 @@ from arena.results.exports.tables import (
     leaderboard_table,
 )
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.services.vote_files import digest_of
+from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import Answered
 from augment.errors import UnknownName
@@ -150,12 +149,8 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
 
 
 FORMATS: dict[str, Format[LeaderboardTable]] = {
-    **formats(
-        csv=lambda table: sheet_csv(leaderboard_sheet(table)),
-        json=leaderboard_json,
-        parquet=lambda table: sheet_parquet(leaderboard_sheet(table)),
-        latex=leaderboard_latex,
-    ),
+    **table_formats(leaderboard_sheet),
+    **formats(json=leaderboard_json, latex=leaderboard_latex),
     **drawings(interval_chart),
 }
 
@@ -306,10 +301,7 @@ def _manifest(table: LeaderboardTable, files: dict[str, bytes]) -> dict[str, Any
         "warnings": table.warnings,
         "filters": filters,
         "versions": rating.versions,
-        "files": {
-            name: {"sha256": digest_of(content), "bytes": len(content)}
-            for name, content in files.items()
-        },
+        "files": describe_files(files),
     }
 
 

@@ -13,6 +13,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.files import CONTENT_TYPE, zip_bytes
+from arena.exports.formats import attach
 from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
 from arena.results.exports.board_files import board_folder, rows_of, write_table
@@ -114,7 +115,7 @@ def board_export(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """All tables as a folder for any web host."""
     board = get_object_or_404(Board, code=code)
     name = f"{slugify(board.name) or 'board'}.zip"
-    return _download(zip_bytes(board_folder(board)), CONTENT_TYPE, name)
+    return attach(zip_bytes(board_folder(board)), CONTENT_TYPE, name)
 
 
 # --- Acts --------------------------------------------------------------------------------------
@@ -193,9 +194,4 @@ def _file(board: Board, number: int, form: str) -> HttpResponse:
     if form not in DATA:
         raise Http404
     name = f"{slugify(board.name) or 'board'}-{number}.{form}"
-    return _download(table.files[form].encode(), DATA[form], name)
-
-
-def _download(content: bytes, content_type: str, name: str) -> HttpResponse:
-    disposition = {"Content-Disposition": f'attachment; filename="{name}"'}
-    return HttpResponse(content, content_type=content_type, headers=disposition)
+    return attach(table.files[form].encode(), DATA[form], name)

@@ -12,6 +12,7 @@ from django.shortcuts import get_object_or_404, render
 from django.urls import reverse
 from django.utils.text import slugify
 
+from arena.exports.formats import attach
 from arena.models import Study
 from arena.rating.agreement import AgreementLine, agreement_sentence, share_text
 from arena.results.exports.judges import judge_answers_csv
@@ -119,11 +120,7 @@ def judge_answers(request: HttpRequest, code: uuid.UUID, judge: uuid.UUID) -> Ht
     """Single answers of a judge as CSV."""
     run = _judge(request, code, judge)
     name = f"judge-{slugify(run.model) or 'model'}-answers.csv"
-    return HttpResponse(
-        judge_answers_csv(run),
-        content_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return attach(judge_answers_csv(run), "text/csv; charset=utf-8", name)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
@@ -112,6 +113,14 @@ def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:
 def digest_of(content: bytes) -> str:
     """SHA-256 of a file, in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
+
+
+def describe_files(files: Mapping[str, bytes]) -> dict[str, Any]:
+    """Return the hash and the size of each file, for a manifest."""
+    return {
+        name: {"sha256": digest_of(content), "bytes": len(content)}
+        for name, content in files.items()
+    }
 
 
 LONGEST_CELL = 200

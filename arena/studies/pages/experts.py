@@ -18,6 +18,7 @@ from django.views.decorators.http import require_http_methods
 
 from arena.errors import EnrolmentOver, LinkOver
 from arena.exports.cells import csv_text
+from arena.exports.formats import attach
 from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
@@ -254,11 +255,8 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
     study = get_object_or_404(Study, code=code, enrolment__isnull=False)
-    return HttpResponse(
-        csv_text(COLUMNS, map(_line_of, enrolled_voters(study))),
-        content_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": 'attachment; filename="voters.csv"'},
-    )
+    content = csv_text(COLUMNS, map(_line_of, enrolled_voters(study)))
+    return attach(content, "text/csv; charset=utf-8", "voters.csv")
 
 
 def _line_of(voter: Any) -> tuple[object, ...]:

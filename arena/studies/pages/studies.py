@@ -15,6 +15,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST
 
 from arena import tasks
+from arena.exports.formats import attach
 from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
 from arena.results.pages.rating_form import rate_or_send
@@ -112,11 +113,7 @@ def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if not study.preregistration:
         raise Http404
     name = f"{slugify(study.name) or 'study'}-preregistration.json"
-    return HttpResponse(
-        study.preregistration.encode(),
-        content_type="application/json",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    return attach(study.preregistration, "application/json", name)
 
 
 # --- Acts --------------------------------------------------------------------------------------

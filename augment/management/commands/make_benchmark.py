@@ -2,9 +2,7 @@
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.inputs import read_request
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.terminal import TerminalCommand
 
@@ -17,9 +15,7 @@ class Command(TerminalCommand):
         "them with their references. `manage.py export benchmark NAME` writes its folder."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """What it holds."""
-        add_options(parser, inputs_of(BenchmarkRequest))
+    request = BenchmarkRequest
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make it and say what came of it."""

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.db import transaction
 
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.inputs import read_request
 from augment.services.running.budget import Caps, limit_of
 from augment.services.running.choosing import find_job
 from augment.services.running.jobs import resume
@@ -22,10 +21,8 @@ class Command(TerminalCommand):
         "where they are given. What was answered already is not asked again."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """The job and its new caps."""
-        parser.add_argument("job", help="its name or its code")
-        add_options(parser, inputs_of(Caps))
+    arguments = {"job": {"help": "its name or its code"}}
+    request = Caps
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Raise what is given, then resume."""

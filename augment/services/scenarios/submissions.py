@@ -185,10 +185,9 @@ def find_entry(contestant: Contestant, scenario: str, sample: int) -> SubmittedE
         Conflict: It has no such scenario or sample.
     """
     report = report_of(contestant)
-    for entry in report.entries:
-        if (entry.task, entry.sample) == (scenario, sample):
-            return entry
-    raise Conflict(_unanswered(contestant, report, [scenario], sample))
+    _require_answers(contestant, report, [scenario], sample)
+    entries = report.entries
+    return next(one for one in entries if (one.task, one.sample) == (scenario, sample))
 
 
 def refuse_unanswered(contestant: Contestant, scenarios: Iterable[str], *, samples: int) -> None:
@@ -197,21 +196,21 @@ def refuse_unanswered(contestant: Contestant, scenarios: Iterable[str], *, sampl
     Raises:
         Conflict: There are such ones.
     """
-    report = report_of(contestant)
+    _require_answers(contestant, report_of(contestant), scenarios, samples)
+
+
+def _require_answers(
+    contestant: Contestant, report: SubmissionReport, scenarios: Iterable[str], samples: int
+) -> None:
+    n = report.card.samples
+    if samples > n:
+        text = f"“{contestant.slug}” has {n} sample{'s' * (n != 1)} a scenario, not {samples}."
+        raise Conflict(text)
     known = {entry.task for entry in report.entries}
     strange = [slug for slug in scenarios if slug not in known]
-    if strange or samples > report.card.samples:
-        raise Conflict(_unanswered(contestant, report, strange, samples))
-
-
-def _unanswered(
-    contestant: Contestant, report: SubmissionReport, scenarios: list[str], sample: int
-) -> str:
-    which = f"{report.benchmark} version {report.version}"
-    if sample > report.card.samples:
-        n = report.card.samples
-        return f"“{contestant.slug}” has {n} sample{'s' * (n != 1)} a scenario, not {sample}."
-    return (
-        f"“{contestant.slug}” is a submission to {which} and answers its scenarios alone, not "
-        f"{', '.join(scenarios[:8])}{' and others' * (len(scenarios) > 8)}."
-    )
+    if strange:
+        raise Conflict(
+            f"“{contestant.slug}” is a submission to {report.benchmark} version {report.version} "
+            f"and answers its scenarios alone, not {', '.join(strange[:8])}"
+            f"{' and others' * (len(strange) > 8)}."
+        )
