@@ -24,6 +24,9 @@ from arena.rating.comparisons import BoolArray, Estimate, FloatArray, IntArray, 
 from arena.rating.lines import whole_percent
 from arena.rating.sandwich import LEAST
 
+_NOTHING = 1e-12
+"""Up to which variance all clusters have the same share, but for rounding."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairVote:
@@ -214,7 +217,8 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
     (A. C. Cameron, J. B. Gelbach, D. L. Miller, Robust inference with multiway clustering, 2011);
     the interval is symmetric in the logit, with Student's t of one degree less than there are
     clusters of the fewer kind. Without a hit, or without a miss, it is Wilson's interval of as
-    many votes as there are clusters of the fewer kind. A side with one cluster says nothing.
+    many votes as there are clusters of the fewer kind. A side with one cluster says nothing,
+    nor do clusters that all have the same share.
 
     Args:
         hits: (V,) from 0 to 1.
@@ -231,7 +235,7 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
         return wilson(round(value) * fewest, fewest)
     variance = sum(side.value for side in sides) - cells.value * (len(sides) - 1)
     variance = max(variance, LEAST * cells.value)
-    if fewest == 1 or variance <= 0.0:
+    if fewest == 1 or variance < _NOTHING:
         return Estimate(value=value)
     half = float(t_quantile(fewest - 1)) * math.sqrt(variance) / (value * (1.0 - value))
     middle = float(logit(value))

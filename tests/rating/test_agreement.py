@@ -93,8 +93,9 @@ def test_without_a_decided_vote_there_is_nothing_to_agree_with() -> None:
         ([1.0] * 6, [0, 0, 1, 1, 2, 2], True),
         ([1.0, 0.0], [0, 0], False),
         ([0.5] * 4, [0] * 4, False),
+        ([1.0, 1.0, 0.0] * 2, [0, 0, 0, 1, 1, 1], False),
     ],
-    ids=["all agree", "one expert on one scenario", "ties alone"],
+    ids=["all agree", "one expert on one scenario", "ties alone", "two experts alike"],
 )
 def test_an_interval_is_missing_where_nothing_bounds_it(
     hits: list[float], experts: list[int], bounded: bool
