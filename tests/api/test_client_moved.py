@@ -40,6 +40,8 @@ def test_a_redirect_is_told_and_not_followed(moved: tuple[str, list[str]], way: 
     address, asked = moved
     arena = Arena(address, "arena_secret")
     with pytest.raises(ApiError, match="301 moved: this leads to /there") as told:
-        arena.vote({"matchup": "m"}, "A") if way == "vote" else arena.get("votes")
+        arena.vote(
+            {"matchup": "m", "question": "instruction"}, "A"
+        ) if way == "vote" else arena.get("votes")
     assert told.value.code == "moved"
     assert asked == ["POST /api/v1/votes" if way == "vote" else "GET /api/v1/votes"]

@@ -26,7 +26,7 @@ from tests.scenes import cone
 from tests.study_rows import a_study, hang
 from tests.web.cast import people, png
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.slow]
 
 OWN = {
     *("home", "password", "api-tokens", "submissions", "submission-new", "submission"),

@@ -43,5 +43,5 @@ def test_a_line_of_json_says_when_how_bad_and_who(stream: io.StringIO) -> None:
 def test_drawing_and_driving_wait_in_a_queue_of_their_own() -> None:
     for task in ("augment.draw", "arena.draw_checks"):
         assert current_app.amqp.router.route({}, task)["queue"].name == "drawing"
-    asking = {"augmentation", "intentreading", "probe"}
+    asking = {"augmentation", "intentreading", "pairjudgement", "probe"}
     assert {name for name, kind in KINDS.items() if kind.queue == "models"} == asking
