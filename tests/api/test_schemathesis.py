@@ -23,10 +23,12 @@ from schemathesis.specs.openapi import checks
 from arena.models import Snapshot
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
-from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, UploadMoment
+from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, Submission, UploadMoment
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from tests.api.tokens import secret_of
+from tests.entering import entrant, read, sent
 from tests.study_rows import matchups_of, vote
 from tests.web.cast import World, people, world
 
@@ -39,14 +41,15 @@ CHECKS: list[Any] = [
     checks.content_type_conformance,
     checks.response_schema_conformance,
 ]
-ROLES = ("anonymous", "expert", "researcher", "admin")
+ROLES = ("anonymous", "entrant", "expert", "researcher", "admin")
+OF_ENTRANTS = {"sendSubmission", "getSubmission", "keepPreferences"}
 OF_EXPERTS = {"listStudies", "listMatchups", "getShownPicture"}
 OF_EXPERTS |= {"keepPreferences", "report", "vote"}
 EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
 READ_BY_STAFF = {
     *("listJobs", "getJob", "getJobProgress", "exportJob", "listStudies", "getStudy"),
     *("listScenarios", "listContestants", "getUpload", "getMoment", "getProbe"),
-    *("rateStudy", "getSnapshot", "exportSnapshot"),
+    *("rateStudy", "getSnapshot", "exportSnapshot", "getSubmission"),
 }
 
 Seen = dict[str, set[int]]
@@ -73,6 +76,8 @@ def here() -> World:
     Probe.objects.create(model=model_at(endpoint=site, model="m"))
     upload = SceneUpload.objects.create(name="log.zip", size_bytes=1, state="failed")
     UploadMoment.objects.create(upload=upload)
+    whole = make_benchmark(BenchmarkRequest(slug="set", title="Set", scenarios=["all"]))
+    read(sent(whole, entrant()))
     return found
 
 
@@ -86,12 +91,15 @@ def codes(here: World) -> dict[str, object]:
         "moments": UploadMoment.objects.get().code,
         "endpoints": Endpoint.objects.get(label="here").code,
         "models": EndpointModel.objects.get().code,
+        "submissions": Submission.objects.get().code,
     }
 
 
 def account(role: str, here: World) -> User | None:
     if role == "anonymous":
         return None
+    if role == "entrant":
+        return Submission.objects.get().uploaded_by
     return here.expert if role == "expert" else people()[role]
 
 
@@ -158,6 +166,8 @@ def test_every_answer_is_one_that_the_document_knows(role: str, here: World) -> 
     if role == "anonymous":
         assert fine == set()
         assert all(statuses <= {401, 400, 404, 410, 415, 422} for statuses in seen.values()), seen
+    elif role == "entrant":
+        assert "getSubmission" in fine <= OF_ENTRANTS, seen
     elif role == "expert":
         assert fine <= OF_EXPERTS, seen
     else:
