@@ -60,6 +60,9 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "b": _("Image B, edited scene"),
         "original": _("The scene before the edit"),
     }
+    shown = [*pairs, changed["shown"]] if changed else pairs
+    on_them = own_votes(study, expert).filter(matchup__code__in=[one["matchup"] for one in shown])
+    last = {vote.pk: vote for vote in (*context["last"], *on_them.reverse())}
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
         "alts": alts,
@@ -79,7 +82,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "urls": _urls(study),
             "alts": alts,
             "pairs": pairs,
-            "last": [_as_json(vote) for vote in context["last"]],
+            "last": [_as_json(vote) for vote in last.values()],
             "change": changed,
             "allow_both_miss": study.allow_both_miss,
             "rings": has["rings"],

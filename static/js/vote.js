@@ -61,7 +61,8 @@ function caughtUp(shownOnes) {
 }
 
 // Of a pair that was skipped only the skip can be changed; other answers wait behind it.
-const changeable = () => votes.filter(({ question: key, shown }) => key === questions[0] || !isSkipped(shown));
+const changeable = () =>
+  votes.filter(({ question: key, shown }) => key === questions[0] || !isSkipped(shown)).slice(0, undoable);
 
 // --- Painting ------------------------------------------------------------------------------------
 
@@ -142,7 +143,7 @@ function decide(outcome, more = {}) {
     body.supersedes = old.key;
     Object.assign(old, vote);
   } else {
-    votes = [vote, ...votes].slice(0, undoable);
+    votes = [vote, ...votes];
   }
   if (!review) onScreen.draft = "";
   const next = settle(onScreen);
@@ -387,14 +388,12 @@ async function start() {
   const cast = new Map([...votes.reverse(), ...waiting].map((vote) => [keyOf(vote), vote]));
   votes = [...cast.values()].reverse();
   for (const { shown } of votes) if (!nextOf(shown)) pairs.decide(shown.matchup);
-  votes = votes.slice(0, undoable);
   page.drawSaved(outbox.entries.length);
   page.drawLast(changeable());
   pairs.take(caughtUp(given.pairs));
   outbox.start();
   const { change } = given;
-  // One that was skipped long ago is none of the last votes.
-  if (change) undo(cast.get(keyOf(change)) ?? change);
+  if (change) undo(cast.get(keyOf(change)));
 }
 
 start();

@@ -3,6 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
+from arena.voting import screen
 from tests.browser.booth import Booth, all_sent, let_bounce, press
 from tests.browser.test_voting_page import faults
 
@@ -29,3 +30,26 @@ def test_a_skip_moves_no_bar_and_its_pair_comes_back_from_the_list(booth: Booth)
     expect(page.locator("#skipped")).to_be_hidden()
     expect(page.locator("#place")).to_have_text("3")
     assert booth.outcomes() == ["left", "right"]
+
+
+def test_a_pair_skipped_long_ago_is_asked_about_once(
+    booth: Booth, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(screen, "UNDOABLE", 1)  # the skip is none of the last votes
+    page = booth.enter(bypass_csp=True)
+    page.keyboard.press("s")
+    page.keyboard.press("3")
+    expect(page.locator("#skipped")).to_have_text("Skipped: 1")
+    let_bounce(page)
+    for _ in range(2):
+        press(page, "1")
+    all_sent(page, 2)
+    page.locator("#skipped").click()
+    page.get_by_role("link", name="Open pair 1 again").click()
+    page.wait_for_selector("body.is-live #vote:not([inert]) #answers:not([inert])")
+    let_bounce(page)
+    page.keyboard.press("3")
+    all_sent(page, 3)
+    expect(page.locator("#skipped")).to_be_hidden()
+    expect(page.locator("#place")).to_have_text("4")
+    assert sorted(booth.outcomes()) == ["left", "left", "right"]
