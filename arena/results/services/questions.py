@@ -93,9 +93,10 @@ def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _rates_alike(snapshot: Snapshot) -> tuple[str, Filters]:
+def _rates_alike(snapshot: Snapshot) -> tuple[str, int | None, Filters]:
     filters = Filters.of_document(snapshot.filters)
-    return snapshot.method, replace(filters, question="", authors=frozenset())
+    filters = replace(filters, question="", authors=frozenset())
+    return snapshot.method, snapshot.last_vote, filters
 
 
 def _link(

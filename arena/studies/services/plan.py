@@ -97,7 +97,9 @@ def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
 
 
 def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
-    """Return what a rating says of each of the study's hypotheses."""
+    """Return what a rating says of the study's hypotheses, which are of its primary question."""
+    if snapshot.question != snapshot.study.questions[0]:
+        return ()
     ratings = dict(snapshot.standings.values_list("slug", "rating"))
     board = snapshot.results.board
     p_values = {frozenset((pair.a, pair.b)): pair.p for pair in board.p_values or ()}
