@@ -122,9 +122,8 @@ def judge_name(run: JudgeRun) -> str:
 def models_of(contestant: Contestant) -> list[str]:
     """Return the models that a contestant asks, in any role, or that its card names."""
     asked = [contestant.model, *(role["model"] for role in contestant.roles.values())]
-    if contestant.kind == Contestant.Kind.SUBMISSION:
-        summary = contestant.submission.summary or {}
-        asked += summary["card"]["models"]
+    if contestant.card is not None:
+        asked += contestant.card["models"]
     return [model for model in asked if model]
 
 
@@ -179,7 +178,7 @@ def _own_family(study: Study, run: JudgeRun) -> dict[str, str]:
     family = family_of(run.model)
     return {
         row.slug: row.name
-        for row in study.contestants.select_related("submission").order_by("name")
+        for row in study.contestants.order_by("name")
         if family in map(family_of, models_of(row))
     }
 

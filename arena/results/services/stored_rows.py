@@ -26,7 +26,7 @@ LEFT_OUT = frozenset(
         *("sessions.session", "arena.session"),
         *("axes.accessattempt", "axes.accesslog", "axes.accessfailurelog"),
         *("axes.accessattemptexpiration", "augment.worker", "arena.scenariofile"),
-        "arena.studyfile",
+        *("arena.studyfile", "arena.benchmarkfile"),
     }
 )
 """What means nothing after a restore: who was signed in, who was locked out, who worked, and zips
