@@ -59,6 +59,7 @@ class SplitCandidate:
         shared: Keys of what it may have in common with other tasks: tasks that share a key are in
             one split, also by way of a third.
         has_reference: Whether it can be for practice at all.
+        earlier: Its split in other benchmarks, which it keeps: the test where they differ.
     """
 
     name: str
@@ -66,6 +67,7 @@ class SplitCandidate:
     type: str
     shared: Collection[str] = ()
     has_reference: bool = True
+    earlier: Split | None = None
 
 
 def split_tasks(
@@ -90,6 +92,8 @@ def split_tasks(
             group = groups[number]
             seen += len(group)
             is_due = practice + len(group) / 2 <= share * seen
+            if earlier := {task.earlier for task in group} - {None}:
+                is_due = Split.TEST not in earlier
             is_practice = is_due and all(task.has_reference for task in group)
             practice += len(group) * is_practice
             chosen = Split.PRACTICE if is_practice else Split.TEST

@@ -39,6 +39,9 @@ MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
 MOST_CHANGED = 1_000
 """Agents that a file may have beyond those of the source."""
+MOST_TOGETHER = 300_000
+"""Agents in all files together: they are held at once, and so is the report with them."""
+MOST_REMARKS = 100
 _NAMES = TypeAdapter(tuple[str, ...])
 Key = tuple[str, int]
 """A task and a sample."""
@@ -79,7 +82,7 @@ def check_submission(benchmark: BenchmarkSet, path: Path, *, checksum: str) -> S
         checksum=checksum,
         card=card,
         entries=tuple(checker.check(tasks[key[0]], key[1], by_key.get(key, ())) for key in keys),
-        remarks=tuple(f"{name} belongs to no task and sample: not read." for name in strangers),
+        remarks=_remarks_on(strangers),
     )
 
 
@@ -104,10 +107,10 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
     """What each file says; a process reads them in order, and the next where it ended.
 
     Raises:
-        InvalidDocument: Too many end their process.
+        InvalidDocument: Too many end their process, or they hold too many agents together.
     """
     found: dict[str, FileContent] = {}
-    deaths = 0
+    deaths = agents = 0
     while rest := names[len(found) :]:
         problem = "was not read"
         request = {"what": "read", "root": str(root), "files": list(rest), "told": str(told)}
@@ -120,6 +123,10 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
             problem = f"makes its reader fail: {str(fault).splitlines()[-1][:200]}"
         lines = told.read_bytes().split(b"\n")[:-1]
         contents = [_content_in(line) for line in lines]
+        agents += sum(map(_count_agents, contents))
+        if agents > MOST_TOGETHER:
+            text = f"more than {MOST_TOGETHER} agents in all files together"
+            raise InvalidDocument("submission", [("", text)])
         if not contents:  # it died over the first, which had all of its limits for itself
             contents = [FileContent(problem=problem)]
             deaths += 1
@@ -128,6 +135,17 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
             raise InvalidDocument("submission", [("", f"{text} {rest[0]}: {problem}")])
         found.update(zip(rest, contents, strict=False))
     return found
+
+
+def _remarks_on(strangers: Sequence[str]) -> tuple[str, ...]:
+    said = [f"{name} belongs to no task and sample: not read." for name in strangers]
+    more = len(said) - MOST_REMARKS
+    return (*said[:MOST_REMARKS], *([f"{more} others belong to none either."] if more > 0 else []))
+
+
+def _count_agents(content: FileContent) -> int:
+    changed = content.modification.changed if content.modification else ()
+    return len(changed) + (len(content.scene.agents) if content.scene else 0)
 
 
 def _content_in(line: bytes) -> FileContent:

@@ -1,6 +1,7 @@
 """How much an instruction asks for, and which tasks are for practice."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,3 +80,18 @@ def test_what_is_alike_stays_together_also_by_way_of_a_third(seed: int) -> None:
     assert all(splits[f"t{n}"] is splits[f"t{n + 1}"] for n in range(1, 60, 3))
     assert splits["t0"] is splits["bridge"] is splits["t7"] is splits["t8"]
     assert splits["loose"] is Split.TEST
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_split_is_kept_in_later_benchmarks_and_the_test_wins(seed: int) -> None:
+    first = split_tasks(candidates(60), share=0.4, rng=np.random.default_rng(1))
+    later = [replace(task, earlier=first.get(task.name)) for task in candidates(63)]
+    splits = split_tasks(later, share=0.1, rng=np.random.default_rng(seed))
+    assert {name: splits[name] for name in first} == first
+    pair = [
+        SplitCandidate(name=name, stratum=EASY, type="x", shared=["z"], earlier=Split(name))
+        for name in ("practice", "test")
+    ]
+    assert set(split_tasks(pair, share=0.9, rng=np.random.default_rng(seed)).values()) == {
+        Split.TEST
+    }

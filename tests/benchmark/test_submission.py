@@ -12,6 +12,7 @@ import pytest
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
+from augment.benchmark import submission
 from augment.benchmark.folder import checksum, read_folder
 from augment.benchmark.report import report_to_document
 from augment.benchmark.submission import check_submission
@@ -149,3 +150,18 @@ def test_practice_tasks_that_were_not_read_miss_all_of_the_reference(folder: Pat
     found = entries(folder)["near--1"].displacement
     assert found is not None
     assert (found.matches, found.missing) == ((), ("Agent12", "Agent13"))
+
+
+def test_a_submission_holds_so_many_agents_together_and_gets_so_many_remarks(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("near.json", "far.json", *(f"stray-{n}.json" for n in range(102))):
+        write(folder, name, modification_to_document(CONE))
+    remarks = check_submission(STREETS, folder, checksum="ab" * 32).remarks
+    assert remarks[99:] == (
+        "stray-97.json belongs to no task and sample: not read.",
+        "2 others belong to none either.",
+    )
+    monkeypatch.setattr(submission, "MOST_TOGETHER", 1)
+    with pytest.raises(InvalidDocument, match="more than 1 agents in all files together"):
+        check_submission(STREETS, folder, checksum="ab" * 32)

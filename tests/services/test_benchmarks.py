@@ -57,6 +57,7 @@ def test_a_benchmark_is_made_again_as_its_next_version(streets: list[Scenario]) 
     found = benchmark_set(first)
     assert [task.reference is None for task in found.tasks] == [False] * 5
     second = make_benchmark(asked("street-1"))
+    assert second.items.get().split == first.items.get(position=1).split
     assert [str(first), str(second)] == ["streets@1", "streets@2"]
     assert first.checksum != second.checksum
     assert Event.objects.filter(verb="make", object_kind="benchmark").count() == 2

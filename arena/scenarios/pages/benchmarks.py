@@ -19,6 +19,7 @@ from arena.scenarios.queries import count_tasks, list_benchmarks
 from arena.site.access import ADMIN, BENCHMARK_READERS, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import RequestForm
+from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services.events import retire
 from augment.services.inputs import inputs_of, read_request
@@ -80,7 +81,7 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "items": items,
         "counts": count_tasks((one.split, one.stratum) for one in items),
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
-        "file": row.files.order_by("pk").last(),
+        "file": _file_of(row),
         "is_staff": role_of(request.user) in STAFF,
     }
     return render(request, "benchmarks/benchmark.html", context)
@@ -90,8 +91,18 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def write_zip(request: HttpRequest, code: uuid.UUID) -> None:
     """Leave the folder to a worker; twice does no harm."""
     with transaction.atomic():
-        _ask_for_zip(request, get_object_or_404(Benchmark, code=code))
+        row = get_object_or_404(Benchmark, code=code)
+        file = _file_of(row)
+        if file is not None and file.state == BenchmarkFile.State.READY:
+            raise Conflict("The folder is written already.")
+        _ask_for_zip(request, row)
         messages.success(request, "A worker writes the folder; it is offered here when ready.")
+
+
+def _file_of(row: Benchmark) -> BenchmarkFile | None:
+    """Return the newest zip that is ready, else the newest."""
+    files = row.files.order_by("-pk")
+    return files.filter(state=BenchmarkFile.State.READY).first() or files.first()
 
 
 def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:

@@ -5,7 +5,7 @@ of them stays; rows that changed nevertheless no longer fit its checksum, and wh
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,8 +13,9 @@ from uuid import UUID
 
 import numpy as np
 from django.contrib.auth.models import User
-from django.db import transaction
+from django.db import IntegrityError, transaction
 from django.db.models import Max, prefetch_related_objects
+from django.db.models.functions import Coalesce
 from django.utils import timezone
 
 from augment.benchmark.folder import MOST_TASKS, checksum
@@ -86,8 +87,11 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
         row.slug: measure_task(scenes.intent_of(row), scenes.reference_of(row)) for row in rows
     }
     strata = choose_strata(sizes)
+    family = Coalesce("scenario__paraphrase_of", "scenario")
+    past = BenchmarkItem.objects.annotate(family=family).order_by("split")  # the test last
+    earlier = {pk: Split(split) for pk, split in past.values_list("family", "split")}
     splits = split_tasks(
-        [_candidate(row, strata[row.slug]) for row in rows],
+        [_candidate(row, strata[row.slug], earlier) for row in rows],
         share=request.practice / 100.0,
         rng=np.random.default_rng(request.seed),
     )
@@ -99,7 +103,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
     ]
 
 
-def _candidate(row: Scenario, stratum: Stratum) -> SplitCandidate:
+def _candidate(row: Scenario, stratum: Stratum, earlier: Mapping[int, Split]) -> SplitCandidate:
     """Return a scenario with all that would give its reference away if another one were known."""
     shared = [f"original {row.paraphrase_of_id or row.pk}"]
     if row.intent is not None:
@@ -113,6 +117,7 @@ def _candidate(row: Scenario, stratum: Stratum) -> SplitCandidate:
         type=row.type,
         shared=shared,
         has_reference=reference is not None,
+        earlier=earlier.get(row.paraphrase_of_id or row.pk),
     )
 
 
@@ -123,7 +128,7 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
     Raises:
         UnknownName: There is no such scenario or set.
         InvalidDocument: Name, title or a number break their rules.
-        Conflict: There are no scenarios, or too many.
+        Conflict: There are no scenarios, or too many, or somebody else makes the same version.
     """
     scenes.check_slug(request.slug, what="benchmark")
     title = one_line("title", request.title, what="benchmark")
@@ -141,7 +146,11 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
         made_by=actor,
     )
     row.checksum = checksum(_set_of(row, planned))
-    row.save()
+    try:
+        with transaction.atomic():
+            row.save()
+    except IntegrityError:
+        raise Conflict(f"Somebody else has just made {row}; do it again for the next.") from None
     for item in planned:
         item.benchmark = row
     BenchmarkItem.objects.bulk_create(planned)

@@ -133,6 +133,8 @@ def open_file(row: SentFile) -> Iterator[Path]:
     Raises:
         Conflict: The file was removed.
     """
+    if not row.stored:
+        raise Conflict(f"The file of “{row.name}” was removed.")
     with tempfile.TemporaryDirectory(prefix="arena-upload-") as folder:
         path = Path(folder) / row.name
         try:
