@@ -122,6 +122,25 @@ def test_every_pair_of_a_batch_has_a_newcomer_and_old_answers_are_shown_again(
     assert rules_of(batch).challengers == ("dot", "eli")
 
 
+def test_a_later_batch_shows_old_answers_even_where_a_newcomers_job_has_others(
+    board: Board,
+) -> None:
+    published(board, 1)
+    rated_by = set(Augmentation.objects.values_list("pk", flat=True))
+    dot = newcomer("dot")
+    for row in dot.augmentations.all():  # in the job of the newcomer, ann was asked anew
+        again = picture(row.scenario, Contestant.objects.get(slug="ann"))
+        Augmentation.objects.filter(pk=again.pk).update(job=row.job)
+    voted(a_batch(board, "dot"), seed=2)
+    published(board, 2)
+    newcomer("eli")
+    batch = a_batch(board, "eli")
+    shown = Matchup.objects.filter(study=batch).values_list("left", "right")
+    of_ann = Augmentation.objects.filter(contestant__slug="ann", pk__in={*sum(shown, ())})
+    assert of_ann.exists()
+    assert set(of_ann.values_list("pk", flat=True)) <= rated_by
+
+
 def test_what_cannot_be_pooled_is_refused(board: Board) -> None:
     newcomer("dot")
     with pytest.raises(Conflict, match="first table"):

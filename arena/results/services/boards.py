@@ -66,6 +66,12 @@ def make_board(
         raise Conflict(f"There is a board named '{name}' already.") from None
     board.studies.add(study)
     require_poolable(board, but_open=True)
+    # Asked once: a benchmark may be retired, and its scenarios changed, while the board goes on.
+    if benchmark is not None and _scenarios_of(study) != _test_split(benchmark):
+        raise Conflict(
+            f"'{study.name}' does not show just the scenarios and instructions of the test split "
+            f"of {benchmark}: its votes can't be rated on this board."
+        )
     log_change(board, "make", actor, after={"name": name, "study": str(study.code)})
     return board
 
@@ -145,16 +151,14 @@ def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
     if not studies:
         raise Conflict("All studies of the board were cancelled: nothing can be rated.")
     first = studies[0]
-    wanted, whose = _scenarios_of(first), f"'{first.name}'"
-    if board.benchmark is not None:
-        wanted, whose = _test_split(board.benchmark), f"the test split of {board.benchmark}"
+    wanted = _scenarios_of(first)
     for study in studies:
         if study.state == Study.State.OPEN and not but_open:
             raise StudyStillOpen(study.name)
         if _scenarios_of(study) != wanted:
             raise Conflict(
-                f"'{study.name}' does not show just the scenarios and instructions of {whose}: "
-                "its votes can't be rated on this board."
+                f"'{study.name}' does not show just the scenarios and instructions of "
+                f"'{first.name}': its votes can't be rated on this board."
             )
         if study.questions[0] != first.questions[0]:
             raise Conflict(

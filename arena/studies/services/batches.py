@@ -4,6 +4,7 @@ A batch is a study like every other. Its pairs are chosen by its seed before any
 each has a new contestant; the opponents are spread over the newest table.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from django.contrib.auth.models import User
@@ -80,7 +81,11 @@ def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) 
         hypotheses=(),
         jobs=tuple(dict.fromkeys(job for plan in plans for job in plan.jobs)),
     )
-    study = open_study(study_plan, challengers=asked.newcomers, actor=actor)
+    jobs_of: dict[str, Sequence[str]] = {}
+    for plan in plans:
+        for slug in plan.contestants:
+            jobs_of.setdefault(slug, plan.jobs)
+    study = open_study(study_plan, challengers=asked.newcomers, jobs_of=jobs_of, actor=actor)
     board.studies.add(study)
     require_poolable(board, but_open=True)
     log_change(board, "open batch", actor, after={"study": str(study.code)})

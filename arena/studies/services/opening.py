@@ -7,7 +7,7 @@ in the order of their names. Its SHA-256 stands in every export of the study.
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -57,7 +57,11 @@ _ELSEWHERE = frozenset({"entries", "experts", "hypotheses", "stopping", "jobs", 
 
 @transaction.atomic
 def open_study(
-    study_plan: StudyPlan, *, challengers: Sequence[str] = (), actor: User | None = None
+    study_plan: StudyPlan,
+    *,
+    challengers: Sequence[str] = (),
+    jobs_of: Mapping[str, Sequence[str]] | None = None,
+    actor: User | None = None,
 ) -> Study:
     """Plan all matchups of a new study and open it.
 
@@ -65,6 +69,7 @@ def open_study(
         study_plan: Who takes part, and by which rules; the same ones give the same plan.
         challengers: Contestants of whom every pair has one, whatever job their pictures are of;
             none for all pairs.
+        jobs_of: By contestant the codes of the jobs whose pictures count, where not all do.
         actor: Who opens it, for the log.
 
     Raises:
@@ -91,6 +96,7 @@ def open_study(
         rule=study_plan.samples,
         jobs=[find_job(job) for job in study_plan.jobs],
         challengers=challengers,
+        jobs_of=jobs_of or {},
     )
     rules, broken, alike_shown = _rules(
         study_plan, shown.cells, scenarios, experts, tuple(sorted(challengers))

@@ -3,9 +3,10 @@
 import hashlib
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Any
 
 from django.db.models import F, Min, Q
@@ -171,6 +172,7 @@ def choose_pictures(
     rule: SampleRule = SampleRule.ONE,
     jobs: Sequence[GenerationJob] = (),
     challengers: Sequence[str] = (),
+    jobs_of: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> StudyPictures:
     """Return the augmentation that finished last of each scenario, contestant and sample shown.
 
@@ -181,6 +183,7 @@ def choose_pictures(
         rule: Which samples are shown.
         jobs: Whose augmentations count; none for those of every job.
         challengers: Slugs of contestants whose augmentations count whatever their job.
+        jobs_of: By slug of other contestants the codes of the only jobs that count.
 
     Raises:
         NothingToPlan: Pictures are missing; the text names them.
@@ -189,6 +192,8 @@ def choose_pictures(
     rows = find_showable(scenarios).filter(contestant__in=contestants)
     if jobs:
         rows = rows.filter(Q(job__in=jobs) | Q(contestant__slug__in=challengers))
+    for slug, codes in jobs_of.items():
+        rows = rows.exclude(Q(contestant__slug=slug) & ~Q(job__code__in=codes))
     rows = rows.select_related("scenario", "contestant", "job")
     latest: Latest = defaultdict(dict)
     for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
