@@ -15,7 +15,7 @@ from arena.results.services.ratings import rate_now
 from arena.studies.services.opening import close_study
 from augment import tasks
 from augment.fake_llm.server import running
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun, Submission
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.running.judge_runs import JUDGEMENTS
@@ -167,8 +167,7 @@ def test_preferences_come_with_and_without_the_judges_own_family(
 
 def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:
     asking = Contestant(model="gpt-4o", roles={"viewer": {"endpoint": "e", "model": "gemini"}})
-    sent = Contestant(kind="submission")
-    Submission(contestant=sent, summary={"card": {"models": ["Llama 3.1"]}})
+    sent = Contestant(kind="submission", card={"models": ["Llama 3.1"]})
     assert [models_of(row) for row in (asking, sent, Contestant())] == [
         *(["gpt-4o", "gemini"], ["Llama 3.1"], [])
     ]
