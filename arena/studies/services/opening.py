@@ -80,11 +80,7 @@ def open_study(
         NothingToPlan: A target or hypothesis can't be read; pictures, drives or checks are
             missing.
     """
-    name = one_line("name", study_plan.name, what="study")
-    if Study.objects.filter(name=name).exists():
-        raise Conflict(f"There is a study named '{name}' already.")
-    check_seed(study_plan.seed)
-    check_questions(study_plan.questions or one_question())
+    name = _check_new(study_plan)
     contestants, scenarios = _contestants(study_plan), _scenarios(study_plan)
     accounts = {user.username: user for user in expert_accounts()}
     experts = find_named("expert", study_plan.experts, accounts)
@@ -119,6 +115,16 @@ def open_study(
     after = {"name": study.name, "matchups": len(planned.matchups), "seed": study.seed}
     log_change(study, "open", actor, after=after)
     return study
+
+
+def _check_new(study_plan: StudyPlan) -> str:
+    """Return the name of a study that is not there yet, with a seed and questions that can be."""
+    name = one_line("name", study_plan.name, what="study")
+    if Study.objects.filter(name=name).exists():
+        raise Conflict(f"There is a study named '{name}' already.")
+    check_seed(study_plan.seed)
+    check_questions(study_plan.questions or one_question())
+    return name
 
 
 def check_seed(seed: int) -> None:
