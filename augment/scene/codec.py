@@ -14,12 +14,19 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 
-from augment.scene.entities import AgentType, Modification, ScenarioType, Scene, TurnType
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    TurnType,
+)
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
+from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path
 
-EGO_ID = "Agent1"
 ENGLISH = "en"
 _ALWAYS_WRITTEN = ("requests", "kind", "body")
 
@@ -39,6 +46,7 @@ def _scene_problems(scene: Scene) -> Iterator[Problem]:
         named += [(path(key, i, "id"), one.id) for i, one in enumerate(getattr(scene, key))]
     yield from _doubled(named)
     yield from _second_egos(agents=scene.agents)
+    yield from _motion_problems(agents=scene.agents)
     yield from _reference_problems(scene)
     for index, area in enumerate(scene.areas):
         if len(set(area.boundary_m)) < 3:
@@ -54,6 +62,7 @@ def _modification_problems(change: Modification) -> Iterator[Problem]:
     named += [(path("remove", i), name) for i, name in enumerate(change.removed)]
     yield from _doubled(named)
     yield from _second_egos(add=change.added, move=change.moved)
+    yield from _motion_problems(add=change.added, move=change.moved)
 
 
 def _doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
@@ -69,6 +78,13 @@ def _second_egos(**agents: Iterable[Any]) -> Iterator[Problem]:
         for index, agent in enumerate(listed):
             if agent.type is AgentType.EGO_VEHICLE:
                 yield path(key, index, "type"), "there is one ego, and it is not in this list"
+
+
+def _motion_problems(**agents: Iterable[TrafficAgent]) -> Iterator[Problem]:
+    for key, listed in agents.items():
+        for index, agent in enumerate(listed):
+            if agent.motion is not None and agent.walk_to_m is not None:
+                yield path(key, index, "motion"), "an agent has a walk or a motion, not both"
 
 
 def _reference_problems(scene: Scene) -> Iterator[Problem]:

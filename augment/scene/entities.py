@@ -14,6 +14,7 @@ from pydantic import Field
 
 from augment.errors import InvalidModification
 from augment.geometry.frames import Box, Pose
+from augment.scene.planned_motion import PlannedMotion
 from augment.scene.schema import (
     CLOSED,
     Heading,
@@ -105,6 +106,7 @@ class TrafficAgent:
         speed_mps: Along the heading, 0 for what stands.
         lane_id: The lane or connector under the centre, None off every lane.
         walk_to_m: Where a pedestrian's walk ends (interPlan's end point), None without a walk.
+        motion: What it is made to do after t0; None to go on by itself. Never beside a walk.
     """
 
     id: Id
@@ -117,6 +119,7 @@ class TrafficAgent:
     speed_mps: Speed = 0.0
     lane_id: Id | None = None
     walk_to_m: PointPair | None = None
+    motion: PlannedMotion | None = None
 
     @property
     def pose(self) -> Pose:

@@ -4,7 +4,7 @@ Frame: ego frame of t0. T steps.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.frames import wrap
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_mover import HeldCourse, PlannedMover
 from augment.scene.recording import Recording, agent_of
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +35,7 @@ class MotionSource(StrEnum):
     WALK = "walk"
     HELD_SPEED = "held speed"
     STANDING = "standing"
+    PLANNED = "planned"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,11 +45,13 @@ class Movement:
     Attributes:
         agent: As it is at t0, or where it is first seen.
         states: (T, 4): x_m, y_m, heading_rad, speed_mps of the box centre; NaN where it is not.
+        started_s: When a planned motion set out, None where it never does or there is none.
     """
 
     agent: TrafficAgent
     source: MotionSource
     states: FloatArray
+    started_s: float | None = None
 
     @property
     def is_present(self) -> NDArray[np.bool_]:
@@ -89,7 +92,8 @@ def motion_of(
 ) -> Motion:
     """What is known of the scene's agents after t0, and what has to be assumed.
 
-    Who was recorded does what was recorded; who has a walk goes it; who moves otherwise holds the
+    Who has a planned motion carries it out; who was recorded does what was recorded; who has a
+    walk goes it; who moves otherwise holds the
     speed of t0 along its lane, or straight on where there is none; all others stand. The ego is
     there at every step: where its recording has a gap it goes straight across, and after the last
     step that was recorded it goes on like someone who was not.
@@ -107,22 +111,54 @@ def motion_of(
     graph = LaneGraph(scene)
     ego = _ego_movement(scene.ego, recording, times_s, graph)
     tracks = {} if recording is None else {track.agent_id: track for track in recording.tracks}
-    others = []
+    others: dict[str, Movement] = {}
     for agent in scene.agents:
         track = tracks.get(agent.id)
         if agent.walk_to_m is not None:
-            others.append(_walk(agent, times_s, ego))
+            others[agent.id] = _walk(agent, times_s, ego)
         elif recording is not None and track is not None and agent.id not in replaced:
-            others.append(_recorded(agent, track.states, recording, times_s))
+            others[agent.id] = _recorded(agent, track.states, recording, times_s)
         else:
-            others.append(_assumed(agent, times_s, graph))
+            others[agent.id] = _assumed(agent, times_s, graph)
     if recording is not None and with_later:
         taken = {agent.id for agent in scene.everyone}
-        others += _later(recording, times_s, taken, replaced)
-    return Motion(times_s=times_s, ego=ego, others=tuple(others))
+        others |= {one.agent.id: one for one in _later(recording, times_s, taken, replaced)}
+    others |= _planned(scene, times_s, graph, {ego.agent.id: ego} | others)
+    return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
 
 
 # Private
+
+
+def _planned(
+    scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
+) -> dict[str, Movement]:
+    """Those with a motion of their own, who watch everybody for their triggers."""
+    movers = [
+        PlannedMover(agent, graph, ego_id=scene.ego.id)
+        for agent in scene.agents
+        if agent.motion is not None
+    ]
+    if not movers:
+        return {}
+    rows: dict[str, list[FloatArray]] = {mover.agent.id: [] for mover in movers}
+    for step, time_s in enumerate(times_s.tolist()):
+        places = {name: one.states[step, :2].tolist() for name, one in moves.items()}
+        for mover in movers:
+            mover.advance(time_s)
+            places[mover.agent.id] = mover.state()[:2].tolist()
+        for mover in movers:
+            mover.react(places)
+            rows[mover.agent.id].append(mover.state())
+    return {
+        mover.agent.id: Movement(
+            agent=mover.agent,
+            source=MotionSource.PLANNED,
+            states=np.array(rows[mover.agent.id]),
+            started_s=mover.started_s,
+        )
+        for mover in movers
+    }
 
 
 def _ego_movement(
@@ -224,22 +260,13 @@ def _assumed(
     states = np.tile(_state(agent), (len(times_s), 1))
     if agent.speed_mps <= 0.0:
         return Movement(agent=agent, source=MotionSource.STANDING, states=states)
-    driven_m = times_s * agent.speed_mps
-    if agent.type is AgentType.PEDESTRIAN or agent.lane_id not in graph.lanes:
-        states[:, 0] += driven_m * math.cos(agent.heading_rad)
-        states[:, 1] += driven_m * math.sin(agent.heading_rad)
-        return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
-    assert agent.lane_id is not None
-    line = graph.lane(agent.lane_id).centerline
-    here = line.project(agent.x_m, agent.y_m)
-    askew = wrap(agent.heading_rad - line.heading_at(here.s_m))
+    course = HeldCourse(agent, graph)
     for step in range(1, len(times_s)):
-        place = graph.along(agent.lane_id, here.s_m, float(driven_m[step]), here.d_m)
-        if place is None:
+        pose = course.pose_at(float(times_s[step]) * agent.speed_mps)
+        if pose is None:
             states[step:] = [*states[step - 1, :3], 0.0] if stays else np.nan
             break
-        heading = wrap(place.pose.heading_rad + askew)
-        states[step, :3] = place.pose.x_m, place.pose.y_m, heading
+        states[step, :3] = pose
     return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
 
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.planned_mover import PlannedMover
 from augment.scene.recording import Recording, Track, agent_of
 from augment.simulation import shapes
 from augment.simulation.path import Path
@@ -175,6 +176,30 @@ class StraightOn:
         self._objects = replace(self._objects, boxes=self._objects.later(np.array(STEP_S)))
 
 
+class PlannedMovers:
+    """Agents with a motion, who react to nobody but for their triggers."""
+
+    def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
+        self._base, self._step = objects_of(agents), 0
+        self._movers = [PlannedMover(agent, road.graph, ego_id=EGO_ID) for agent in agents]
+
+    def objects(self) -> Objects:
+        """Return those who are still on the map."""
+        states = np.array([mover.state() for mover in self._movers]).reshape(-1, 4)
+        boxes = np.column_stack([states[:, :3], self._base.boxes[:, 3:]])
+        now = replace(self._base, boxes=boxes, speeds_mps=states[:, 3])
+        return now.chosen(~np.isnan(states[:, 0]))
+
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
+        """Let those set out whose trigger fires, and go one step on."""
+        centres: list[list[float]] = everybody.boxes[:, :2].tolist()
+        places = {name: (x, y) for name, (x, y) in zip(everybody.ids, centres, strict=True)}
+        self._step += 1
+        for mover in self._movers:
+            mover.react(places)
+            mover.advance(self._step * STEP_S)
+
+
 class LaneDrivers:
     """D drivers who follow the lanes under them by the IDM.
 
@@ -324,9 +349,9 @@ class Traffic:
     """All objects of one drive.
 
     Who has a walk walks; what stands stays; a recorded agent is replayed, unless the drive is
-    reactive and it is a vehicle that moves on a lane; who moves on a lane otherwise follows it by
-    the IDM; anybody else who moves goes straight on. Where the recording ends before the drive,
-    those who are replayed go on from there in the same ways.
+    reactive and it is a vehicle that moves on a lane; who has a motion carries it out; who moves
+    on a lane otherwise follows it by the IDM; anybody else who moves goes straight on. Where the
+    recording ends before the drive, those who are replayed go on from there in the same ways.
     """
 
     def __init__(self, setting: DriveSetting, road: Road, body: EgoBody, ego: FloatArray) -> None:
@@ -334,11 +359,14 @@ class Traffic:
         replayed = _replayed(setting, road)
         names = {track.agent_id for track in replayed}
         own = [agent for agent in setting.after.agents if agent.id not in names]
-        moving = [agent for agent in own if agent.walk_to_m is None]
+        plain = [agent for agent in own if agent.walk_to_m is None]
+        moving = [agent for agent in plain if agent.motion is None]
+        planned = [agent for agent in plain if agent.motion is not None]
         walking = [agent for agent in own if agent.walk_to_m is not None]
-        self._movers: list[StraightOn | LaneDrivers | Walkers | Replay] = [
+        self._movers: list[StraightOn | LaneDrivers | Walkers | PlannedMovers | Replay] = [
             *_set_moving(moving, road, ego_box),
             Walkers(walking, road.centreline, ego_box),
+            PlannedMovers(planned, road),
         ]
         self._replay = Replay(setting.recording, replayed) if setting.recording else None
         self._movers += [self._replay] if self._replay else []

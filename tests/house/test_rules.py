@@ -21,6 +21,7 @@ HEAVY = {
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
+    "scipy.interpolate": ("augment.scene",),
     "scipy.optimize": ("augment.benchmark", "augment.metrics", "arena.pairing"),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),

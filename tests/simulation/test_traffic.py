@@ -8,6 +8,8 @@ import pytest
 
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import LaneConnector, Modification, TrafficAgent, TrafficLight
+from augment.scene.motion import motion_of
+from augment.scene.planned_motion import NearEgo, PlannedMotion, PointPath
 from augment.scene.recording import Recording
 from augment.simulation.road import Road
 from augment.simulation.states import Objects, start_state
@@ -65,6 +67,20 @@ def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego() -> None:
     x, y = place(made[-1], "V")
     assert y == pytest.approx(0.0, abs=1e-6)
     assert -2.588 - 2.4 - 5.0 < x < -2.588 - 2.4
+
+
+def test_a_planned_motion_is_the_same_in_a_drive_as_without_one() -> None:
+    # Sets out where the ego is 30 m away, runs 8 m across at 2 m/s.
+    motion = PlannedMotion(
+        path=PointPath(points_m=((50.0, 4.0),)), speeds=((0.0, 2.0),), start=NearEgo(within_m=30.0)
+    )
+    runner = replace(pedestrian("P", 50.0, -4.0), motion=motion)
+    setting = with_agents(runner)
+    moves = motion_of(setting.after)
+    driven = after(setting, 80, ego_speed_mps=setting.scene.ego.speed_mps)
+    assert moves.others[0].started_s is not None
+    for step in range(0, 81, 10):
+        assert place(driven[step], "P") == pytest.approx(tuple(moves.others[0].states[step, :2]))
 
 
 def test_lane_drivers_stop_at_a_red_light() -> None:

@@ -1,0 +1,300 @@
+"""Carries a planned motion out, step by step: in `motion_of` and in drives alike.
+
+Frame: the scene's.
+"""
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from augment.errors import InvalidModification
+from augment.geometry.frames import difference, wrap
+from augment.geometry.polyline import FloatArray, Polyline
+from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, apply
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, LanePath, NearEgo, PointPath
+
+SAMPLE_M = 0.5
+REACH_M = 600.0
+"""So far paths over lanes are followed past the last lane that is named."""
+BESIDE_WITHIN_M = 8.0
+"""Between the centrelines of lanes that one can change between."""
+_ALONG_BELOW_RAD = math.radians(60.0)
+
+Places = Mapping[str, Point]
+"""Centres of those who are there, by id; the ego is among them under the scene's id for it."""
+
+
+class HeldCourse:
+    """On at the same offset along the lane and what follows it, or straight on without a lane."""
+
+    def __init__(self, agent: TrafficAgent, graph: LaneGraph) -> None:
+        self._agent, self._graph = agent, graph
+        self._lane_id = None if agent.type is AgentType.PEDESTRIAN else agent.lane_id
+        if self._lane_id in graph.lanes:
+            assert self._lane_id is not None
+            line = graph.lane(self._lane_id).centerline
+            self._here = line.project(agent.x_m, agent.y_m)
+            self._askew = wrap(agent.heading_rad - line.heading_at(self._here.s_m))
+        else:
+            self._lane_id = None
+
+    def pose_at(self, gone_m: float) -> tuple[float, float, float] | None:
+        """Return x, y and heading after so many metres, None past the map."""
+        agent = self._agent
+        if gone_m <= 0.0:
+            return agent.x_m, agent.y_m, agent.heading_rad
+        if self._lane_id is None:
+            east, north = math.cos(agent.heading_rad), math.sin(agent.heading_rad)
+            return agent.x_m + gone_m * east, agent.y_m + gone_m * north, agent.heading_rad
+        place = self._graph.along(self._lane_id, self._here.s_m, gone_m, self._here.d_m)
+        if place is None:
+            return None
+        return place.pose.x_m, place.pose.y_m, wrap(place.pose.heading_rad + self._askew)
+
+
+class PlannedMover:
+    """One agent with a motion, from t0 on: at each step `advance`, then `react`.
+
+    Args:
+        agent: With a motion.
+        graph: Of its scene.
+        ego_id: How the ego is called among the places.
+
+    Raises:
+        InvalidModification: Its path leads over lanes that don't follow each other.
+
+    Attributes:
+        started_s: When it set out, None until then.
+    """
+
+    def __init__(self, agent: TrafficAgent, graph: LaneGraph, *, ego_id: str = EGO_ID) -> None:
+        assert agent.motion is not None
+        if isinstance(agent.motion.path, LanePath):
+            check_lane_path(graph, agent.motion.path)
+        self.agent, self._motion, self._graph, self._ego_id = agent, agent.motion, graph, ego_id
+        self._held = HeldCourse(agent, graph)
+        self._line: Polyline | None = None
+        self.started_s: float | None = None
+        self.advance(0.0)
+
+    def state(self) -> FloatArray:
+        """Return x, y, heading and speed (4,) now; NaN past the map."""
+        own_mps, speeds = self.agent.speed_mps, self._motion.speeds
+        if self.started_s is None:
+            return _row(self._held.pose_at(own_mps * self._time_s), own_mps)
+        since_s = self._time_s - self.started_s
+        gone_m, speed_mps = (
+            travelled_m(speeds, own_mps, since_s),
+            speed_at(speeds, own_mps, since_s),
+        )
+        if self._line is None:
+            return _row(self._held.pose_at(own_mps * self.started_s + gone_m), speed_mps)
+        if gone_m >= self._line.length_m:
+            if isinstance(self._motion.path, LanePath):
+                return np.full(4, np.nan)
+            gone_m, speed_mps = self._line.length_m, 0.0
+        pose = self._line.pose_at(gone_m)
+        keeps_heading = (
+            isinstance(self._motion.path, PointPath) and self._motion.path.keeps_heading
+        )
+        heading_rad = self.agent.heading_rad if keeps_heading else pose.heading_rad
+        return _row((pose.x_m, pose.y_m, heading_rad), speed_mps)
+
+    def advance(self, time_s: float) -> None:
+        """Go on to a moment; a trigger by time fires on the way."""
+        self._time_s = time_s
+        trigger = self._motion.start
+        if isinstance(trigger, AtTime) and time_s >= trigger.after_s:
+            self._start(trigger.after_s)
+
+    def react(self, places: Places) -> None:
+        """Set out if the trigger fires, given where everybody is at this moment."""
+        match self._motion.start:
+            case AtTime():
+                return
+            case NearEgo(within_m=within_m):
+                who, place = self._ego_id, tuple(self.state()[:2].tolist())
+            case AtPlace(agent_id=agent_id, x_m=x_m, y_m=y_m, within_m=within_m):
+                who, place = (self._ego_id if agent_id == EGO_ID else agent_id), (x_m, y_m)
+        if who in places and math.dist(places[who], place) <= within_m:
+            self._start(self._time_s)
+
+    def _start(self, at_s: float) -> None:
+        if self.started_s is not None:
+            return
+        self.started_s, path = at_s, self._motion.path
+        here = self._held.pose_at(self.agent.speed_mps * at_s)
+        if here is not None and isinstance(path, PointPath):
+            self._line = smooth_line([here[:2], *path.points_m])
+        elif here is not None and isinstance(path, LanePath):
+            self._line = lane_line(self._graph, path, here[:2])
+
+
+def speed_at(speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float) -> float:
+    """Return the speed so long after the start."""
+    times_s, values_mps = _profile(speeds, own_mps)
+    return float(np.interp(since_s, times_s, values_mps))
+
+
+def travelled_m(speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float) -> float:
+    """Return the way so long after the start: the area under the speeds."""
+    times_s, values_mps = _profile(speeds, own_mps)
+    inner = times_s[times_s < since_s]
+    moments_s = np.append(inner, since_s)
+    return float(np.trapezoid(np.interp(moments_s, times_s, values_mps), moments_s))
+
+
+def smooth_line(points_m: list[Point]) -> Polyline | None:
+    """Return a line through points without corners or overshoot, None for points in one place.
+
+    Each coordinate is a monotone cubic (PCHIP) over the length of the chords.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    points = np.array(points_m)
+    steps_m = np.hypot(*np.diff(points, axis=0).T)
+    points = points[np.concatenate([[True], steps_m > 1e-6])]
+    if len(points) < 2:
+        return None
+    if len(points) == 2:
+        return Polyline(points)
+    chords_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    samples_m = np.linspace(0.0, chords_m[-1], max(3, math.ceil(chords_m[-1] / SAMPLE_M) + 1))
+    return Polyline(PchipInterpolator(chords_m, points)(samples_m))
+
+
+def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
+    """Return the line that a path over lanes takes from a place on its first lane.
+
+    It keeps its offset from the centreline until it changes lanes; a change ends in the centre.
+
+    Raises:
+        InvalidModification: A lane is unknown, or neither follows nor runs beside the one before.
+    """
+    check_lane_path(graph, path)
+    runs = _runs_of(graph, path.lane_ids)
+    line, last_begins_m = _followed(graph, runs[0])
+    at = line.project(*here)
+    at_m, d_m, points = at.s_m, at.d_m, [here]
+    for run in runs[1:]:
+        begins_m = max(at_m, last_begins_m)
+        points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
+        target, last_begins_m = _followed(graph, run)
+        for s_m in _samples(begins_m, begins_m + path.change_m):
+            share = _smooth_share((s_m - begins_m) / path.change_m)
+            start = line.position(s_m, d_m)
+            end = target.position(target.project(*start).s_m)
+            points.append(_between(start, end, share))
+        line, d_m = target, 0.0
+        at_m = target.project(*points[-1]).s_m
+    points += [line.position(s_m, d_m) for s_m in _samples(at_m, line.length_m)]
+    return Polyline(points)
+
+
+def check_motions(scene: Scene, modification: Modification) -> None:
+    """Do nothing where every motion of a modification can be carried out in its scene.
+
+    Raises:
+        InvalidModification: A path leads over lanes that don't follow each other, or a trigger
+            waits for nobody's arrival.
+    """
+    motions = [(one, one.motion) for one in modification.changed if one.motion is not None]
+    if not motions:
+        return
+    graph, names = LaneGraph(scene), {one.id for one in apply(scene, modification).everyone}
+    for agent, motion in motions:
+        try:
+            if isinstance(motion.path, LanePath):
+                check_lane_path(graph, motion.path)
+        except InvalidModification as fault:
+            raise InvalidModification(f"{agent.id}: {fault}") from None
+        start = motion.start
+        if isinstance(start, AtPlace) and start.agent_id not in names - {agent.id}:
+            raise InvalidModification(
+                f"{agent.id}: it waits for {start.agent_id}, who is none of "
+                f"{', '.join(sorted(names - {agent.id}))}"
+            )
+
+
+def check_lane_path(graph: LaneGraph, path: LanePath) -> None:
+    """Do nothing where the lanes can be followed one after the other.
+
+    Raises:
+        InvalidModification: One is unknown, or neither follows nor runs beside the one before.
+    """
+    for name in path.lane_ids:
+        if name not in graph.lanes:
+            allowed = ", ".join(sorted(graph.lanes)) or "none"
+            raise InvalidModification(f"{name} is no lane of the scene; its lanes: {allowed}")
+    for before, after in pairwise(path.lane_ids):
+        if after not in graph.successors(before) and not _run_beside(graph, before, after):
+            raise InvalidModification(
+                f"a path over lanes: {after} neither follows {before} nor runs beside it"
+            )
+
+
+# Private
+
+
+def _row(pose: tuple[float, float, float] | None, speed_mps: float) -> FloatArray:
+    return np.full(4, np.nan) if pose is None else np.array([*pose, speed_mps])
+
+
+def _profile(
+    speeds: tuple[tuple[float, float], ...], own_mps: float
+) -> tuple[FloatArray, FloatArray]:
+    """Times and speeds (N,) from the start on."""
+    rows = speeds if speeds and speeds[0][0] == 0.0 else ((0.0, own_mps), *speeds)
+    times_s, values_mps = np.array(rows, dtype=np.float64).T
+    return times_s, values_mps
+
+
+def _runs_of(graph: LaneGraph, lane_ids: tuple[str, ...]) -> list[list[str]]:
+    """Lanes that follow each other, one list for each lane change more."""
+    runs = [[lane_ids[0]]]
+    for before, after in pairwise(lane_ids):
+        if after in graph.successors(before):
+            runs[-1].append(after)
+        else:
+            runs.append([after])
+    return runs
+
+
+def _followed(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
+    """The line over lanes and what follows the last straightest; where that last one begins."""
+    lines = [graph.lane(name).centerline for name in run]
+    last_begins_m = sum(line.length_m for line in lines[:-1])
+    lines += [graph.lane(name).centerline for name in graph.route(run[-1], REACH_M)[1:]]
+    return Polyline(np.vstack([line.points_m for line in lines])), last_begins_m
+
+
+def _run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
+    if other_id in graph.abreast(lane_id):
+        return other_id != lane_id
+    other = graph.lane(other_id).centerline
+    line = graph.lane(lane_id).centerline
+    for s_m in np.linspace(0.0, line.length_m, 20):
+        pose = line.pose_at(float(s_m))
+        place = other.project(pose.x_m, pose.y_m)
+        turn_rad = abs(difference(place.heading_rad, pose.heading_rad))
+        if place.distance_m <= BESIDE_WITHIN_M and turn_rad < _ALONG_BELOW_RAD:
+            return other_id != lane_id
+    return False
+
+
+def _samples(start_m: float, end_m: float) -> list[float]:
+    """Stations after the start up to the end."""
+    count = math.ceil((end_m - start_m) / SAMPLE_M - 1e-9)
+    return np.linspace(start_m, end_m, count + 1)[1:].tolist() if count > 0 else []
+
+
+def _smooth_share(share: float) -> float:
+    """From 0 to 1 without a jump in speed or acceleration across."""
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+
+def _between(start: Point, end: Point, share: float) -> Point:
+    return ((1.0 - share) * start[0] + share * end[0], (1.0 - share) * start[1] + share * end[1])
