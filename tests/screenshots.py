@@ -18,7 +18,7 @@ from typing import Literal
 
 import django
 from PIL import Image
-from playwright.sync_api import Browser, Error, Page
+from playwright.sync_api import Browser, Error, Page, TimeoutError
 
 from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.processes import ROOT
@@ -39,6 +39,8 @@ WIDTH, LEAST, MOST = 1280, 720, 1600
 QUALITIES = (50, 35, 20)
 LIGHT = 40_000
 """Bytes: the first quality that stays below, else the last one."""
+IDLE_MS = 10_000
+TRIES = 3
 VOTES_HERE = ("vote", "vote-practice", "vote-skipped")
 OPEN_HERE = ("study", "enrolment", "preregistration", "invite")
 
@@ -143,11 +145,22 @@ def _sessions() -> dict[str, str]:
 def _measure(pages: dict[str, Page], url: str, shot: Shot) -> list[int]:
     """Height and visible controls of a page on a desk; empty where it answers none."""
     page = pages[shot.who]
-    if not _open(page, url, shot):
-        return []
     page.set_viewport_size({"width": 1440, "height": 900})
-    page.wait_for_load_state("networkidle")
-    return [page.evaluate("document.documentElement.scrollHeight"), page.evaluate(CONTROLS)]
+    for attempt in range(1, TRIES + 1):
+        if not _open(page, url, shot):
+            return []
+        try:
+            page.wait_for_load_state("networkidle", timeout=IDLE_MS)
+        except TimeoutError:  # a page that asks again and again; it is measured as it stands
+            print(f"{shot.name}: still asking after {IDLE_MS / 1e3:g} s", file=sys.stderr)
+        try:
+            return [
+                page.evaluate("document.documentElement.scrollHeight"),
+                page.evaluate(CONTROLS),
+            ]
+        except Error as error:  # it showed itself anew meanwhile
+            print(f"{shot.name}, try {attempt}: {error.message}", file=sys.stderr)
+    raise RuntimeError(f"{shot.name} could not be measured in {TRIES} tries")
 
 
 def _open(page: Page, url: str, shot: Shot) -> bool:
