@@ -20,6 +20,7 @@ from augment.models.jobs import (
 from augment.models.judging import JudgeRun, PairJudgement
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
 from augment.models.submissions import Submission
+from augment.models.sweeps import Sweep, SweepValue
 from augment.models.work import (
     FAILED,
     AppendOnly,

@@ -10,6 +10,7 @@ from augment.llm.costs import usd_of
 from augment.models.budgets import Budgeted
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.scenes import Scenario
+from augment.models.sweeps import SweepValue
 from augment.models.work import Work, account_column
 
 
@@ -319,14 +320,15 @@ class TranscriptNote(models.Model):
 class Simulation(Work):
     """One closed-loop drive: scenario x what was changed x planner and its options.
 
-    The scene as it was and with its reference is driven once for all jobs; each augmentation has
-    drives of its own.
+    The scene as it was and with its reference is driven once for all jobs; each augmentation and
+    each value of a sweep has drives of its own.
     """
 
     class Subject(models.TextChoices):
         UNMODIFIED = "unmodified", "Unmodified scene"
         REFERENCE = "reference", "Reference"
         AUGMENTATION = "augmentation", "Augmentation"
+        SWEPT = "swept", "Value of a sweep"
 
     class State(models.TextChoices):
         QUEUED = "queued", "Waiting"
@@ -334,9 +336,15 @@ class Simulation(Work):
         DONE = "done", "Done"
         FAILED = "failed", "Failed"
 
+    OF_SCENES = Q(augmentation=None, swept=None)
+    """Drives of scenes as they were and with their references."""
+
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="simulations")
     augmentation = models.ForeignKey(
         Augmentation, null=True, blank=True, on_delete=models.CASCADE, related_name="simulations"
+    )
+    swept = models.ForeignKey(
+        SweepValue, null=True, blank=True, on_delete=models.CASCADE, related_name="drives"
     )
     subject = models.CharField(max_length=20, choices=Subject.choices)
     planner = models.CharField(max_length=120, help_text="pdm-closed, idm, or a dotted path")
@@ -363,13 +371,19 @@ class Simulation(Work):
             models.UniqueConstraint(
                 name="one_drive_of_a_scene",
                 fields=("scenario", "subject", "planner", "offsets", "is_reactive"),
-                condition=Q(augmentation=None),
+                condition=Q(augmentation=None, swept=None),
+            ),
+            models.UniqueConstraint(
+                name="one_drive_of_a_swept_value",
+                fields=("swept", "planner", "offsets", "is_reactive"),
+                condition=Q(swept__isnull=False),
             ),
             models.CheckConstraint(
-                name="drive_of_an_augmentation_names_it",
+                name="drive_names_its_subject",
                 condition=(
-                    Q(subject="augmentation", augmentation__isnull=False)
-                    | (~Q(subject="augmentation") & Q(augmentation=None))
+                    Q(subject="augmentation", augmentation__isnull=False, swept=None)
+                    | Q(subject="swept", augmentation=None, swept__isnull=False)
+                    | Q(subject__in=("unmodified", "reference"), augmentation=None, swept=None)
                 ),
             ),
             models.CheckConstraint(

@@ -145,7 +145,7 @@ _CHOSEN: dict[type[models.Model], Callable[[Closure], Q]] = {
     Simulation: lambda it: (
         (
             Q(augmentation__job__in=it.jobs)
-            | Q(augmentation=None, scenario__in=it.scenarios.values("pk"))
+            | (Simulation.OF_SCENES & Q(scenario__in=it.scenarios.values("pk")))
         )
         & ~Q(state__in=Simulation.UNDER_WAY)
     ),

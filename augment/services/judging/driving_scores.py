@@ -127,14 +127,15 @@ def scores_of_augmentations(
 ) -> DrivingScores:
     """Return the table of the augmentations with these keys, with their scenes."""
     scenarios = Scenario.objects.filter(augmentations__in=ids)
-    scenes = Q(augmentation=None, scenario__in=scenarios)
+    scenes = Simulation.OF_SCENES & Q(scenario__in=scenarios)
     results = NuplanResult.objects.filter(augmentation__in=ids, rules=score)
     return _scores(title, Q(augmentation__in=ids) | scenes, results, options, score)
 
 
 def drives_of_job(job: GenerationJob) -> Q:
     """Return a filter for its results, and its scenes before the change and as referred to."""
-    return Q(augmentation__job=job) | Q(augmentation=None, scenario__in=job.scenarios.all())
+    scenes = Simulation.OF_SCENES & Q(scenario__in=job.scenarios.all())
+    return Q(augmentation__job=job) | scenes
 
 
 def least_clearance_m(row: Simulation) -> float | None:

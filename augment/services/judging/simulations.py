@@ -14,6 +14,8 @@ from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import Modification
+from augment.services.clock import Moment
+from augment.services.judging.thresholds import conclude, conclude_all
 from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, expert_of, run
@@ -104,7 +106,7 @@ class Drives(WorkKind[Simulation]):
 
     model = Simulation
     lost_limit = 5
-    related = ("scenario__base_scene", "augmentation")
+    related = ("scenario__base_scene", "augmentation", "swept")
 
     def __init__(self, also: Collection[str] = ()) -> None:
         self._also = also
@@ -137,6 +139,15 @@ class Drives(WorkKind[Simulation]):
             "trace": zlib.compress(json.dumps(trace, separators=(",", ":")).encode(), 6),
         }
         return Settlement(state=State.DONE, columns=columns)
+
+    def over(self, row: Simulation, outcome: Settlement | None) -> None:
+        """Conclude the sweep of which this was the last drive."""
+        if row.swept is not None:
+            conclude(row.swept.sweep_id)
+
+    def tidy(self, now: Moment) -> None:
+        """Conclude the sweeps whose workers died before they could."""
+        conclude_all()
 
 
 DRIVES = Drives()
@@ -201,10 +212,11 @@ def _plan(
 def _setting_of(row: Simulation) -> DriveSetting:
     """Return what a row drives; without a modification the scene stays as it was."""
     scenario, modification = row.scenario, None
+    changed = row.augmentation or row.swept
     if row.subject == Subject.REFERENCE:
         modification = reference_of(scenario)
-    elif row.augmentation is not None and row.augmentation.modification is not None:
-        modification = modification_from_document(row.augmentation.modification)
+    elif changed is not None and changed.modification is not None:
+        modification = modification_from_document(changed.modification)
     recording = scenario.base_scene.recording
     return DriveSetting(
         scene=scene_of(scenario),

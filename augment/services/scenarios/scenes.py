@@ -15,6 +15,7 @@ from augment.baselines.rule_placer import list_open
 from augment.checks.derived import describe_change, type_of_change
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import goal_place
+from augment.llm.messages import shorten
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
 from augment.scene import codec, entities
@@ -167,6 +168,38 @@ def add_scenario(
         _set_intent(scenario, intent, intent_origin)
     _insert(scenario, actor)
     return scenario
+
+
+def add_variant(
+    scenario: Scenario,
+    *,
+    difference: str,
+    reference: entities.Modification,
+    intent: Intent | None,
+    actor: User | None = None,
+) -> Scenario:
+    """Keep a scenario that asks for the same with other numbers, named after the first.
+
+    Args:
+        scenario: Whose scene, traffic, goal and type it has.
+        difference: What its instruction says beyond the first one's.
+        reference: What is changed with these numbers.
+        intent: With these numbers, None where nobody has written it down.
+        actor: Who did it.
+    """
+    kept = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
+    variant = Scenario(
+        slug=_numbered_slug(scenario.slug),
+        instruction=shorten(f"{scenario.instruction} ({difference})", INSTRUCTION_LENGTH),
+        reference=codec.modification_to_document(reference),
+        instruction_is_generated=True,
+        **{name: getattr(scenario, name) for name in (*kept, "spawned", "interplan", "language")},
+    )
+    if intent is not None:
+        variant.intent = codec.intent_to_document(intent)
+        variant.intent_origin = IntentOrigin.DERIVED
+    _insert(variant, actor)
+    return variant
 
 
 def _set_intent(scenario: Scenario, intent: object, origin: IntentOrigin) -> None:
@@ -386,6 +419,10 @@ def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
 def _free_slug(base_scene: BaseScene, name: str) -> str:
     kind = type_of(name)
     stem = (name if kind is None else kind.name).lower().replace("_", "-")
-    stem = f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}"
+    return _numbered_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}")
+
+
+def _numbered_slug(stem: str) -> str:
+    stem = stem[: SLUG_LENGTH - 6].strip("-")
     taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
     return next(name for n in count(1) if (name := f"{stem}-{n}") not in taken)

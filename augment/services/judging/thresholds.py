@@ -1,0 +1,160 @@
+"""What a sweep says: each value's drives, where the planner fails, the hardest value solved.
+
+Once the last drive has an outcome the sweep is concluded: whichever worker finds that first keeps
+the hardest value as a scenario, and a worker's regular round does where that one died before.
+"""
+
+from dataclasses import dataclass
+
+from django.db import transaction
+from django.utils import timezone
+
+from augment.models import Scenario, Simulation, Sweep, SweepValue
+from augment.scene import codec
+from augment.scene.intent import Intent
+from augment.scene.intent_statements import list_statements
+from augment.scene.numbers import list_numbers, set_number
+from augment.services.scenarios.scenes import add_variant
+from augment.simulation.score import ScoreKind
+from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
+
+State = Simulation.State
+_TRIAL = ("swept", "planner", "offsets", "state", "nuplan_score", "document", "code", "reason")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepLine:
+    """A value of a sweep.
+
+    Attributes:
+        row: With the reason why nothing fits, if that is so.
+        drives: Without their traces; the planner under test first.
+        tried: What of it has a score.
+    """
+
+    row: SweepValue
+    drives: tuple[Simulation, ...]
+    tried: TriedValue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepResult:
+    """A sweep as far as it has been driven.
+
+    Attributes:
+        lines: By value.
+        edges: Between which neighbours the outcome changes: (passed, failed).
+        hardest: The hardest value that is solved while the planner under test fails.
+        under_way: How many drives wait or run.
+        failed: How many could not be driven.
+    """
+
+    sweep: Sweep
+    lines: tuple[SweepLine, ...]
+    edges: tuple[tuple[float, float], ...]
+    hardest: TriedValue | None
+    under_way: int
+    failed: int
+
+    @property
+    def verdict(self) -> str:
+        """Where the planner under test fails, as a sentence."""
+        passed = {line.tried.is_passed for line in self.lines} - {None}
+        if self.edges:
+            places = "; ".join(f"it passes {good:g} and fails {bad:g}" for good, bad in self.edges)
+            return f"Where the planner fails: {places}."
+        if not passed:
+            return "No value has been driven yet."
+        return f"The planner {'passes' if True in passed else 'fails'} every value driven."
+
+
+def result_of(sweep: Sweep) -> SweepResult:
+    """Return what a sweep says so far; two queries."""
+    drives: dict[int, list[Simulation]] = {}
+    for drive in Simulation.objects.filter(swept__sweep=sweep).only(*_TRIAL).order_by("pk"):
+        drives.setdefault(drive.swept_id or 0, []).append(drive)
+    lines = tuple(_line(sweep, row, drives.get(row.pk, [])) for row in sweep.values.all())
+    tried = [line.tried for line in lines]
+    states = [drive.state for line in lines for drive in line.drives]
+    return SweepResult(
+        sweep=sweep,
+        lines=lines,
+        edges=find_edges(tried),
+        hardest=find_hardest(tried),
+        under_way=sum(state in Simulation.UNDER_WAY for state in states),
+        failed=states.count(State.FAILED),
+    )
+
+
+def driver_of(drive: Simulation | Sweep) -> str:
+    """Return a planner with its offsets, where they matter, as pages and files name it."""
+    return f"{drive.planner}, {drive.offsets}" if drive.planner == "pdm-closed" else drive.planner
+
+
+@transaction.atomic
+def conclude(sweep_pk: int) -> None:
+    """Keep the hardest value of a sweep whose drives all have outcomes; once."""
+    rows = Sweep.objects.select_for_update(of=("self",), no_key=True)
+    sweep = rows.filter(pk=sweep_pk, concluded_at=None).first()
+    if sweep is None:
+        return
+    result = result_of(sweep)
+    if result.under_way:
+        return
+    if result.hardest is not None:
+        row = next(line.row for line in result.lines if line.tried is result.hardest)
+        sweep.hardest = _keep(sweep, row)
+    sweep.concluded_at = timezone.now()
+    sweep.save(update_fields=["hardest", "concluded_at"])
+
+
+def conclude_all() -> None:
+    """Conclude every sweep that is driven and not concluded, for a worker may die in between."""
+    driving = Simulation.objects.filter(swept__isnull=False, state__in=Simulation.UNDER_WAY)
+    over = Sweep.objects.filter(concluded_at=None).exclude(pk__in=driving.values("swept__sweep"))
+    for pk in over.values_list("pk", flat=True):
+        conclude(pk)
+
+
+def tell_difference(before: Intent, after: Intent) -> str:
+    """Return what an intent says that another one does not, as short statements."""
+    known = list_statements(before)
+    return "; ".join(one for one in list_statements(after) if one not in known)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _line(sweep: Sweep, row: SweepValue, drives: list[Simulation]) -> SweepLine:
+    trials = tuple(
+        Trial(
+            driver=driver_of(drive),
+            score=drive.nuplan_score or 0.0,
+            is_lawful=is_lawful(
+                {one["name"]: one["value"] for one in drive.document["metrics"][ScoreKind.NUPLAN]}
+            ),
+            is_tested=(drive.planner, drive.offsets) == (sweep.planner, sweep.offsets),
+        )
+        for drive in drives
+        if drive.state == State.DONE and drive.document is not None
+    )
+    tried = TriedValue(value=row.value, trials=trials)
+    return SweepLine(row=row, drives=tuple(drives), tried=tried)
+
+
+def _keep(sweep: Sweep, row: SweepValue) -> Scenario:
+    """Return the value as a scenario, with its intent where the number is one of the intent."""
+    scenario = sweep.scenario
+    intent, difference = None, f"{sweep.number}: {row.value:g}"
+    if scenario.intent is not None and sweep.number in list_numbers(scenario.intent):
+        before = codec.intent_from_document(scenario.intent)
+        changed = set_number(scenario.intent, sweep.number, row.value)
+        intent = codec.intent_from_document(changed)
+        difference = tell_difference(before, intent) or difference
+    return add_variant(
+        scenario,
+        difference=difference,
+        reference=codec.modification_from_document(row.modification),
+        intent=intent,
+        actor=sweep.asked_by,
+    )

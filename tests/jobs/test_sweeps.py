@@ -1,0 +1,190 @@
+"""Sweeps as rows: a threshold as brute force finds it, dead workers lose nothing, what is kept."""
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from pytest_django import Settings
+
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.models import Scenario, Simulation, Sweep
+from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.entities import Modification
+from augment.scene.intent import Shape
+from augment.services.judging.driving_scores import options_driven
+from augment.services.judging.simulations import DRIVES, Options
+from augment.services.judging.sweeps import numbers_of, plan_sweep, ways_of
+from augment.services.judging.thresholds import conclude, result_of
+from augment.services.scenarios.scenes import intent_of, reference_of
+from augment.simulation.drive import expert_of, run
+from augment.simulation.road import Road
+from augment.simulation.score import score_drive
+from augment.simulation.traffic import DriveSetting
+from tests.drives import short_drive
+from tests.intents import cones
+from tests.jobs import rows
+from tests.jobs.test_simulations import Straight
+from tests.scenes import scene, vehicle
+
+pytestmark = pytest.mark.django_db
+
+State = Simulation.State
+STRAIGHT = Options(planner="tests.jobs.test_simulations.Straight")
+ACROSS = "add[0].y_m"
+
+
+@pytest.fixture(autouse=True)
+def allowed(settings: Settings) -> None:
+    settings.PLANNERS = (STRAIGHT.planner,)
+
+
+def parked(y_m: float) -> Modification:
+    return Modification(added=(vehicle("Agent2", 30.0, y_m),))
+
+
+def planned(low: float = 0.0, high: float = 3.5, count: int = 8) -> tuple[Sweep, list[int]]:
+    """A sweep of how far to the left a car stands in front of one who never steers."""
+    document = modification_to_document(parked(0.0))
+    scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
+    return plan_sweep(
+        scenario=scenario, number=ACROSS, low=low, high=high, count=count, options=STRAIGHT
+    )
+
+
+def drive_tested() -> None:
+    for pk in Simulation.objects.filter(planner=STRAIGHT.planner).values_list("pk", flat=True):
+        DRIVES.perform(pk)
+
+
+def settle_others(**scores: float) -> None:
+    """Let all others have driven: lawfully, with a score by value, or not where none is given."""
+    trace, document = short_drive()
+    for drive in Simulation.objects.exclude(planner=STRAIGHT.planner).select_related("swept"):
+        assert drive.swept is not None
+        score = scores.get(f"at_{drive.swept.value:g}", 0.0)
+        parts = {one["name"]: one["value"] for one in document["metrics"]["nuplan"]}
+        parts |= {"no_ego_at_fault_collisions": float(score > 0.0)}
+        parts |= {"drivable_area_compliance": 1.0, "ego_is_making_progress": 1.0}
+        metrics = [{"name": name, "value": value} for name, value in parts.items()]
+        Simulation.objects.filter(pk=drive.pk).update(
+            state=State.DONE,
+            nuplan_score=score,
+            interplan_score=score,
+            trace=trace,
+            document=document | {"metrics": {"nuplan": metrics}},
+        )
+
+
+def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
+    sweep, waiting = planned()
+    assert len(waiting) == 8 * len(ways_of(STRAIGHT)) == 32
+    drive_tested()
+    result = result_of(sweep)
+    by_hand = {}
+    for line in result.lines:
+        setting = DriveSetting(scene=scene(), modification=parked(line.row.value))
+        road = Road(setting.scene)
+        drive = run(setting, Straight(), road=road)
+        by_hand[line.row.value] = not score_drive(drive, expert_of(setting, road)).collisions
+    assert {line.row.value: line.tried.is_passed for line in result.lines} == by_hand
+    # Bodies 2.297 m and 2 m wide pass each other at 2.149 m.
+    assert result.edges == ((2.5, 2.0),)
+    assert "passes 2.5 and fails 2" in result.verdict
+    assert (result.under_way, sweep.concluded_at) == (24, None)
+
+
+def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> None:
+    sweep, _ = planned(1.0, 3.0, 3)
+    settle_others(at_1=0.5, at_2=0.8, at_3=0.1)
+    drive_tested()
+    sweep.refresh_from_db()
+    kept = sweep.hardest
+    assert kept is not None
+    assert sweep.concluded_at is not None
+    reference = reference_of(kept)
+    assert reference is not None
+    assert (kept.slug, reference.added[0].y_m) == ("parked-1", 1.0)
+    assert kept.instruction.endswith("(add[0].y_m: 1)")
+    conclude(sweep.pk)
+    assert Scenario.objects.filter(slug__startswith="parked-").count() == 1
+
+
+def test_nothing_is_kept_where_nobody_solves_what_the_planner_fails() -> None:
+    sweep, _ = planned(1.0, 3.0, 3)
+    settle_others(at_3=0.9)
+    drive_tested()
+    sweep.refresh_from_db()
+    assert sweep.concluded_at is not None
+    assert sweep.hardest is None
+
+
+def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> None:
+    sweep, _ = planned(2.0, 3.0, 2)
+    settle_others(at_2=0.8)
+    first, last = Simulation.objects.filter(planner=STRAIGHT.planner).order_by("pk")
+    held = DRIVES.take(first.pk, now=rows.NOON)
+    assert held is not None
+    assert DRIVES.take_back_lost(now=rows.NOON + rows.STALE * 10) == [first.pk]
+    assert DRIVES.perform(first.pk)
+    assert not DRIVES.perform(first.pk)
+    again = DRIVES.take(last.pk)
+    assert again is not None
+    assert not held.renew()
+    outcome = DRIVES.run(last, again)
+    assert again.settle(outcome)  # and dies before it concludes
+    DRIVES.tidy(rows.NOON)
+    sweep.refresh_from_db()
+    assert sweep.hardest is not None
+    assert [line.tried.is_passed for line in result_of(sweep).lines] == [False, True]
+    assert DRIVES.find_unsent(older_than=timedelta(0)) == []
+
+
+def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> None:
+    intent = intent_to_document(cones(20.0, 1, Shape.LINE))
+    scenario = rows.add_scenario("cones", intent=intent)
+    number = "requests[0].spot.distance"
+    assert number in numbers_of(scenario)
+    sweep, _ = plan_sweep(
+        scenario=scenario, number=number, low=20.0, high=220.0, count=3, options=STRAIGHT
+    )
+    near, middle, far = result_of(sweep).lines
+    assert near.row.modification is not None
+    assert near.row.modification["add"][0]["x_m"] == pytest.approx(20.0, abs=0.5)
+    assert (middle.row.modification, far.row.modification) == (None, None), "the lane ends"
+    assert middle.row.reason
+    assert not middle.drives
+    settle_others(at_20=0.4)
+    drive_tested()
+    sweep.refresh_from_db()
+    assert sweep.hardest is not None
+    assert intent_of(sweep.hardest) == cones(20.0, 1, Shape.LINE)
+
+
+@pytest.mark.parametrize(
+    ("changed", "error", "words"),
+    [
+        ({"number": "add[7].y_m"}, UnknownName, r"add\[0\]\.y_m"),
+        ({"options": Options(planner="nobody.Knows")}, UnknownName, "pdm-closed"),
+        ({"high": -1.0}, InvalidDocument, "above low"),
+        ({"number": "add[0].width_m", "low": 200.0, "high": 300.0}, Conflict, "No value"),
+    ],
+)
+def test_a_sweep_that_can_not_be_is_refused(
+    changed: dict[str, Any], error: type[Exception], words: str
+) -> None:
+    document = modification_to_document(parked(0.0))
+    scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
+    asked: dict[str, Any] = {"number": ACROSS, "low": 0.0, "high": 1.0, "count": 2}
+    asked |= {"options": STRAIGHT, **changed}
+    with pytest.raises(error, match=words):
+        plan_sweep(scenario=scenario, **asked)
+    assert not Sweep.objects.exists()
+
+
+def test_drives_of_a_sweep_are_not_among_those_of_a_job() -> None:
+    job = rows.launch()
+    scenario = Scenario.objects.get()
+    plan_sweep(
+        scenario=scenario, number="add[0].x_m", low=20.0, high=25.0, count=2, options=STRAIGHT
+    )
+    assert options_driven(job) == []
