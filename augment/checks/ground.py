@@ -4,7 +4,7 @@ Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,6 +25,9 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
+from augment.scene.motion import Motion, motion_of
+from augment.scene.planned_motion import AtPlace
+from augment.scene.recording import Recording
 
 SEAM_M = 0.3
 """A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
@@ -151,15 +154,50 @@ class Ground:
     Attributes:
         scene: The scene before the change.
         graph: Its lanes and connectors.
+        read_recording: Reads what was recorded after t0; asked only where something moves.
     """
 
     scene: Scene
     graph: LaneGraph
+    read_recording: Callable[[], Recording | None]
 
     @classmethod
-    def of(cls, scene: Scene) -> "Ground":
-        """Return the ground of a scene."""
-        return cls(scene=scene, graph=LaneGraph(scene))
+    def of(
+        cls, scene: Scene, read_recording: Callable[[], Recording | None] = lambda: None
+    ) -> "Ground":
+        """Return the ground of a scene, by default one without a recording."""
+        return cls(scene=scene, graph=LaneGraph(scene), read_recording=read_recording)
+
+    @cached_property
+    def recording(self) -> Recording | None:
+        """What was recorded after t0 of the ego and the traffic that stays."""
+        return self.read_recording()
+
+    def motion_after(self, modification: Modification, *, of_all: bool = True) -> Motion:
+        """Return what everybody does after a change, who was recorded later included.
+
+        Args:
+            modification: The change.
+            of_all: False for the ego, who is changed and whom they wait for, alone.
+
+        Raises:
+            InvalidModification: The modification does not fit the scene.
+        """
+        after, changed = apply(self.scene, modification), modification.changed
+        if not of_all:
+            watched = {agent.id for agent in changed} | {
+                agent.motion.start.agent_id
+                for agent in changed
+                if agent.motion is not None and isinstance(agent.motion.start, AtPlace)
+            }
+            after = replace(after, agents=tuple(one for one in after.agents if one.id in watched))
+        moved = [agent.id for agent in modification.moved]
+        return motion_of(
+            after,
+            recording=self.recording,
+            replaced=frozenset([*moved, *modification.removed]),
+            with_later=of_all,
+        )
 
     def _areas(self, *kinds: AreaKind) -> list[Area]:
         return [area for area in self.scene.areas if area.kind in kinds]
@@ -196,12 +234,12 @@ class ChangedScene:
 
     Attributes:
         ground: The scene before the change.
-        changed: The added and the moved agents, which the findings are about.
+        modification: The change.
         everyone: All agents after the change, the ego first.
     """
 
     ground: Ground
-    changed: tuple[TrafficAgent, ...]
+    modification: Modification
     everyone: tuple[TrafficAgent, ...]
 
     @classmethod
@@ -212,7 +250,17 @@ class ChangedScene:
             InvalidModification: It does not fit the scene.
         """
         after = apply(ground.scene, modification)
-        return cls(ground=ground, changed=modification.changed, everyone=after.everyone)
+        return cls(ground=ground, modification=modification, everyone=after.everyone)
+
+    @property
+    def changed(self) -> tuple[TrafficAgent, ...]:
+        """The added and the moved agents, which the findings are about."""
+        return self.modification.changed
+
+    @cached_property
+    def motion(self) -> Motion:
+        """What everybody does after the change."""
+        return self.ground.motion_after(self.modification)
 
     @cached_property
     def boxes(self) -> dict[str, Box]:

@@ -127,8 +127,10 @@ def measure_change(ground: Ground, change: Modification) -> list[PlacedObject]:
 def measure_recorded(ground: Ground) -> list[PlacedObject]:
     """Measure all of a scene as it was but its ego."""
     scene = ground.scene
-    situation = ChangedScene(ground=ground, changed=scene.agents, everyone=scene.everyone)
-    return measure_objects(situation)
+    every = Modification(moved=scene.agents)
+    return measure_objects(
+        ChangedScene(ground=ground, modification=every, everyone=scene.everyone)
+    )
 
 
 def count_recorded(objects: Iterable[PlacedObject]) -> RecordedCounts:

@@ -308,6 +308,11 @@ class Modification:
         """Every agent that a picture marks as changed: the added, then the moved."""
         return self.added + self.moved
 
+    @property
+    def has_motion(self) -> bool:
+        """Whether an agent is made to do something after t0."""
+        return any(agent.motion is not None for agent in self.changed)
+
 
 def apply(scene: Scene, modification: Modification) -> Scene:
     """The scene after the change; the given one stays as it is.

@@ -24,6 +24,7 @@ from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording import Recording
 from augment.services.events import log_change
 from augment.services.texts import check_prose
 
@@ -344,6 +345,19 @@ def scene_of(scenario: Scenario) -> entities.Scene:
         place_m = goal_place(scenario.interplan, scenario.goal, scene)
         options = replace(options, goal=entities.TurnType(scenario.goal), goal_m=place_m)
     return replace(scene, options=options)
+
+
+def recording_of(scenario: Scenario) -> Recording | None:
+    """What was recorded after t0, None for nothing; of the ego alone where traffic is cleared.
+
+    Raises:
+        InvalidDocument: The stored recording can't be read.
+    """
+    document = scenario.base_scene.recording
+    if document is None:
+        return None
+    recording = codec.recording_from_document(document)
+    return recording if scenario.keep_traffic else replace(recording, tracks=())
 
 
 def scene_key(scenario: Scenario) -> str:
