@@ -58,7 +58,8 @@ class LanePath:
     """Along lanes: each follows the one before, or runs beside it and is changed to.
 
     Attributes:
-        lane_ids: From the lane at which it sets out; after the last the straightest follow.
+        lane_ids: From the lane at which it sets out, or onto which it pulls out from beside it;
+            after the last the straightest follow.
         change_m: How far along the lane a change takes, a smooth one.
     """
 

@@ -21,6 +21,8 @@ REACH_M = 600.0
 """So far paths over lanes are followed past the last lane that is named."""
 BESIDE_WITHIN_M = 8.0
 """Between the centrelines of lanes that one can change between."""
+_KEEPS_OFFSET_SHARE = 0.25
+"""Who is further from its lane's centre than this share of the width does not drive in it."""
 _ALONG_BELOW_RAD = math.radians(60.0)
 
 Places = Mapping[str, Point]
@@ -170,6 +172,7 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
     """Return the line that a path over lanes takes from a place on its first lane.
 
     It keeps its offset from the centreline until it changes lanes; a change ends in the centre.
+    Who sets out beside the first lane, or at its edge, changes onto it first.
 
     Raises:
         InvalidModification: A lane is unknown, or neither follows nor runs beside the one before.
@@ -179,8 +182,9 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
     line, last_begins_m = _followed(graph, runs[0])
     at = line.project(*here)
     at_m, d_m, points = at.s_m, at.d_m, [here]
-    for run in runs[1:]:
-        begins_m = max(at_m, last_begins_m)
+    is_beside = abs(d_m) > graph.lane(path.lane_ids[0]).width_m * _KEEPS_OFFSET_SHARE
+    for run in runs[0 if is_beside and at.beyond_m == 0.0 else 1 :]:
+        begins_m = at_m if run is runs[0] else max(at_m, last_begins_m)
         points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
         target, last_begins_m = _followed(graph, run)
         for s_m in _samples(begins_m, begins_m + path.change_m):
