@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from augment.errors import ReplyUnreadable
 
@@ -45,14 +46,20 @@ def validate(kind: type[_Kind], value: object) -> _Kind:
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        faults = error.errors(include_url=False, include_input=False, include_context=False)[:8]
-    paths = (".".join(ascii(part).strip("'")[:40] for part in fault["loc"]) for fault in faults)
-    raise ReplyUnreadable(
-        [
-            f"{path or 'the block'}: {fault['msg']}"
-            for path, fault in zip(paths, faults, strict=True)
-        ]
-    )
+        faults = error.errors(include_url=False, include_input=False)[:8]
+    raise ReplyUnreadable([sentence_of(fault) for fault in faults])
+
+
+def sentence_of(fault: ErrorDetails) -> str:
+    """Tell one fault of pydantic's: where it is and what is wrong, without what was written."""
+    path = ".".join(ascii(part).strip("'")[:40] for part in fault["loc"])
+    said = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] == "union_tag_invalid":
+        path, said = f"{path}.kind", f"Input should be {fault['ctx']['expected_tags']}"
+    if fault["type"] == "dataclass_type":
+        said = "Input should be an object"
+    said = said.replace("tuple", "list").replace("Tuple", "List")  # as it is in JSON
+    return f"{path or 'the block'}: {said}"
 
 
 def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], bool]:

@@ -18,7 +18,10 @@ from augment.errors import ReplyUnreadable
 from augment.prompts import blocks
 
 TOOL = "pose_on_lane"
-PARAMETERS = ("lane", "start", "distance_m", "lateral_m", "object")
+PARAMETERS = (
+    *("lane", "start", "distance_m", "lateral_m", "object"),
+    *("speed_mps", "motion", "after_s"),
+)
 """In the order in which the prompt names them."""
 MOST_LOOKED_AT = 64
 

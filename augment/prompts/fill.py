@@ -31,7 +31,7 @@ QUOTE = "> "
 """Stands before every line of somebody else's words: no line of them can end the quotation."""
 LONGEST_ECHO = 20_000
 CANNOT_SEE = "cannot see"
-VECTORS_VERSION = 4
+VECTORS_VERSION = 5
 """Raised with every change to what of a scene is written down, or how: no text shows that."""
 
 Messages = tuple[Message, ...]

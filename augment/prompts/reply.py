@@ -8,7 +8,7 @@ Frame: ego frame of the scene.
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
@@ -16,10 +16,18 @@ from pydantic import Field
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
 from augment.geometry.frames import wrap
 from augment.prompts.blocks import LONGEST_ANSWER, Strict, last_object, validate, without_thoughts
-from augment.prompts.vectors import DEFAULT_RADIUS_M, ShortNames, short_names
+from augment.prompts.vectors import (
+    DEFAULT_RADIUS_M,
+    ShortNames,
+    short_names,
+    with_scene_ids,
+    with_short_ids,
+)
 from augment.scene.codec import intent_from_parts
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, check_fits
 from augment.scene.intent import Intent
+from augment.scene.planned_motion import PlannedMotion, PointPath
+from augment.scene.planned_mover import check_motions
 
 MOST_AGENTS = 64
 LONGEST_NOTES = 4000
@@ -30,7 +38,7 @@ _MOST_PROBLEMS = 8
 
 _Item = TypeVar("_Item")
 _Id = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
-_Size = Annotated[float, Field(ge=0.2, le=20.0)]
+_Size = Annotated[float, Field(ge=0.1, le=20.0)]
 _Several = Annotated[list[_Item], Field(max_length=MOST_AGENTS)]
 _Words = Annotated[str, Field(min_length=1, max_length=LONGEST_ENTRY)]
 _Rating = Annotated[int, Field(ge=1, le=5)]
@@ -47,6 +55,13 @@ class _Agent(Strict):
     speed_mps: float = Field(ge=0.0, le=60.0)
     lane: str | None
     walk_to: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    motion: PlannedMotion | None = None
+
+    @property
+    def path_m(self) -> tuple[tuple[float, float], ...]:
+        """The points that its motion leads over."""
+        path = None if self.motion is None else self.motion.path
+        return path.points_m if isinstance(path, PointPath) else ()
 
 
 class _Block(Strict):
@@ -151,13 +166,18 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
     block, names = validate(_Block, document), short_names(scene)
     problems = []
     for agent in [*block.add, *block.move]:
-        points = [(agent.x_m, agent.y_m), tuple(agent.walk_to or (0.0, 0.0))]
-        if max(abs(value) for point in points for value in point) > radius_m:
+        ends = (agent.x_m, agent.y_m, *(agent.walk_to or ()))
+        far_m = 2.0 * radius_m  # who moves may leave what is shown
+        if max(map(abs, ends)) > radius_m:
             problems.append(f"{agent.id}: x and y must lie between -{radius_m:g} and {radius_m:g}")
+        if any(abs(value) > far_m for point in agent.path_m for value in point):
+            problems.append(f"{agent.id}: points_m must lie between -{far_m:g} and {far_m:g}")
         if agent.lane is not None and agent.lane not in names.lane_ids:
             problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
         if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
             problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
+        if agent.walk_to is not None and agent.motion is not None:
+            problems.append(f"{agent.id}: it has walk_to or a motion, not both")
         if agent.type is AgentType.EGO_VEHICLE:
             problems.append(f"{agent.id}: nobody else is an EGO_VEHICLE")
     if problems:
@@ -271,32 +291,30 @@ def read_intent(answer: str) -> Intent:
 
 def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modification:
     """Return the change in the scene's own ids; its faults are told in the short ones."""
-    shown = replace(scene, agents=tuple(replace(a, id=names.agents[a.id]) for a in scene.agents))
+    shown = with_short_ids(scene, names)
     asked = Modification(
-        added=tuple(_agent(agent, names) for agent in block.add),
-        moved=tuple(_agent(agent, names) for agent in block.move),
+        added=tuple(_agent(agent) for agent in block.add),
+        moved=tuple(_agent(agent) for agent in block.move),
         removed=tuple(block.remove),
     )
     try:
         check_fits(shown, asked)
+        check_motions(shown, asked)
     except InvalidModification as error:
         raise ReplyUnreadable([str(error)]) from None
     if {agent.id for agent in asked.added} & names.agents.keys():
         raise ReplyUnreadable(
             [f"an added agent's id is taken: number them from {names.next_agent}"]
         )
-    return replace(
-        asked,
-        moved=tuple(replace(a, id=names.agent_ids[a.id]) for a in asked.moved),
-        removed=tuple(names.agent_ids[name] for name in asked.removed),
-    )
+    return with_scene_ids(asked, names)
 
 
-def _agent(agent: _Agent, names: ShortNames) -> TrafficAgent:
+def _agent(agent: _Agent) -> TrafficAgent:
     return TrafficAgent(
-        **agent.model_dump(exclude={"heading_rad", "lane", "walk_to"}),
+        **agent.model_dump(exclude={"heading_rad", "lane", "walk_to", "motion"}),
         heading_rad=wrap(agent.heading_rad),
-        lane_id=None if agent.lane is None else names.lane_ids[agent.lane],
+        lane_id=agent.lane,
+        motion=agent.motion,
         walk_to_m=None if agent.walk_to is None else (agent.walk_to[0], agent.walk_to[1]),
     )
 

@@ -19,7 +19,7 @@ from enum import StrEnum
 from functools import cached_property
 from itertools import count
 from string import ascii_letters
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,21 +29,37 @@ from augment.geometry.polyline import Projection
 from augment.prompts.extent import boundary_near, extent_of, shown_spans
 from augment.scene import entities
 from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
+from augment.scene.codec import intent_to_parts
 from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.planned_motion import AtPlace, LanePath, PlannedMotion
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0
 
 Vector = list[object]
+Renamed = TypeVar("Renamed")
 
 _COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
 _BOUNDARY_TOLERANCE_M = 0.1
 _WITH_IDS = (
     *(entities.Scene, entities.Modification, entities.TrafficAgent),
-    *(entities.Lane, entities.LaneConnector),
+    *(entities.Lane, entities.LaneConnector, PlannedMotion, LanePath, AtPlace),
 )
+_OF_AGENTS = frozenset({"agent_id", "removed"})
+_OF_LANES = frozenset(
+    {
+        "lane_id",
+        "lane_ids",
+        "left_neighbor",
+        "right_neighbor",
+        "successors",
+        "from_lane",
+        "to_lane",
+    }
+)
+"""Fields that name agents, or lanes and connectors, besides the `id` of each."""
 # The end of a whole number; ids and words of ours have no dot.
-_WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],])")
+_WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],}])")
 
 
 class LaneFormat(StrEnum):
@@ -91,16 +107,16 @@ def short_names(scene: entities.Scene) -> ShortNames:
     )
 
 
-def with_short_ids(value: Any, names: ShortNames) -> Any:
-    """Return a scene, or a part of one, with short ids wherever the scene's own stand in it."""
-    if isinstance(value, str):
-        return names.agents.get(value) or names.lanes.get(value, value)
-    if isinstance(value, tuple):
-        return tuple(with_short_ids(part, names) for part in value)
-    if isinstance(value, _WITH_IDS):
-        changes = {part.name: getattr(value, part.name) for part in fields(value)}
-        return replace(value, **{n: with_short_ids(part, names) for n, part in changes.items()})
-    return value
+def with_short_ids(value: Renamed, names: ShortNames) -> Renamed:
+    """Return a scene, a part of one or a change with short ids in the place of the scene's own."""
+    renamed: Renamed = _renamed(value, names.agents, names.lanes)
+    return renamed
+
+
+def with_scene_ids(value: Renamed, names: ShortNames) -> Renamed:
+    """Return what has short ids with the scene's own; ids that are new to it stay."""
+    renamed: Renamed = _renamed(value, names.agent_ids, names.lane_ids)
+    return renamed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,7 +251,8 @@ def scene_vectors(
 ) -> dict[str, dict[str, Vector]]:
     """Return the four lists by heading: each entity's attributes by its short id.
 
-    Agents: type, centre x and y, heading, width, length, velocity, lane. Lanes: number, travel
+    Agents: type, centre x and y, heading, width, length, velocity, lane, and of those that have
+    one the end of a walk or a motion. Lanes: number, travel
     direction, direction relative to the ego, width, limit, coordinates. Lane connectors: from,
     to, light, turn, width, limit, coordinates. Areas: kind and boundary.
     """
@@ -268,7 +285,7 @@ def scene_vectors(
         if len(boundary):
             areas[names.areas[area.id]] = [area.kind.value, _points(boundary)]
     shown = shown_agents(scene, radius_m)
-    agents = {names.agents[one.id]: _agent_vector(one, names)[:8] for one in shown}
+    agents = {names.agents[one.id]: _agent_vector(one, names) for one in shown}
     return {"Agents": agents, **road, "Areas": areas}
 
 
@@ -307,9 +324,50 @@ def _relative(heading_rad: float) -> str:
     return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
 
 
+def _renamed(value: Any, agents: Mapping[str, str], lanes: Mapping[str, str]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_renamed(part, agents, lanes) for part in value)
+    if not isinstance(value, _WITH_IDS):
+        return value
+    changes = {}
+    for part in fields(value):
+        given, is_lane = getattr(value, part.name), isinstance(value, AnyLane)
+        if part.name in _OF_LANES or (part.name == "id" and is_lane):
+            changes[part.name] = _named(given, lanes)
+        elif part.name in _OF_AGENTS or part.name == "id":
+            changes[part.name] = _named(given, agents)
+        else:
+            changes[part.name] = _renamed(given, agents, lanes)
+    return replace(value, **changes)
+
+
+def _named(given: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any:
+    if isinstance(given, tuple):
+        return tuple(names.get(name, name) for name in given)
+    return given and names.get(given, given)
+
+
+def motion_parts(motion: PlannedMotion) -> dict[str, object]:
+    """Return a motion as it stands in lists and answers, to the centimetre."""
+    parts: dict[str, object] = _rounded(intent_to_parts(motion))
+    return parts
+
+
+def _rounded(part: Any) -> Any:
+    if isinstance(part, dict):
+        return {name: _rounded(value) for name, value in part.items()}
+    if isinstance(part, list):
+        return [_rounded(value) for value in part]
+    return _metres(part) if isinstance(part, float) else part
+
+
 def _agent_vector(agent: entities.TrafficAgent, names: ShortNames) -> Vector:
-    """Return an agent's attributes, at the end that of its walk if it walks."""
-    walk = [] if agent.walk_to_m is None else [[_metres(value) for value in agent.walk_to_m]]
+    """Return an agent's attributes, at the end where its walk ends, or its motion."""
+    last: Vector = []
+    if agent.motion is not None:
+        last = [motion_parts(with_short_ids(agent.motion, names))]
+    elif agent.walk_to_m is not None:
+        last = [[_metres(value) for value in agent.walk_to_m]]
     return [
         agent.type.value,
         _metres(agent.x_m),
@@ -319,7 +377,7 @@ def _agent_vector(agent: entities.TrafficAgent, names: ShortNames) -> Vector:
         _metres(agent.length_m),
         _metres(agent.speed_mps),
         names.lanes.get(agent.lane_id or ""),
-        *walk,
+        *last,
     ]
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from augment.scene.schema import Id, Metres, PointPair, Real, Speed, Yes
+from augment.scene.schema import CLOSED, Id, Metres, PointPair, Real, Speed, Yes
 
 EGO_ID = "Agent1"
 """The ego's id in every scene."""
@@ -124,6 +124,8 @@ class PlannedMotion:
             at the start on unless the first pair is of 0 s, and the last is held.
         start: If it never comes to that, nothing changes.
     """
+
+    __pydantic_config__ = CLOSED
 
     path: Path | None = None
     speeds: Annotated[tuple[tuple[Seconds, Speed], ...], Field(fail_fast=True, max_length=50)] = ()

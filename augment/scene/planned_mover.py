@@ -19,6 +19,8 @@ from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, LanePath, Near
 SAMPLE_M = 0.5
 REACH_M = 600.0
 """So far paths over lanes are followed past the last lane that is named."""
+MOST_LISTED = 80
+"""Names that a sentence lists as what is allowed."""
 BESIDE_WITHIN_M = 8.0
 """Between the centrelines of lanes that one can change between."""
 _KEEPS_OFFSET_SHARE = 0.25
@@ -219,7 +221,7 @@ def check_motions(scene: Scene, modification: Modification) -> None:
         if isinstance(start, AtPlace) and start.agent_id not in names - {agent.id}:
             raise InvalidModification(
                 f"{agent.id}: it waits for {start.agent_id}, who is none of "
-                f"{', '.join(sorted(names - {agent.id}))}"
+                f"{', '.join(sorted(names - {agent.id})[:MOST_LISTED])}"
             )
 
 
@@ -231,13 +233,28 @@ def check_lane_path(graph: LaneGraph, path: LanePath) -> None:
     """
     for name in path.lane_ids:
         if name not in graph.lanes:
-            allowed = ", ".join(sorted(graph.lanes)) or "none"
+            allowed = ", ".join(sorted(graph.lanes)[:MOST_LISTED]) or "none"
             raise InvalidModification(f"{name} is no lane of the scene; its lanes: {allowed}")
     for before, after in pairwise(path.lane_ids):
-        if after not in graph.successors(before) and not _run_beside(graph, before, after):
+        if after not in graph.successors(before) and not run_beside(graph, before, after):
             raise InvalidModification(
                 f"a path over lanes: {after} neither follows {before} nor runs beside it"
             )
+
+
+def run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
+    """Return whether one can change from a lane to another: it runs near it the same way."""
+    if other_id in graph.abreast(lane_id):
+        return other_id != lane_id
+    other = graph.lane(other_id).centerline
+    line = graph.lane(lane_id).centerline
+    for s_m in np.linspace(0.0, line.length_m, 20):
+        pose = line.pose_at(float(s_m))
+        place = other.project(pose.x_m, pose.y_m)
+        turn_rad = abs(difference(place.heading_rad, pose.heading_rad))
+        if place.distance_m <= BESIDE_WITHIN_M and turn_rad < _ALONG_BELOW_RAD:
+            return other_id != lane_id
+    return False
 
 
 # Private
@@ -273,20 +290,6 @@ def _followed(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
     last_begins_m = sum(line.length_m for line in lines[:-1])
     lines += [graph.lane(name).centerline for name in graph.route(run[-1], REACH_M)[1:]]
     return Polyline(np.vstack([line.points_m for line in lines])), last_begins_m
-
-
-def _run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
-    if other_id in graph.abreast(lane_id):
-        return other_id != lane_id
-    other = graph.lane(other_id).centerline
-    line = graph.lane(lane_id).centerline
-    for s_m in np.linspace(0.0, line.length_m, 20):
-        pose = line.pose_at(float(s_m))
-        place = other.project(pose.x_m, pose.y_m)
-        turn_rad = abs(difference(place.heading_rad, pose.heading_rad))
-        if place.distance_m <= BESIDE_WITHIN_M and turn_rad < _ALONG_BELOW_RAD:
-            return other_id != lane_id
-    return False
 
 
 def _samples(start_m: float, end_m: float) -> list[float]:

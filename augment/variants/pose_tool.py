@@ -6,14 +6,15 @@ a `ToolError` whose sentence tells the model what was wrong.
 `pose_on_lane(lane, start, distance_m, lateral_m, object)` answers from the recorded centrelines,
 under the same short ids as the prompt shows. It follows the lanes across connectors, along the
 ego's route where they belong to it, else straightest first, and says which lane lies under the
-place and who stands there. Everything is computed from the scene before the change.
+place and who stands there, and where an object that sets out there is some seconds later.
+Everything is computed from the scene before the change.
 
 Frame: ego frame; s along the shown part of a lane, from where it begins.
 """
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -22,12 +23,15 @@ import pydantic
 from pydantic import Field
 
 from augment.checks import Ground
-from augment.errors import ToolError
+from augment.errors import InvalidModification, ToolError
 from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts import vectors
 from augment.prompts.calls import TOOL
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
+from augment.scene.motion import LENGTH_S, Motion, Movement, motion_of
+from augment.scene.planned_motion import AtPlace, PlannedMotion
+from augment.scene.planned_mover import check_motions, run_beside
 from augment.scene.schema import problems_of
 
 LANE_START = "lane"
@@ -54,6 +58,7 @@ _Several = (pydantic.BeforeValidator(lambda value: value if isinstance(value, li
 _Many = Field(min_length=1, max_length=MOST_PLACES)
 _Along = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
 _Aside = Annotated[float, Field(ge=-WIDEST_M, le=WIDEST_M)]
+_Seconds = Annotated[float, Field(ge=0.0, le=LENGTH_S)]
 _Kind = Annotated[
     str, Field(pattern=f"^({'|'.join(OBJECT_TYPES)})$"), pydantic.AfterValidator(AgentType)
 ]
@@ -69,6 +74,9 @@ class _Call(pydantic.BaseModel):
     distance_m: Annotated[list[_Along], *_Several, _Many]
     lateral_m: Annotated[list[_Aside], *_Several, _Many] = [0.0]
     object: Annotated[list[_Kind], *_Several, _Many] = [AgentType.VEHICLE]
+    speed_mps: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
+    motion: PlannedMotion | None = None
+    after_s: Annotated[list[_Seconds], *_Several, Field(max_length=MOST_PLACES)] = []
 
 
 _CONTROL = pydantic.TypeAdapter(
@@ -83,6 +91,7 @@ class PoseOnLane:
     Attributes:
         lane: The short id of the shown lane or connector under the place, None where there is
             none. Of several the one that the place was counted on.
+        lanes_beside: Short ids of the shown lanes that one can change to from there.
         taken_by: Short ids of those in whose place an object there would stand; None for nobody.
         edge_left_m, edge_right_m: From the centre of that lane to the edge of the road, which lies
             beyond all lanes, but before a carpark. None without one within 30 m.
@@ -101,6 +110,7 @@ class PoseOnLane:
     edge_right_m: float | None
     next_lanes: list[str]
     route: list[str]
+    lanes_beside: list[str] | None = None
     carpark_left_m: float | None = None
     carpark_right_m: float | None = None
     walkway_left_m: float | None = None
@@ -171,6 +181,7 @@ class PoseTool:
             remaining_m=last.length_m - s_m,
             lane_width_m=last.width_m,
             next_lanes=list(last.after),
+            lanes_beside=self._beside(last, centre) or None,
             route=[one.id for one in passed],
             nearest_free_m=free_m,
             start_lateral_m=start_lateral_m,
@@ -228,6 +239,11 @@ class PoseTool:
         return vectors.short_names(self.scene)
 
     @cached_property
+    def _shown(self) -> Scene:
+        """The scene in the ids that models read and write."""
+        return vectors.with_short_ids(self.scene, self._names)
+
+    @cached_property
     def _ground(self) -> Ground:
         return Ground.of(self.scene)
 
@@ -242,9 +258,59 @@ class PoseTool:
     ) -> dict[str, object]:
         try:
             place = self.pose_on_lane(call.lane, call.start, distance_m, lateral_m, object_type)
+            later = self._later(call, place, object_type) if call.motion or call.after_s else {}
         except ToolError as fault:
             return {"error": fault.problem}
-        return place.to_document()
+        return place.to_document() | later
+
+    def _later(self, call: _Call, place: PoseOnLane, object_type: AgentType) -> dict[str, object]:
+        """Return where an object is that many seconds after it stood at a place.
+
+        Nobody else moves but whom its trigger waits for, and whom they wait for.
+
+        Raises:
+            ToolError: Its motion can't be carried out.
+        """
+        length_m, width_m = LENGTH_WIDTH_M[object_type]
+        agent = TrafficAgent(
+            id=self._names.next_agent,
+            type=object_type,
+            **asdict(place.pose),
+            width_m=width_m,
+            length_m=length_m,
+            speed_mps=call.speed_mps,
+            lane_id=place.lane,
+            motion=call.motion,
+        )
+        try:
+            check_motions(self._shown, Modification(added=(agent,)))
+        except InvalidModification as fault:
+            raise ToolError(TOOL, str(fault)) from None
+        starts = [one.motion.start for one in (*self._shown.agents, agent) if one.motion]
+        awaited = {start.agent_id for start in starts if isinstance(start, AtPlace)}
+        others = tuple(a for a in self._shown.agents if a.motion or a.id in awaited)
+        motion = motion_of(replace(self._shown, agents=(*others, agent)))
+        moved = motion.others[-1]
+        found: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
+        return found | ({"started_s": _rounded(moved.started_s)} if call.motion else {})
+
+    def _at(self, after_s: float, moved: Movement, motion: Motion) -> dict[str, object]:
+        """Return where one is at the step nearest to a moment, and how far from the ego."""
+        step = round(after_s / motion.step_s)
+        x_m, y_m, heading_rad, speed_mps = moved.states[step].tolist()
+        if math.isnan(x_m):
+            return {"after_s": after_s, "error": "it has left the lanes of the map"}
+        ego_m = math.dist((x_m, y_m), motion.ego.states[step, :2].tolist())
+        lane_id = self._ground.graph.under(x_m, y_m, heading_rad)
+        return {
+            "after_s": after_s,
+            "x_m": _rounded(x_m),
+            "y_m": _rounded(y_m),
+            "heading_rad": _rounded(heading_rad, 3),
+            "speed_mps": _rounded(speed_mps),
+            "lane": lane_id and self._names.lanes[lane_id],
+            "ego_distance_m": _rounded(ego_m),
+        }
 
     def _line(self, lane: object) -> tuple[LaneCurve, float]:
         """Return what a call goes along, and from where on it."""
@@ -322,6 +388,17 @@ class PoseTool:
         lane_id = self._ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
         short = None if lane_id is None else self._names.lanes[lane_id]
         return short if short in self.curves else None
+
+    def _beside(self, curve: LaneCurve, centre: Pose) -> list[str]:
+        """Return the shown lanes beside a place on a lane that a path may change to."""
+        graph = self._ground.graph
+        return [
+            self._names.lanes[one.lane_id]
+            for one in graph.beside(centre.x_m, centre.y_m)
+            if one.beyond_m == 0.0
+            and self._names.lanes[one.lane_id] in self.curves
+            and run_beside(graph, curve.whole.id, one.lane_id)
+        ]
 
     def _side(self, centre: Pose, side: str, turn_rad: float) -> dict[str, Any]:
         """Return the side of the road in the direction turned so far from a lane's own."""

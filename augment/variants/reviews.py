@@ -234,7 +234,7 @@ def pictures(
     reviewed, never on a reference.
     """
     names = short_names(scene)
-    shown, change = (with_short_ids(one, names) for one in (scene, modification))
+    shown, change = with_short_ids(scene, names), with_short_ids(modification, names)
     return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 

@@ -1,5 +1,6 @@
 import hashlib
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -8,8 +9,9 @@ from augment.prompts import fill
 from augment.prompts.fill import VECTORS_VERSION
 from augment.prompts.vectors import LaneFormat, scene_text
 from augment.scene.entities import without_traffic
+from augment.scene.planned_motion import NearEgo, PlannedMotion
 from tests.fixtures.shelf import SLUGS, shown_scene
-from tests.scenes import junction, scene
+from tests.scenes import junction, scene, vehicle
 
 WISH = "Add a parked car 21.4 m ahead of the ego.\nIt stands 0.5 m left of the lane centre."
 
@@ -42,15 +44,17 @@ def test_no_line_of_an_instruction_ends_its_quotation(wish: str) -> None:
 
 def test_the_form_of_a_scene_is_pinned_to_its_version() -> None:
     """Whoever changes the form raises VECTORS_VERSION: stored answers are told apart by it."""
+    motion = PlannedMotion(speeds=((0.5, 0.0),), start=NearEgo(within_m=12.5))
+    moving = replace(junction(), agents=(replace(vehicle("Agent2", 9.0, 0.0), motion=motion),))
     text = "\n".join(
         scene_text(place, lanes=lanes)
-        for place in (scene(), junction(), without_traffic(shown_scene(SLUGS[0])))
+        for place in (scene(), moving, without_traffic(shown_scene(SLUGS[0])))
         for lanes in LaneFormat
     )
     digest = hashlib.sha256(text.encode()).hexdigest()
     assert (VECTORS_VERSION, digest) == (
-        4,
-        "97ca018209eb9ff276e22747a50f488b35082d328c6670397de44928733063b4",
+        5,
+        "e83e94695285cf43ad7e2aedacc590bf4eaf85ebc01f1e80b7dc7173e818e620",
     )
 
 

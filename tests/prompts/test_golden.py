@@ -3,12 +3,14 @@
 python -m tests.prompts.test_golden
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from augment.prompts.fill import regenerate_messages, result_text, said_by_user, viewer_messages
 from augment.scene.entities import Modification
+from augment.scene.planned_motion import LanePath, NearEgo, PlannedMotion
 from augment.variants.pipeline import form_of
 from augment.variants.recipes import RECIPES, VQA
 from augment.variants.respondents import ModelRole
@@ -17,8 +19,17 @@ from tests.scenes import junction, pedestrian, vehicle
 
 GOLDEN = Path(__file__).parent / "golden"
 WISH = "Add a parked car 21.4 m ahead of the ego.\nIt stands 0.5 m left of the lane centre."
+TURNS = PlannedMotion(
+    path=LanePath(lane_ids=("Lane1", "Connector2")),
+    speeds=((1.5, 3.0),),
+    start=NearEgo(within_m=12.0),
+)
 DONE = Modification(
-    added=(vehicle("Agent2", 21.4, 0.5), pedestrian("Agent3", 24.0, -5.0, (24.0, 5.0)))
+    added=(
+        vehicle("Agent2", 21.4, 0.5),
+        pedestrian("Agent3", 24.0, -5.0, (24.0, 5.0)),
+        replace(vehicle("Agent4", 12.0, 0.0), speed_mps=6.0, lane_id="Lane1", motion=TURNS),
+    )
 )
 
 CASES = [

@@ -62,6 +62,14 @@ def test_a_heading_is_wrapped() -> None:
 DRAFT = block(agent(x_m=3.0))
 
 
+def along(*lane_ids: str) -> dict[str, object]:
+    return {"kind": "lanes", "lane_ids": lane_ids}
+
+
+def at(name: str) -> dict[str, object]:
+    return {"kind": "place", "agent_id": name, "x_m": 1.0, "y_m": 2.0}
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -180,10 +188,10 @@ def test_neither_a_place_nor_the_end_of_a_walk_lies_beyond_the_radius(
 
 
 @pytest.mark.parametrize(
-    ("value_m", "is_read"), [(0.19, False), (0.2, True), (20.0, True), (20.01, False)]
+    ("value_m", "is_read"), [(0.09, False), (0.1, True), (20.0, True), (20.01, False)]
 )
 @pytest.mark.parametrize("key", ["width_m", "length_m"])
-def test_a_size_is_between_a_cone_and_an_articulated_bus(
+def test_a_size_is_between_a_door_and_an_articulated_bus(
     key: str, value_m: float, is_read: bool
 ) -> None:
     text = block(agent(**{key: value_m}))
@@ -202,6 +210,43 @@ def test_a_new_agent_takes_no_id_that_the_scene_uses_under_another_name() -> Non
     assert raised.value.problems == ["an added agent's id is taken: number them from Agent3"]
     (added,) = read_reply(block(agent(id="Agent3")), street).modification.added
     assert added.id == "Agent3"
+
+
+@pytest.mark.parametrize(
+    ("motion", "problem"),
+    [
+        (3, "add.0.motion: Input should be an object"),
+        ({"colour": 1}, "add.0.motion.colour: Unexpected keyword argument"),
+        ({"start": {"within_m": 3}}, "add.0.motion.start: Unable to extract tag using disc"),
+        (
+            {"start": {"kind": "hush" * 99}},
+            "add.0.motion.start.kind: Input should be 'time', 'ego_distance', 'place'",
+        ),
+        ({"start": {"kind": "time", "after_s": -1}}, "start.time.after_s: Input should be great"),
+        ({"start": at("Agent9")}, "Agent2: it waits for Agent9, who is none of Agent1, Agent7"),
+        ({"speeds": [["2", 0]]}, "add.0.motion.speeds.0.0: Input should be a valid number"),
+        ({"speeds": {}}, "add.0.motion.speeds: Input should be a valid list"),
+        ({"speeds": [[2, 0], [1, 0]]}, "add.0.motion: speeds: 1 s does not follow 2 s"),
+        ({"path": along()}, "path.lanes.lane_ids: List should have at least 1 item"),
+        ({"path": along("Lane9")}, "Agent2: Lane9 is no lane of the scene; its lanes: Lane1, Lan"),
+        ({"path": along("Lane1", "Lane2")}, "Lane2 neither follows Lane1 nor runs beside it"),
+        (
+            {"path": {"kind": "points", "points_m": [[160, 0], [160.01, 0]]}},
+            "Agent2: points_m must lie between -160 and 160",
+        ),
+    ],
+)
+def test_a_motion_that_can_not_be_read_is_refused_with_its_reason(
+    motion: object, problem: str
+) -> None:
+    (said,) = problems(block(agent(motion=motion)))
+    assert problem in said
+    assert "hush" not in said
+
+
+def test_nobody_has_a_walk_and_a_motion() -> None:
+    both = agent(type="PEDESTRIAN", walk_to=[1.0, 2.0], motion={"speeds": [[0, 2]]})
+    assert problems(block(both)) == ["Agent2: it has walk_to or a motion, not both"]
 
 
 READERS: list[Callable[[str], object]] = [

@@ -7,9 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import ToolError
-from augment.prompts.vectors import control_points, short_names
+from augment.geometry.polyline import Polyline
+from augment.prompts.vectors import control_points, short_names, with_short_ids
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AreaKind, SceneOptions, TurnType
+from augment.scene.entities import AreaKind, Scene, SceneOptions, TurnType
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_motion import LanePath
+from augment.scene.planned_mover import check_lane_path
 from augment.variants.pose_tool import OBJECT_TYPES, PoseTool
 from tests.fixtures.shelf import whole_scene
 from tests.scenes import curve, junction, scene, vehicle
@@ -213,3 +217,93 @@ any_json = st.recursive(
 )
 def test_whatever_is_called_the_answer_is_json(arguments: object) -> None:
     json.dumps(JUNCTION.answer(arguments), allow_nan=False)
+
+
+def two_lanes() -> Scene:
+    """Lane2 left of Lane1, the same way; Agent2 waits beside them."""
+    street = scene(agents=(vehicle("Agent2", 40.0, -6.0),))
+    left = replace(street.lanes[1], centerline=Polyline([(-50.0, 3.5), (100.0, 3.5)]))
+    return replace(street, lanes=(street.lanes[0], left))
+
+
+SETS_OUT = {"lane": "Lane2", "start": "Agent1", "distance_m": 30, "speed_mps": 4}
+
+
+def test_the_lanes_to_follow_are_those_beside_and_those_that_come_next() -> None:
+    tool = PoseTool(two_lanes())
+    assert tool.answer(SETS_OUT)["lanes_beside"] == ["Lane1"]
+    assert "lanes_beside" not in STREET.answer(SETS_OUT)  # Lane2 comes the other way
+    for name in ("market-crossing", "orchard-circle"):
+        world = with_short_ids(whole_scene(name), short_names(whole_scene(name)))
+        tool, graph = PoseTool(world), LaneGraph(world)
+        for lane in tool.curves:
+            place = tool.pose_on_lane(lane, "lane", 0.0)
+            for after in (*place.next_lanes, *(place.lanes_beside or ())):
+                check_lane_path(graph, LanePath(lane_ids=(lane, after)))
+
+
+@pytest.mark.parametrize(
+    ("motion", "started_s", "later"),
+    [
+        (None, None, [(4.0, 46.0, 3.5, 4.0), (15.0, 90.0, 3.5, 4.0)]),
+        # The ego, at 8 m/s, is 15 m away after 3.9 s, as in tests/scene/test_planned_motion.py.
+        (
+            {
+                "start": {"kind": "ego_distance", "within_m": 15},
+                "path": {"kind": "lanes", "lane_ids": ["Lane2", "Lane1"]},
+            },
+            3.9,
+            # 3.5 m across on 20 m are 0.43 m more of a way (the integral of the quintic).
+            [(3.9, 45.6, 3.5, 4.0), (10.0, 69.57, 0.0, 4.0)],
+        ),
+        # From 4 m/s to a stand within 2 s: 4 m, then nothing.
+        ({"speeds": [[2, 0]]}, 0.0, [(1.0, 33.0, 3.5, 2.0), (9.0, 34.0, 3.5, 0.0)]),
+        ({"start": {"kind": "place", "agent_id": "Agent2", "x_m": 0, "y_m": 0}}, None, []),
+        ({"start": {"kind": "place", "x_m": 16, "y_m": 0, "within_m": 0.1}}, 2.0, []),
+    ],
+)
+def test_where_it_is_later_is_what_its_motion_says(
+    motion: object, started_s: float | None, later: list[tuple[float, ...]]
+) -> None:
+    given = {} if motion is None else {"motion": motion}
+    seconds = {"after_s": [row[0] for row in later]} if later else {}
+    answer = PoseTool(two_lanes()).answer(SETS_OUT | given | seconds)
+    assert answer.get("started_s") == started_s
+    found = answer["later"]
+    assert isinstance(found, list)
+    assert [(at["after_s"], at["x_m"], at["y_m"], at["speed_mps"]) for at in found] == [
+        pytest.approx(row, abs=0.06) for row in later
+    ]
+    for at in found:
+        apart_m = math.dist((at["x_m"], at["y_m"]), (8.0 * at["after_s"], 0.0))
+        assert at["ego_distance_m"] == pytest.approx(apart_m, abs=0.02) or at["after_s"] > 12.0
+        assert at["lane"] == ("Lane1" if at["y_m"] < 1.0 else "Lane2")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"after_s": 15.1}, "after_s[0]: Input should be less than or equal to 15"),
+        ({"after_s": [1] * 17}, "after_s: Value should have at most 16 items"),
+        ({"speed_mps": -1}, "speed_mps: Input should be greater than or equal to 0"),
+        ({"motion": {"speed": 1}}, "motion.speed: is not a field of this format"),
+        (
+            {"motion": {"path": {"kind": "lanes", "lane_ids": ["Lane7"]}}},
+            "Agent3: Lane7 is no lane of the scene; its lanes: Lane1, Lane2",
+        ),
+        (
+            {"motion": {"start": {"kind": "place", "agent_id": "x", "x_m": 0, "y_m": 0}}},
+            "Agent3: it waits for x",
+        ),
+    ],
+)
+def test_what_can_not_be_carried_out_is_told(changes: dict[str, object], said: str) -> None:
+    answer = PoseTool(two_lanes()).answer(SETS_OUT | changes)
+    assert str(answer["error"]).startswith(said)
+
+
+def test_past_the_end_of_the_map_nobody_is_anywhere() -> None:
+    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 0, "speed_mps": 60, "after_s": 3}
+    assert PoseTool(two_lanes()).answer(call)["later"] == [
+        {"after_s": 3.0, "error": "it has left the lanes of the map"}
+    ]

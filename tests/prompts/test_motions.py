@@ -1,0 +1,95 @@
+"""A motion that stands in a prompt's lists is read back from an answer as it was."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment.prompts.reply import read_reply
+from augment.prompts.vectors import changes_text, scene_text, short_names, with_short_ids
+from augment.scene.entities import Modification, Scene
+from augment.scene.planned_motion import (
+    EGO_ID,
+    AtPlace,
+    AtTime,
+    LanePath,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+)
+from tests.scenes import junction, vehicle
+from tests.variants.playing import block
+
+FOREIGN = {"Lane1": "48", "Connector2": "turn:left", "Lane3": "Agent9"}
+
+
+def foreign() -> Scene:
+    """A junction with ids from elsewhere: a lane and a truck share one, another is like ours."""
+    names = replace(short_names(junction()), lanes=FOREIGN, agents={"Agent2": "48"})
+    return with_short_ids(replace(junction(), agents=(vehicle("Agent2", 30.0, 4.0),)), names)
+
+
+def hundredths(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.integers(round(low * 100), round(high * 100)).map(lambda number: number / 100)
+
+
+POINTS = st.tuples(hundredths(-160, 160), hundredths(-160, 160))
+PATHS = st.sampled_from([("48",), ("48", "turn:left"), ("turn:left", "Agent9")])
+MOTIONS = st.builds(
+    PlannedMotion,
+    path=st.none()
+    | st.builds(LanePath, lane_ids=PATHS, change_m=hundredths(1, 200))
+    | st.builds(
+        PointPath,
+        points_m=st.lists(POINTS, min_size=1, max_size=5).map(tuple),
+        keeps_heading=st.booleans(),
+    ),
+    speeds=st.lists(
+        st.tuples(hundredths(0, 60), hundredths(0, 100)), max_size=5, unique_by=lambda row: row[0]
+    ).map(lambda rows: tuple(sorted(rows))),
+    start=st.builds(AtTime, after_s=hundredths(0, 60))
+    | st.builds(NearEgo, within_m=hundredths(0.01, 500))
+    | st.builds(
+        AtPlace,
+        agent_id=st.sampled_from(["Agent1", "48"]),
+        x_m=hundredths(-99, 99),
+        y_m=hundredths(-99, 99),
+        within_m=hundredths(0.01, 500),
+    ),
+)
+
+
+def vector(text: str, name: str) -> list[Any]:
+    """An agent's entry in a list."""
+    (line,) = [one for one in text.splitlines() if f'"{name}": [' in one]
+    written = line[line.index(f'"{name}": ') + len(name) + 4 :]
+    values: list[Any] = json.JSONDecoder().raw_decode(written)[0]
+    return values
+
+
+def entry(name: str, values: list[Any]) -> dict[str, object]:
+    """The same as a model answers it."""
+    keys = ("type", "x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps", "lane")
+    return {"id": name, **dict(zip(keys, values, strict=False)), "motion": values[8]}
+
+
+@given(motion=MOTIONS)
+def test_every_motion_that_is_shown_is_read_back(motion: PlannedMotion) -> None:
+    street = foreign()
+    added = replace(vehicle("Agent3", 5.0, 0.0), lane_id="48", motion=motion)
+    moved = replace(street.agents[0], motion=motion)
+    if isinstance(motion.start, AtPlace):
+        start = replace(motion.start, agent_id=EGO_ID)
+        moved = replace(moved, motion=replace(motion, start=start))
+    change = Modification(added=(added,), moved=(moved,))
+    told = changes_text(street, change)
+    assert "turn:left" not in told
+    written = [entry(name, vector(told, name)) for name in ("Agent3", "Agent2")]
+    answer = block(written[0], move=[written[1]])
+    read = read_reply(answer, street).modification
+    assert (read.added[0].motion, read.added[0].lane_id) == (added.motion, "48")
+    assert (read.moved[0].id, read.moved[0].motion) == ("48", moved.motion)
+    in_scene = scene_text(replace(street, agents=(moved,)))
+    assert vector(in_scene, "Agent2") == vector(told, "Agent2")
