@@ -66,3 +66,24 @@ def test_the_image_runs_as_nobody_special() -> None:
     assert lines.index("USER arena") < next(
         number for number, line in enumerate(lines) if line.startswith("CMD")
     )
+
+
+def test_kubernetes_runs_what_compose_runs(services: dict[str, Any]) -> None:
+    documents = list(yaml.safe_load_all((ROOT / "kubernetes.yaml").read_text()))
+    pods = {
+        document["metadata"]["name"]: document["spec"]["template"]["spec"]
+        for document in documents
+        if document["kind"] in ("Job", "Deployment")
+    }
+    pairs = {"web": "arena-web", "worker": "arena-models", "render-worker": "arena-drawing"}
+    for name, pod in pairs.items():
+        command = pods[pod]["containers"][0]["command"][-1]
+        assert command.endswith(" ".join(services[name]["command"].split()))
+        grace_s = pods[pod]["terminationGracePeriodSeconds"]
+        assert grace_s == seconds(services[name]["stop_grace_period"])
+    assert pods["arena-prepare"]["containers"][0]["command"] == ["python", "manage.py", "prepare"]
+    values = [one for one in documents if one["kind"] in ("Secret", "ConfigMap")]
+    named = {name for one in values for name in (one.get("stringData") or one["data"])}
+    assert named - {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "OPENAI_API_KEY"} <= {
+        *Environment.model_fields
+    }
