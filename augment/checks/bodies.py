@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
 import shapely
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
 from augment.checks.ground import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
 from augment.geometry import frames
 from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.planned_motion import PointPath
 
 TOUCH_M = 0.01
 """Depths below this are rounding."""
@@ -45,7 +47,9 @@ USUAL_MPS: dict[AgentType, float] = {
     AgentType.PEDESTRIAN: 4.0,
 }
 """The fastest that still looks normal; what is not listed stands."""
-_RIDER = frozenset({AgentType.PEDESTRIAN, AgentType.BICYCLE})
+_MOVED_MPS = USUAL_MPS | {AgentType.GENERIC_OBJECT: 4.0}
+"""With a motion: also doors, balls and animals."""
+RIDERS = frozenset({AgentType.PEDESTRIAN, AgentType.BICYCLE})
 _LONG = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 
 
@@ -60,7 +64,7 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
 
     With the ego always wrong. Two stopped vehicles: contact up to 10 % is a fact, up to 20 %
     doubtful. People among themselves, also on bicycles: doubtful up to half. All others:
-    doubtful up to 5 %. Above, wrong.
+    doubtful up to 5 %. Above, wrong. A door in its car is a fact.
     """
     ego_id = situation.ground.scene.ego.id
     for agent, other in situation.new_pairs():
@@ -82,13 +86,21 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
 
 def _overlap_severity(one: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
     fine, doubtful = 0.0, SLIGHT_SHARE
-    if all(agent.type in VEHICLES and is_stopped(agent) for agent in (one, other)):
+    if any(_is_door(a) and b.type in VEHICLES for a, b in ((one, other), (other, one))):
+        fine = 1.0
+    elif all(agent.type in VEHICLES and is_stopped(agent) for agent in (one, other)):
         fine, doubtful = CRASH_SHARE, GROSS_CRASH_SHARE
-    elif one.type in _RIDER and other.type in _RIDER:
+    elif one.type in RIDERS and other.type in RIDERS:
         doubtful = CROWD_SHARE
     if share <= fine:
         return Severity.FACT
     return Severity.DOUBTFUL if share <= doubtful else Severity.WRONG
+
+
+def _is_door(agent: TrafficAgent) -> bool:
+    path = None if agent.motion is None else agent.motion.path
+    is_slide = isinstance(path, PointPath) and path.keeps_heading
+    return is_slide and agent.type is AgentType.GENERIC_OBJECT
 
 
 def size(situation: ChangedScene) -> Iterator[Finding]:
@@ -118,24 +130,28 @@ def size(situation: ChangedScene) -> Iterator[Finding]:
 def speed(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful above what is usual for the type or on its lane; wrong far above.
 
-    A thing that can't move and does is wrong.
+    Of who has a motion the highest one counts. A thing that can't move and does is wrong.
     """
     for agent in situation.changed:
-        usual_mps = USUAL_MPS.get(agent.type, STOPPED_BELOW_MPS)
+        known, speed_mps = USUAL_MPS, agent.speed_mps
+        if agent.id in situation.planned:
+            known = _MOVED_MPS
+            speed_mps = float(np.nanmax(situation.planned[agent.id].states[:, 3]))
+        usual_mps = known.get(agent.type, STOPPED_BELOW_MPS)
         most_mps, under = usual_mps, situation.under[agent.id]
         if under is not None and agent.type in (AgentType.VEHICLE, AgentType.BUS):
             limit_mps = situation.ground.graph.lanes[under.lane_id].speed_limit_mps
             most_mps = min(usual_mps, OVER_LIMIT * limit_mps) if limit_mps else usual_mps
-        if agent.speed_mps <= most_mps:
+        if speed_mps <= most_mps:
             continue
-        is_wrong = agent.type not in USUAL_MPS or agent.speed_mps > FAR_OFF * usual_mps
+        is_wrong = agent.type not in known or speed_mps > FAR_OFF * usual_mps
         yield find(
             FindingKind.SPEED,
             Severity.WRONG if is_wrong else Severity.DOUBTFUL,
             [agent],
             f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; up to {most_mps:.1f} m/s are usual "
             f"for {name_type(agent.type)} there.",
-            speed_mps=agent.speed_mps,
+            speed_mps=speed_mps,
         )
 
 
@@ -152,10 +168,10 @@ def end_of_walk(agent: TrafficAgent) -> Point | None:
 def walk_blocked(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful for every changed pedestrian whose walk leads through something that stands.
 
-    People are no obstacle to each other: they step aside.
+    People are no obstacle to each other: they step aside. A motion is not a walk.
     """
     for agent in situation.changed:
-        end = end_of_walk(agent)
+        end = None if agent.motion is not None else end_of_walk(agent)
         if agent.type is not AgentType.PEDESTRIAN or end is None:
             continue
         walk = shapely.LineString([(agent.x_m, agent.y_m), end])

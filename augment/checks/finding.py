@@ -27,6 +27,11 @@ class FindingKind(StrEnum):
     OVERLAP = "overlap"
     SIZE = "size"
     SPEED = "speed"
+    MOTION_TRIGGER = "motion_trigger"
+    MOTION_START = "motion_start"
+    MOTION_LIMITS = "motion_limits"
+    MOTION_OFF_ROAD = "motion_off_road"
+    MOTION_BLOCKED = "motion_blocked"
     ASKED_DISTANCE = "asked_distance"
     ASKED_ACROSS = "asked_across"
     ASKED_SPACING = "asked_spacing"
@@ -47,11 +52,13 @@ class FindingKind(StrEnum):
 _FAULTS = {
     FindingKind.LANE: FaultClass.POSITION,
     FindingKind.OFF_ROAD: FaultClass.POSITION,
+    FindingKind.MOTION_OFF_ROAD: FaultClass.POSITION,
     FindingKind.ASKED_DISTANCE: FaultClass.POSITION,
     FindingKind.ASKED_ACROSS: FaultClass.POSITION,
     FindingKind.ASKED_SPACING: FaultClass.POSITION,
     FindingKind.HEADING: FaultClass.HEADING,
     FindingKind.WALK_HEADING: FaultClass.HEADING,
+    FindingKind.MOTION_START: FaultClass.HEADING,
     FindingKind.ASKED_HEADING: FaultClass.HEADING,
 }
 """All others speak for a fault of logic."""

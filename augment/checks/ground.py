@@ -25,7 +25,7 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
-from augment.scene.motion import Motion, motion_of
+from augment.scene.motion import Motion, Movement, motion_of
 from augment.scene.planned_motion import AtPlace
 from augment.scene.recording import Recording
 
@@ -261,6 +261,13 @@ class ChangedScene:
     def motion(self) -> Motion:
         """What everybody does after the change."""
         return self.ground.motion_after(self.modification)
+
+    @cached_property
+    def planned(self) -> dict[str, Movement]:
+        """The changed agents with a motion, by id; without one nobody's is worked out."""
+        names = [agent.id for agent in self.changed if agent.motion is not None]
+        by_id = {one.agent.id: one for one in self.motion.others} if names else {}
+        return {name: by_id[name] for name in names}
 
     @cached_property
     def boxes(self) -> dict[str, Box]:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
-from augment.checks.ground import VEHICLES, ChangedScene, is_stopped
-from augment.geometry.frames import difference
+from augment.checks.ground import VEHICLES, ChangedScene, Ground, is_stopped
+from augment.geometry.frames import Box, difference
 from augment.scene.entities import AgentType, TrafficAgent
 
 NAMED_WITHIN_M = 0.5
@@ -132,6 +133,54 @@ def walk_heading(situation: ChangedScene) -> Iterator[Finding]:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stray:
+    """How far a box is off the ground of its kind.
+
+    Attributes:
+        over: How many of the kind's limits are passed: 1 is a fact, 2 doubtful, 3 wrong.
+        off: What the limits are of, a share or metres.
+    """
+
+    over: int
+    off: float
+    outside_share: float
+    gap_m: float
+
+    @property
+    def severity(self) -> Severity:
+        """How much it speaks against who passes a limit."""
+        return (Severity.FACT, Severity.DOUBTFUL, Severity.WRONG)[self.over - 1]
+
+
+def stray(ground: Ground, kind: AgentType, box: Box) -> Stray:
+    """Measure a box against the limits of its kind, as `off_road` has them."""
+    surface = ground.road if kind in VEHICLES | _EDGE else ground.everything
+    share = surface.share_outside(box.corners_m)
+    gap_m = surface.distance_m(box.pose.x_m, box.pose.y_m)
+    off, limits = gap_m, (0.0, VERGE_M, FAR_FROM_PATHS_M)
+    if kind in VEHICLES:
+        off, limits = share, (SEEN_SHARE, KERB_SHARE, MOST_SHARE)
+    elif kind in _EDGE:
+        limits = (EDGE_M, EDGE_M, NEAR_ROAD_M)
+    elif ground.walkways.is_empty:
+        limits = (0.0, math.inf, math.inf)
+    over = sum(off > limit for limit in limits)
+    return Stray(over=over, off=off, outside_share=share, gap_m=gap_m)
+
+
+def name_stray(kind: AgentType) -> str:
+    """Return the words for a `Stray` of a kind."""
+    if kind in VEHICLES:
+        return (
+            "{outside_share:.0%} of {agents[0]} is outside the drivable area; its centre is "
+            "{gap_m:.1f} m off it."
+        )
+    if kind in _EDGE:
+        return "{agents[0]} is {gap_m:.1f} m off the road and its edge."
+    return "{agents[0]} is {gap_m:.1f} m off everything that the map shows."
+
+
 def off_road(situation: ChangedScene) -> Iterator[Finding]:
     """Changed agents off their ground; nothing for who stands where its kind belongs.
 
@@ -142,25 +191,13 @@ def off_road(situation: ChangedScene) -> Iterator[Finding]:
     """
     ground = situation.ground
     for agent in () if ground.road.is_empty else situation.changed:
-        surface = ground.road if agent.type in VEHICLES | _EDGE else ground.everything
-        share = surface.share_outside(situation.boxes[agent.id].corners_m)
-        gap_m = surface.distance_m(agent.x_m, agent.y_m)
-        off, words = gap_m, "{agents[0]} is {gap_m:.1f} m off the road and its edge."
-        if agent.type in VEHICLES:
-            off, limits = share, (SEEN_SHARE, KERB_SHARE, MOST_SHARE)
-            words = (
-                "{outside_share:.0%} of {agents[0]} is outside the drivable area; its centre is "
-                "{gap_m:.1f} m off it."
+        found = stray(ground, agent.type, situation.boxes[agent.id])
+        if found.over:
+            yield find(
+                FindingKind.OFF_ROAD,
+                found.severity,
+                [agent],
+                name_stray(agent.type),
+                outside_share=found.outside_share,
+                gap_m=found.gap_m,
             )
-        elif agent.type in _EDGE:
-            limits = (EDGE_M, EDGE_M, NEAR_ROAD_M)
-        else:
-            limits = (0.0, VERGE_M, FAR_FROM_PATHS_M)
-            if ground.walkways.is_empty:
-                limits = (0.0, math.inf, math.inf)
-            words = "{agents[0]} is {gap_m:.1f} m off everything that the map shows."
-        over = sum(off > limit for limit in limits)
-        if over:
-            severity = (Severity.FACT, Severity.DOUBTFUL, Severity.WRONG)[over - 1]
-            kind = FindingKind.OFF_ROAD
-            yield find(kind, severity, [agent], words, outside_share=share, gap_m=gap_m)

@@ -25,6 +25,13 @@ from augment.checks.bodies import overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import ChangedScene, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
+from augment.checks.motions import (
+    motion_blocked,
+    motion_limits,
+    motion_off_road,
+    motion_start,
+    motion_trigger,
+)
 from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
 from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
 from augment.scene.entities import Modification
@@ -32,12 +39,18 @@ from augment.scene.intent import Intent, VehicleRequest
 
 CHECKS: tuple[Check, ...] = (
     *(lane, lane_named, heading, walk_heading, walk_blocked, off_road, overlap, size, speed),
+    *(motion_trigger, motion_start, motion_limits, motion_off_road, motion_blocked),
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),
     *(asked_walk, asked_motion, asked_spacing, asked_changes),
 )
-_OF_PLACE = frozenset({FindingKind.HEADING, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD})
+_OF_PLACE = frozenset(
+    {
+        *(FindingKind.HEADING, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD),
+        *(FindingKind.MOTION_START, FindingKind.MOTION_OFF_ROAD),
+    }
+)
 
 
 def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ...]:

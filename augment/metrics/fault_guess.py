@@ -10,6 +10,7 @@ _FOLLOWS_PLACE = frozenset(
     {
         FindingKind.OVERLAP,
         FindingKind.WALK_BLOCKED,
+        FindingKind.MOTION_BLOCKED,
         FindingKind.ASKED_CROSSING,
         FindingKind.LANE_NAMED,
     }

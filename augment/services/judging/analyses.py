@@ -18,7 +18,7 @@ from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job
-from augment.services.judging.findings import find_readable
+from augment.services.judging.findings import findings_by_row
 from augment.services.judging.realism import realism_of_rows
 
 State = Augmentation.State
@@ -54,13 +54,12 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample."""
     rows = job.augmentations.select_related("scenario__base_scene")
     scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
-    realism = realism_of_rows(list(scenes))
+    realism, found = realism_of_rows(list(scenes)), findings_by_row(scenes.values())
     for line in _lines(job):
         if line.row.pk in realism:
             line = replace(line, realism=realism[line.row.pk].mean)
-        findings = find_readable(scenes[line.row.pk])
-        if findings is not None:
-            counts = Counter(finding.severity for finding in findings)
+        if line.row.pk in found:
+            counts = Counter(finding.severity for finding in found[line.row.pk])
             wrong, doubtful = counts[Severity.WRONG], counts[Severity.DOUBTFUL]
             line = replace(line, wrong=wrong, doubtful=doubtful)
         yield line

@@ -3,9 +3,11 @@
 The reference and anybody's labels stay out of it.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import lru_cache
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from typing import Any
 
 from augment.checks import Finding as Finding
@@ -19,8 +21,9 @@ from augment.models import Augmentation, Scenario
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent
 from augment.services.scenarios.editing import editable_scene, read_edit, snap
-from augment.services.scenarios.scenes import intent_of, scene_of
+from augment.services.scenarios.scenes import intent_of, recording_of, scene_of
 
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
 
@@ -61,9 +64,34 @@ def findings_of(row: Augmentation) -> tuple[Finding, ...]:
         InvalidDocument: The stored scene, intent or modification can't be read.
         InvalidModification: They do not fit together.
     """
-    modification = modification_from_document(row.modification)
-    ground = Ground.of(scene_of(row.scenario))
-    return _worst_first(check_against_intent(ground, modification, intent_of(row.scenario)))
+    return _check(row, ground_of(row.scenario), intent_of(row.scenario))
+
+
+def ground_of(scenario: Scenario) -> Ground:
+    """Return the ground of a scenario, whose recording is read where something moves.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return Ground.of(scene_of(scenario), partial(recording_of, scenario))
+
+
+def findings_by_row(rows: Iterable[Augmentation]) -> dict[int, tuple[Finding, ...]]:
+    """Return the findings about all rows that can be checked, by key; a scene is read once."""
+    by_scenario: defaultdict[Scenario, list[Augmentation]] = defaultdict(list)
+    for row in rows:
+        if row.modification is not None:
+            by_scenario[row.scenario].append(row)
+    found = {}
+    for scenario, own in by_scenario.items():
+        try:
+            ground, intent = ground_of(scenario), intent_of(scenario)
+        except InvalidDocument:
+            continue
+        for row in own:
+            with suppress(InvalidDocument, InvalidModification):
+                found[row.pk] = _check(row, ground, intent)
+    return found
 
 
 def check_augmentation(row: Augmentation) -> Checked | None:
@@ -90,7 +118,9 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         if snapped:
             modification = snap(scenario, modification, snapped)
         intent = intent_of(scenario)
-        ground = _ground(editable_scene(scenario))
+        ground = replace(
+            _ground(editable_scene(scenario)), read_recording=partial(recording_of, scenario)
+        )
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
@@ -101,17 +131,9 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
     )
 
 
-def find_readable(row: Augmentation) -> tuple[Finding, ...] | None:
-    """Return the findings about a row; None without a modification that can be read."""
-    try:
-        return None if row.modification is None else findings_of(row)
-    except (InvalidDocument, InvalidModification):
-        return None
-
-
 def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
     """Guess a row's faults by its findings; None without a modification that can be read."""
-    findings = find_readable(row)
+    findings = findings_by_row([row]).get(row.pk)
     return None if findings is None else first_guess(findings)
 
 
@@ -121,6 +143,11 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
 @lru_cache(maxsize=4)
 def _ground(scene: Scene) -> Ground:
     return Ground.of(scene)
+
+
+def _check(row: Augmentation, ground: Ground, intent: Intent | None) -> tuple[Finding, ...]:
+    modification = modification_from_document(row.modification)
+    return _worst_first(check_against_intent(ground, modification, intent))
 
 
 def _worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -1,19 +1,16 @@
 """One number an augmentation by each metric, more being better: what votes are held against."""
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable
+from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
-from augment.checks import Ground, Severity
-from augment.checks.registry import check_against_intent
-from augment.errors import InvalidDocument, InvalidModification
-from augment.models import Augmentation, Contestant, Scenario, Simulation
-from augment.scene.codec import modification_from_document
+from augment.checks import Severity
+from augment.models import Augmentation, Contestant, Simulation
 from augment.services.judging.displacement import of_rows
+from augment.services.judging.findings import findings_by_row
 from augment.services.judging.realism import realism_of_rows
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.scenarios.scenes import intent_of, scene_of
 
 SAME_M = 0.15
 """Displacements that differ by no more are equal: objects so near each other look the same."""
@@ -57,35 +54,17 @@ def _displacement(ids: Collection[int]) -> MetricScores:
 def _checks(ids: Collection[int]) -> MetricScores:
     """Fewer wrong findings are better, then fewer doubtful ones; no answer is worst."""
     rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
-    by_scenario: defaultdict[Scenario, list[Augmentation]] = defaultdict(list)
-    for row in rows.select_related("scenario__base_scene").defer(
-        "scenario__base_scene__recording", "scenario__reference"
-    ):
-        by_scenario[row.scenario].append(row)
-    scores: dict[str, float] = {}
-    for scenario, own in by_scenario.items():
-        scores |= _check_scenario(scenario, own)
-    return MetricScores(name="Checks", by_code=scores)
-
-
-def _check_scenario(scenario: Scenario, rows: Iterable[Augmentation]) -> dict[str, float]:
-    try:
-        ground, intent = Ground.of(scene_of(scenario)), intent_of(scenario)
-    except InvalidDocument:
-        return {}
-    scores = {}
-    for row in rows:
+    related = rows.select_related("scenario__base_scene")
+    checked = list(related.defer("scenario__base_scene__recording", "scenario__reference"))
+    found, scores = findings_by_row(checked), dict[str, float]()
+    for row in checked:
         if row.state in UNREADABLE_OR_REFUSED:
             scores[str(row.code)] = -math.inf
-            continue
-        try:
-            change = modification_from_document(row.modification)
-            findings = check_against_intent(ground, change, intent)
-        except (InvalidDocument, InvalidModification):
-            continue
-        found = Counter(finding.severity for finding in findings)
-        scores[str(row.code)] = -found[Severity.WRONG] - min(found[Severity.DOUBTFUL], 99) / 100
-    return scores
+        elif row.pk in found:
+            counts = Counter(finding.severity for finding in found[row.pk])
+            doubts = min(counts[Severity.DOUBTFUL], 99) / 100
+            scores[str(row.code)] = -counts[Severity.WRONG] - doubts
+    return MetricScores(name="Checks", by_code=scores)
 
 
 def _realism(ids: Collection[int]) -> MetricScores:
