@@ -1,11 +1,13 @@
-"""Drive a job's results, or one scenario, in closed loop; `export driving` has the means."""
+"""Drive a job's results, one scenario, or files; `export driving` has the means of a job."""
 
+from pathlib import Path
 from typing import Any
 
 from django.db import transaction
 
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
+from augment.services.judging.drive_files import drive_files, read_shard
 from augment.services.judging.driving_scores import clearance_text, least_clearance_m
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
@@ -14,7 +16,7 @@ from augment.tasks import check_broker, enqueue_simulations
 
 
 class Command(TerminalCommand):
-    """simulate JOB|SCENARIO [--planner P] [--offsets O] [--reactive] [--queue]."""
+    """simulate JOB|SCENARIO|FOLDER [--planner P] [--queue] [--to FOLDER --shard I/N] ..."""
 
     help = (
         "Let a planner drive every result of a job, with the scenes before the change and with "
@@ -22,7 +24,10 @@ class Command(TerminalCommand):
     )
 
     arguments = {
-        "what": {"help": "name or code of a job, or slug of a scenario"},
+        "what": {
+            "help": "name or code of a job, slug of a scenario, or with --to a folder of "
+            "scenarios as `export scenarios --format json` and `sweep --to` write it"
+        },
         "--planner": {
             "default": "pdm-closed",
             "help": "pdm-closed, idm, or a class's dotted path; the workers (--queue) load only "
@@ -37,6 +42,11 @@ class Command(TerminalCommand):
             "help": "recorded vehicles answer to the ego instead of being replayed",
         },
         "--queue": {"action": "store_true", "help": "leave the drives to the workers and return"},
+        "--to": {"type": Path, "help": "a folder for one JSON a drive; needs no database"},
+        "--shard": {
+            "default": "1/1",
+            "help": "with --to: the I-th of N parts, such as 2/8, for one task of an array",
+        },
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -44,6 +54,9 @@ class Command(TerminalCommand):
         how = Options(
             planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
+        if options["to"] is not None:
+            self._drive_files(options, how)
+            return
         scenario = Scenario.objects.filter(slug=options["what"]).first()
         job = None if scenario is not None else find_job(options["what"])
         also = () if options["queue"] else (how.planner,)
@@ -64,6 +77,12 @@ class Command(TerminalCommand):
         for number, pk in enumerate(waiting, start=1):
             simulations.Drives(also).perform(pk)
             self._say(pk, f"{number}/{len(waiting)}")
+
+    def _drive_files(self, options: dict[str, Any], how: Options) -> None:
+        source, shard = Path(options["what"]), read_shard(options["shard"])
+        for name, score in drive_files(source, options["to"], options=how, shard=shard):
+            self.stdout.write(f"{name}: nuPlan {100.0 * score:.1f}")
+            self.stdout.flush()
 
     def _say(self, pk: int, place: str) -> None:
         row = Simulation.objects.select_related("scenario", "augmentation__contestant").get(pk=pk)

@@ -1,0 +1,99 @@
+"""Drives from files to files, without a database: a part of them for each task of an array.
+
+In: a folder as the own JSON's writer makes it: `<name>.before.json`, `<name>.modification.json`
+and, where there is one, `<name>.recording.json`. Out: `<name>.drive.json`, each a function of its
+own three files alone, so that all parts together are one run byte for byte.
+"""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from augment.errors import Conflict
+from augment.formats.documents import read_json
+from augment.scene import codec
+from augment.services.judging.simulations import NUPLAN, Options, document_of, load_planner
+from augment.simulation.drive import expert_of, run
+from augment.simulation.road import Road
+from augment.simulation.score import ScoreKind, score_drive
+from augment.simulation.traffic import DriveSetting
+
+_BEFORE = ".before.json"
+
+
+def read_shard(text: str) -> tuple[int, int]:
+    """Return which part of how many `2/8` is.
+
+    Raises:
+        Conflict: It is none.
+    """
+    found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
+    part, parts = map(int, found.groups()) if found else (1, 0)
+    if part > parts:
+        raise Conflict(f"A shard is I/N with I from 1 to N, such as 2/8, not {text!r}.")
+    return part, parts
+
+
+def drive_files(
+    source: Path, out: Path, *, options: Options, shard: tuple[int, int]
+) -> Iterator[tuple[str, float]]:
+    """Drive every N-th scenario of a folder, by name; yield each name with nuPlan's score.
+
+    A result that is there already is written anew, whole or not at all.
+
+    Args:
+        source: Where the scenarios are.
+        out: Where the results go; made where it is missing.
+        options: How to drive; the planner may be any class's dotted path.
+        shard: Which part, counted from 1, and how many there are.
+
+    Raises:
+        Conflict: The folder has no scenario.
+        UnknownName, CannotDrive, InvalidDocument, InvalidModification: Of planner or files.
+    """
+    names = sorted(file.name.removesuffix(_BEFORE) for file in source.glob(f"*{_BEFORE}"))
+    if not names:
+        raise Conflict(f"{source} has no *{_BEFORE}: it is no folder of scenarios as own JSON.")
+    out.mkdir(parents=True, exist_ok=True)
+    part, parts = shard
+    for name in names[part - 1 :: parts]:
+        document = _drive(_setting(source, name, options), options)
+        text = json.dumps({"scenario": name, **document}, indent=1, sort_keys=True) + "\n"
+        scratch = out / f".{name}.{part}"
+        scratch.write_text(text, encoding="utf-8")
+        scratch.replace(out / f"{name}.drive.json")
+        yield name, document["score"]
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _setting(source: Path, name: str, options: Options) -> DriveSetting:
+    def read(what: str) -> object:
+        return read_json(source / f"{name}.{what}.json", what=what)
+
+    has_recording = (source / f"{name}.recording.json").exists()
+    return DriveSetting(
+        scene=codec.scene_from_document(read("before")),
+        modification=codec.modification_from_document(read("modification")),
+        recording=codec.recording_from_document(read("recording")) if has_recording else None,
+        reactive=options.is_reactive,
+    )
+
+
+def _drive(setting: DriveSetting, options: Options) -> dict[str, Any]:
+    road = Road(setting.scene, setting.recording)
+    drove = run(setting, load_planner(options, also=(options.planner,)), road=road)
+    score = score_drive(drove, expert_of(setting, road), modification=setting.modification)
+    return {
+        "format": "scenario-arena/drive",
+        "version": 1,
+        "planner": options.planner,
+        "offsets": options.offsets,
+        "is_reactive": options.is_reactive,
+        "score": score.value,
+        "kind": NUPLAN,
+        **document_of(drove, {ScoreKind.NUPLAN: score}),
+    }
