@@ -154,6 +154,12 @@ def enqueue_job(job_pk: int) -> int:
     return enqueue(AUGMENTATIONS, unsent)
 
 
+def enqueue_sweep(sweep_pk: int) -> int:
+    """Send the messages of a sweep's drives; as `enqueue`."""
+    unsent = DRIVES.find_unsent(older_than=RESEND_AFTER, only=Q(swept__sweep=sweep_pk))
+    return enqueue(DRIVES, unsent)
+
+
 def enqueue_judge(run_pk: int) -> int:
     """Send the messages of the pairs that a judge has not been asked about; as `enqueue`."""
     unsent = JUDGEMENTS.find_unsent(older_than=RESEND_AFTER, only=Q(run=run_pk))

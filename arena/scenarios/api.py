@@ -12,8 +12,8 @@ from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.access import ENTRANTS, STAFF
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.access import ADMINS, ENTRANTS, STAFF
+from arena.api.fields import FlagField, RequestBody, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
     ApiView,
     Given,
@@ -26,8 +26,11 @@ from arena.api.views import (
 )
 from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
-from augment.models import Scenario, SceneUpload, Submission, UploadMoment
+from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
+from augment.services.inputs import read_request
+from augment.services.judging.sweeps import LARGEST_FAMILY, SweepRequest, add_family, plan_sweep
+from augment.services.judging.thresholds import SweepResult, result_of
 from augment.services.scenarios import uploads
 from augment.services.scenarios.benchmarks import find_benchmark
 from augment.services.scenarios.scene_imports import notes_of
@@ -38,7 +41,13 @@ from augment.services.scenarios.scenes import (
     add_scenario,
 )
 from augment.services.scenarios.submissions import keep_submission
-from augment.tasks import enqueue_moment, enqueue_scenario, enqueue_submission, enqueue_upload
+from augment.tasks import (
+    enqueue_moment,
+    enqueue_scenario,
+    enqueue_submission,
+    enqueue_sweep,
+    enqueue_upload,
+)
 
 
 class ScenarioQuery(PageQuery):
@@ -265,6 +274,120 @@ class MomentView(ApiView):
         """
         rows = UploadMoment.objects.select_related("upload", "scene").defer("upload__tracks")
         return get_object_or_404(rows, code=code)
+
+
+class SweepBody(RequestBody):
+    """A new sweep."""
+
+    request = SweepRequest
+
+
+class SweptTrial(serializers.Serializer[Any]):
+    """A drive of a value that has a score."""
+
+    driver = serializers.CharField()
+    score = serializers.FloatField(help_text="By nuPlan, 0 to 1.")
+    is_lawful = serializers.BooleanField(
+        help_text="It hit nobody, stayed on the road and made progress."
+    )
+    is_tested = serializers.BooleanField()
+
+
+class SweptValueDocument(serializers.Serializer[Any]):
+    """A value of a sweep."""
+
+    value = serializers.FloatField(source="row.value")
+    reason = serializers.CharField(source="row.reason", help_text="Why it fits nowhere.")
+    trials = SweptTrial(many=True, source="tried.trials")
+
+
+class SweepDocument(WarnedDocument):
+    """A sweep as far as it has been driven."""
+
+    code = serializers.UUIDField(source="sweep.code")
+    scenario = serializers.CharField(source="sweep.scenario.slug")
+    number = serializers.CharField(source="sweep.number")
+    planned = serializers.IntegerField(help_text="Drives.")
+    under_way = serializers.IntegerField(help_text="Drives that wait or run; 0 at the end.")
+    verdict = serializers.CharField()
+    edges = serializers.ListField(
+        child=serializers.ListField(child=serializers.FloatField()),
+        help_text="Neighbours with another outcome: passed, failed.",
+    )
+    hardest = serializers.CharField(
+        source="sweep.hardest.slug",
+        default=None,
+        allow_null=True,
+        help_text="The scenario that was kept.",
+    )
+    values = SweptValueDocument(many=True, source="lines")
+
+
+class SweepsView(ApiView):
+    """Sweeps of a scenario."""
+
+    writers = ADMINS
+
+    @operation(SweepDocument, takes=SweepBody, status=202, name="startSweep")
+    def post(self, code: uuid.UUID, given: Given) -> tuple[SweepResult, list[str]]:
+        """Drive one number of a scenario at several values.
+
+        Poll it until nothing is under way.
+        """
+        asked = read_request(SweepRequest, given)
+        plan = partial(plan_sweep, scenario=_scenario(code), request=asked, actor=self.user)
+        sweep, warnings = keep_and_send(plan, enqueue_sweep)
+        return result_of(sweep), warnings
+
+
+class SweepView(ApiView):
+    """One sweep."""
+
+    readers = STAFF
+
+    @operation(SweepDocument, name="getSweep")
+    def get(self, code: uuid.UUID) -> SweepResult:
+        """A sweep.
+
+        Scores by value and planner, where the planner fails, and what was kept.
+        """
+        rows = Sweep.objects.select_related("scenario", "hardest")
+        return result_of(get_object_or_404(rows, code=code))
+
+
+class FamilyBody(StrictSerializer):
+    """How many scenarios are drawn."""
+
+    count = WholeNumberField(min_value=1, max_value=LARGEST_FAMILY)
+    seed = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME, required=False, default=0)
+
+
+class FamilyDocument(serializers.Serializer[Any]):
+    """The scenarios that were drawn."""
+
+    scenarios = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
+    refused = serializers.ListField(
+        child=serializers.CharField(), help_text="Why further draws fit nowhere."
+    )
+
+
+class FamilyView(ApiView):
+    """Families of a scenario."""
+
+    writers = STAFF
+
+    @operation(FamilyDocument, takes=FamilyBody, status=201, name="drawFamily")
+    def post(self, code: uuid.UUID, given: Given) -> dict[str, list[str]]:
+        """Add scenarios with numbers drawn from the ranges of one's intent."""
+        rows, refused = add_family(scenario=_scenario(code), **given, actor=self.user)
+        return {
+            "scenarios": [row.slug for row in rows],
+            "refused": [member.refusal for member in refused],
+        }
+
+
+def _scenario(code: uuid.UUID) -> Scenario:
+    return get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
 
 
 class SubmissionBody(StrictSerializer):

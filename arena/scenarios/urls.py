@@ -8,6 +8,7 @@ from arena.scenarios.pages import (
     editor,
     scenarios,
     submissions,
+    sweeps,
     uploads,
 )
 
@@ -46,6 +47,12 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/<uuid:code>/intent/", scenarios.set_intent, name="set-intent"),
     path("scenarios/<uuid:code>/read/", scenarios.read_instruction, name="intent-read"),
     path("scenarios/<uuid:code>/intent.json", scenarios.intent_file, name="intent"),
+    path("scenarios/<uuid:code>/sweeps/", sweeps.sweeps_page, name="sweeps"),
+    path("scenarios/<uuid:code>/sweeps/start/", sweeps.start_sweep, name="sweep-start"),
+    path("scenarios/<uuid:code>/family/", sweeps.draw_family, name="family-draw"),
+    path("sweeps/<uuid:code>/", sweeps.sweep_page, name="sweep"),
+    path("sweeps/<uuid:code>/files/<slug:form>", sweeps.sweep_file, name="sweep-file"),
+    path("sweeps/<uuid:code>/remove/", sweeps.remove_sweep, name="sweep-remove"),
     path("benchmarks/", benchmarks.benchmarks_page, name="benchmarks"),
     path("benchmarks/new/", benchmarks.new_benchmark_page, name="benchmark-new"),
     path("benchmarks/<uuid:code>/", benchmarks.benchmark_page, name="benchmark"),

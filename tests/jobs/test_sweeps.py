@@ -1,19 +1,30 @@
 """Sweeps as rows: a threshold as brute force finds it, dead workers lose nothing, what is kept."""
 
+from dataclasses import replace
 from datetime import timedelta
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import pytest
+from django.core.management import call_command
+from django.core.management.base import CommandError
 from pytest_django import Settings
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Scenario, Simulation, Sweep
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
-from augment.scene.intent import Shape
+from augment.scene.intent import Intent, Shape
 from augment.services.judging.driving_scores import options_driven
 from augment.services.judging.simulations import DRIVES, Options
-from augment.services.judging.sweeps import numbers_of, plan_sweep, ways_of
+from augment.services.judging.sweeps import (
+    SweepRequest,
+    add_family,
+    numbers_of,
+    plan_sweep,
+    ways_of,
+)
 from augment.services.judging.thresholds import conclude, result_of
 from augment.services.scenarios.scenes import intent_of, reference_of
 from augment.simulation.drive import expert_of, run
@@ -21,7 +32,7 @@ from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.traffic import DriveSetting
 from tests.drives import short_drive
-from tests.intents import cones
+from tests.intents import cones, metres
 from tests.jobs import rows
 from tests.jobs.test_simulations import Straight
 from tests.scenes import scene, vehicle
@@ -42,13 +53,17 @@ def parked(y_m: float) -> Modification:
     return Modification(added=(vehicle("Agent2", 30.0, y_m),))
 
 
-def planned(low: float = 0.0, high: float = 3.5, count: int = 8) -> tuple[Sweep, list[int]]:
+def planned(low: float = 0.0, high: float = 3.5, count: int = 8) -> Sweep:
     """A sweep of how far to the left a car stands in front of one who never steers."""
     document = modification_to_document(parked(0.0))
     scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
-    return plan_sweep(
-        scenario=scenario, number=ACROSS, low=low, high=high, count=count, options=STRAIGHT
-    )
+    return plan_sweep(scenario=scenario, request=asked(low=low, high=high, count=count))
+
+
+def asked(**changed: Any) -> SweepRequest:
+    """A request: of a car's place across the lane, unless something else is said."""
+    given: dict[str, Any] = {"number": ACROSS, "low": 0.0, "high": 1.0, "count": 2}
+    return SweepRequest(**given | {"planner": STRAIGHT.planner} | changed)
 
 
 def drive_tested() -> None:
@@ -76,8 +91,8 @@ def settle_others(**scores: float) -> None:
 
 
 def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
-    sweep, waiting = planned()
-    assert len(waiting) == 8 * len(ways_of(STRAIGHT)) == 32
+    sweep = planned()
+    assert Simulation.objects.count() == 8 * len(ways_of(STRAIGHT)) == 32
     drive_tested()
     result = result_of(sweep)
     by_hand = {}
@@ -94,7 +109,7 @@ def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
 
 
 def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> None:
-    sweep, _ = planned(1.0, 3.0, 3)
+    sweep = planned(1.0, 3.0, 3)
     settle_others(at_1=0.5, at_2=0.8, at_3=0.1)
     drive_tested()
     sweep.refresh_from_db()
@@ -110,7 +125,7 @@ def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> Non
 
 
 def test_nothing_is_kept_where_nobody_solves_what_the_planner_fails() -> None:
-    sweep, _ = planned(1.0, 3.0, 3)
+    sweep = planned(1.0, 3.0, 3)
     settle_others(at_3=0.9)
     drive_tested()
     sweep.refresh_from_db()
@@ -119,7 +134,7 @@ def test_nothing_is_kept_where_nobody_solves_what_the_planner_fails() -> None:
 
 
 def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> None:
-    sweep, _ = planned(2.0, 3.0, 2)
+    sweep = planned(2.0, 3.0, 2)
     settle_others(at_2=0.8)
     first, last = Simulation.objects.filter(planner=STRAIGHT.planner).order_by("pk")
     held = DRIVES.take(first.pk, now=rows.NOON)
@@ -144,8 +159,8 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     scenario = rows.add_scenario("cones", intent=intent)
     number = "requests[0].spot.distance"
     assert number in numbers_of(scenario)
-    sweep, _ = plan_sweep(
-        scenario=scenario, number=number, low=20.0, high=220.0, count=3, options=STRAIGHT
+    sweep = plan_sweep(
+        scenario=scenario, request=asked(number=number, low=20.0, high=220.0, count=3)
     )
     near, middle, far = result_of(sweep).lines
     assert near.row.modification is not None
@@ -164,7 +179,7 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     ("changed", "error", "words"),
     [
         ({"number": "add[7].y_m"}, UnknownName, r"add\[0\]\.y_m"),
-        ({"options": Options(planner="nobody.Knows")}, UnknownName, "pdm-closed"),
+        ({"planner": "nobody.Knows"}, UnknownName, "pdm-closed"),
         ({"high": -1.0}, InvalidDocument, "above low"),
         ({"number": "add[0].width_m", "low": 200.0, "high": 300.0}, Conflict, "No value"),
     ],
@@ -174,17 +189,52 @@ def test_a_sweep_that_can_not_be_is_refused(
 ) -> None:
     document = modification_to_document(parked(0.0))
     scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
-    asked: dict[str, Any] = {"number": ACROSS, "low": 0.0, "high": 1.0, "count": 2}
-    asked |= {"options": STRAIGHT, **changed}
     with pytest.raises(error, match=words):
-        plan_sweep(scenario=scenario, **asked)
+        plan_sweep(scenario=scenario, request=asked(**changed))
     assert not Sweep.objects.exists()
+
+
+def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -> None:
+    spot = replace(cones(20.0, 1, Shape.LINE).requests[0].spot, distance=metres(20.0, 200.0))
+    ranged = Intent(requests=(replace(cones(20.0, 1, Shape.LINE).requests[0], spot=spot),))
+    scenario = rows.add_scenario("cones", intent=intent_to_document(ranged))
+    made, refused = add_family(scenario=scenario, count=10, seed=1)
+    assert (len(made) + len(refused), bool(made), bool(refused)) == (10, True, True)
+    assert [row.slug for row in made] == [f"cones-{n}" for n in range(1, len(made) + 1)]
+    for row in made:
+        intent, reference = intent_of(row), reference_of(row)
+        assert intent is not None
+        assert reference is not None
+        distance = intent.requests[0].spot.distance
+        assert distance is not None
+        assert reference.added[0].x_m == pytest.approx(distance.low_m, abs=0.5)
+        assert f"{distance} ahead" in row.instruction
+    with pytest.raises(Conflict, match="1 to 100"):
+        add_family(scenario=scenario, count=0, seed=1)
+
+
+def said(command: str, *arguments: str, **options: Any) -> str:
+    out = StringIO()
+    call_command(command, *arguments, stdout=out, stderr=StringIO(), **options)
+    return out.getvalue()
+
+
+def test_the_command_tells_the_values_and_where_the_planner_fails(tmp_path: Path) -> None:
+    document = modification_to_document(parked(0.0))
+    rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
+    how = {"low": 2.0, "high": 3.0, "count": 2}
+    told = said("sweep", "parked", ACROSS, planner=STRAIGHT.planner, **how)
+    assert f"2: {STRAIGHT.planner} 0.0 (fails); idm " in told
+    assert told.endswith("passes 3 and fails 2.\nKept as parked-1.\n")
+    out = tmp_path / "values"
+    assert "6 files" in said("sweep", "parked", ACROSS, to=out, **how)
+    assert (out / "parked--2.before.json").exists()
+    with pytest.raises(CommandError, match="parked"):
+        said("sample_family", "nobody", "3")
 
 
 def test_drives_of_a_sweep_are_not_among_those_of_a_job() -> None:
     job = rows.launch()
     scenario = Scenario.objects.get()
-    plan_sweep(
-        scenario=scenario, number="add[0].x_m", low=20.0, high=25.0, count=2, options=STRAIGHT
-    )
+    plan_sweep(scenario=scenario, request=asked(number="add[0].x_m", low=20.0, high=25.0))
     assert options_driven(job) == []

@@ -18,6 +18,7 @@ from augment.models import (
     SceneUpload,
     Simulation,
     Submission,
+    Sweep,
     UploadMoment,
 )
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
@@ -72,6 +73,12 @@ def _code(name: str, word: str, here: World) -> object:
                 offsets="paper",
             )
             return drive.code
+        case "sweeps":
+            sweep, _ = Sweep.objects.get_or_create(
+                scenario=scenario, number="add[0].x_m", planner="idm", offsets="paper"
+            )
+            sweep.values.get_or_create(value=20.0, defaults={"reason": "The lane ends."})
+            return sweep.code
         case "uploads" | "moments":
             upload, _ = SceneUpload.objects.get_or_create(
                 name="log.zip", size_bytes=1, state="failed"

@@ -27,7 +27,7 @@ PAGES = _table(
             "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
             "scenarios-bulk prompts correct picture studies study preregistration "
             "results results-tab benchmarks benchmark boards board board-export "
-            "submissions submission submission-new"
+            "submissions submission submission-new sweeps sweep sweep-file"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "
@@ -63,11 +63,11 @@ ACTIONS = _table(
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
             "study-draft-discard study-hand-over first-step benchmark-retired board-batch "
-            "submission-decline"
+            "submission-decline sweep-start sweep-remove"
         ),
         (302, 302, 403): (
             "scene-send upload-show scenarios-write study-write set-intent results-open "
-            "benchmark-write board-publish board-share board-unshare"
+            "benchmark-write board-publish board-share board-unshare family-draw"
         ),
         ADMIN: (
             "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"

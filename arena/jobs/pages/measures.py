@@ -141,7 +141,9 @@ def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]
 
 
 def _driven(code: uuid.UUID) -> Simulation:
-    rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
+    rows = Simulation.objects.select_related(
+        "scenario", "augmentation__contestant", "swept__sweep"
+    )
     return get_object_or_404(rows, code=code)
 
 

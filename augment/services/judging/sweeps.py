@@ -1,6 +1,7 @@
 """Sweeps and families: one number of a scenario over driven values, ranges drawn into more."""
 
-from dataclasses import asdict
+from collections.abc import Collection
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -9,17 +10,56 @@ from django.db import transaction
 from augment.baselines.family import FamilyMember, sample_family
 from augment.baselines.rule_placer import place
 from augment.errors import AugmentError, Conflict, UnknownName
+from augment.formats import own_json
+from augment.formats.writing import Cell
 from augment.models import Scenario, Simulation, Sweep, SweepValue
 from augment.scene import codec
 from augment.scene.entities import Modification, Scene
-from augment.scene.numbers import list_numbers, set_number, sweep_values
+from augment.scene.numbers import MOST_VALUES, list_numbers, set_number, sweep_values
+from augment.services.inputs import InputKind, input_field
 from augment.services.judging.simulations import Options, load_planner
 from augment.services.judging.thresholds import tell_difference
 from augment.services.scenarios.editing import read_edit
-from augment.services.scenarios.scenes import add_variant, intent_of, scene_of, seed_of
-from augment.simulation.planners import IDM, OFFSETS_M
+from augment.services.scenarios.scenes import add_variant, intent_of, scene_of, seed_of, type_of
+from augment.simulation.planners import IDM, OFFSETS_M, PDM_CLOSED
 
 LARGEST_FAMILY = 100
+_FURTHEST: dict[str, Any] = {"least": -1e6, "most": 1e6}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepRequest:
+    """A new sweep."""
+
+    number: str = input_field(
+        InputKind.TEXT, "Number", "Its path in intent or reference: add[0].speed_mps.", most=200
+    )
+    low: float = input_field(InputKind.NUMBER, "From", **_FURTHEST)
+    high: float = input_field(InputKind.NUMBER, "To", **_FURTHEST)
+    count: int = input_field(
+        InputKind.WHOLE, "Values", "Evenly spaced.", default=11, least=2, most=MOST_VALUES
+    )
+    planner: str = input_field(InputKind.TEXT, "Planner under test", default=PDM_CLOSED, most=120)
+    offsets: str = input_field(
+        InputKind.CHOICE,
+        "Lateral offsets of PDM-Closed",
+        default="paper",
+        choices={"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"},
+    )
+    is_reactive: bool = input_field(
+        InputKind.SWITCH, "Recorded vehicles answer to the ego", default=False
+    )
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The values, in order; as `sweep_values`."""
+        return sweep_values(self.low, self.high, self.count)
+
+    @property
+    def options(self) -> Options:
+        """How it is driven; offsets matter to PDM-Closed alone."""
+        offsets = self.offsets if self.planner == PDM_CLOSED else Options().offsets
+        return Options(planner=self.planner, offsets=offsets, is_reactive=self.is_reactive)
 
 
 def numbers_of(scenario: Scenario) -> dict[str, float]:
@@ -31,55 +71,85 @@ def numbers_of(scenario: Scenario) -> dict[str, float]:
 def plan_sweep(
     *,
     scenario: Scenario,
-    number: str,
-    low: float,
-    high: float,
-    count: int,
-    options: Options,
-    also: tuple[str, ...] = (),
+    request: SweepRequest,
+    also: Collection[str] = (),
     actor: User | None = None,
-) -> tuple[Sweep, list[int]]:
+) -> Sweep:
     """Have one number of a scenario driven at evenly spaced values.
 
     Each value is driven by the planner under test, and by those that may solve it: PDM-Closed with
     each of its offsets, and the IDM. A number of the intent is placed by the rule placer, always
     with the same seed; a number of the reference is set there.
 
-    Returns:
-        The sweep, and the keys of its drives, which wait.
-
     Raises:
         UnknownName: The scenario has no such number, or there is no such planner.
         InvalidDocument: The bounds make no values.
         Conflict: No value fits the scene.
     """
-    load_planner(options, also=also)
-    values, scene, known = sweep_values(low, high, count), scene_of(scenario), numbers_of(scenario)
-    if number not in known:
-        raise UnknownName("number", number, list(known))
-    document = _document(scenario, number)
+    load_planner(request.options, also=also)
+    changes = changes_of(scenario, request)
     sweep = Sweep.objects.create(
-        scenario=scenario, number=number, asked_by=actor, **asdict(options)
+        scenario=scenario, number=request.number, asked_by=actor, **asdict(request.options)
     )
-    rows = []
-    for value in values:
-        row = SweepValue(sweep=sweep, value=value)
-        try:
-            change = _change(scenario, scene, set_number(document, number, value))
+    rows = [SweepValue(sweep=sweep, value=value) for value in changes]
+    for row in rows:
+        change = changes[row.value]
+        if isinstance(change, Modification):
             row.modification = codec.modification_to_document(change)
-        except AugmentError as refused:
-            row.reason = str(refused)
-        rows.append(row)
-    if all(row.modification is None for row in rows):
-        raise Conflict(f"No value of {number} fits: {rows[0].reason}")
+        else:
+            row.reason = str(change)
     SweepValue.objects.bulk_create(rows)
-    drives = Simulation.objects.bulk_create(
+    Simulation.objects.bulk_create(
         Simulation(scenario=scenario, swept=row, subject=Simulation.Subject.SWEPT, **asdict(way))
         for row in rows
         if row.modification is not None
-        for way in ways_of(options)
+        for way in ways_of(request.options)
     )
-    return sweep, [drive.pk for drive in drives]
+    return sweep
+
+
+def changes_of(
+    scenario: Scenario, request: SweepRequest
+) -> dict[float, Modification | AugmentError]:
+    """Return what is changed with each value of a number, or why nothing fits.
+
+    Raises:
+        UnknownName: The scenario has no such number.
+        InvalidDocument: The bounds make no values.
+        Conflict: No value fits.
+    """
+    known, scene, number = numbers_of(scenario), scene_of(scenario), request.number
+    if number not in known:
+        raise UnknownName("number", number, list(known))
+    document, changes = _document(scenario, number), dict[float, Modification | AugmentError]()
+    for value in request.values:
+        try:
+            changes[value] = _change(scenario, scene, set_number(document, number, value))
+        except AugmentError as refused:
+            changes[value] = refused
+    refusals = [change for change in changes.values() if isinstance(change, AugmentError)]
+    if len(refusals) == len(changes):
+        raise Conflict(f"No value of {number} fits: {refusals[0]}")
+    return changes
+
+
+def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
+    """Return the values that fit as scenarios in the own JSON, files by name; as `changes_of`."""
+    recording = scenario.base_scene.recording
+    cells = [
+        Cell(
+            name=f"{scenario.slug} with {request.number} = {value:g}",
+            stem=f"{scenario.slug}--{value:g}",
+            scene=scene_of(scenario),
+            type=type_of(scenario.type),
+            modification=change,
+            keeps_traffic=scenario.keep_traffic,
+            recording=None if recording is None else codec.recording_from_document(recording),
+        )
+        for value, change in changes_of(scenario, request).items()
+        if isinstance(change, Modification)
+    ]
+    return own_json.write(cells).files
 
 
 def ways_of(tested: Options) -> list[Options]:

@@ -36,6 +36,12 @@ class SweepLine:
     drives: tuple[Simulation, ...]
     tried: TriedValue
 
+    @property
+    def cells(self) -> list[tuple[Simulation, bool | None]]:
+        """The drives, each with whether it was lawful; None where it has no score."""
+        lawful = {trial.driver: trial.is_lawful for trial in self.tried.trials}
+        return [(drive, lawful.get(driver_of(drive))) for drive in self.drives]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepResult:
@@ -45,16 +51,21 @@ class SweepResult:
         lines: By value.
         edges: Between which neighbours the outcome changes: (passed, failed).
         hardest: The hardest value that is solved while the planner under test fails.
-        under_way: How many drives wait or run.
-        failed: How many could not be driven.
+        planned: How many drives there are.
+        under_way: How many of them wait or run.
     """
 
     sweep: Sweep
     lines: tuple[SweepLine, ...]
     edges: tuple[tuple[float, float], ...]
     hardest: TriedValue | None
+    planned: int
     under_way: int
-    failed: int
+
+    @property
+    def drivers(self) -> list[str]:
+        """Who drives each value, the planner under test first."""
+        return list(dict.fromkeys(driver_of(one) for line in self.lines for one in line.drives))
 
     @property
     def verdict(self) -> str:
@@ -81,8 +92,8 @@ def result_of(sweep: Sweep) -> SweepResult:
         lines=lines,
         edges=find_edges(tried),
         hardest=find_hardest(tried),
+        planned=len(states),
         under_way=sum(state in Simulation.UNDER_WAY for state in states),
-        failed=states.count(State.FAILED),
     )
 
 

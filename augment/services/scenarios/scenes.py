@@ -329,6 +329,18 @@ def _set_surroundings(
         scenario.reference = codec.modification_to_document(change)
 
 
+def scenario_named(slug: str) -> Scenario:
+    """Return a scenario.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    row = Scenario.objects.select_related("base_scene").filter(slug=slug).first()
+    if row is None:
+        raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
+    return row
+
+
 def scene_of(scenario: Scenario) -> entities.Scene:
     """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
     scene = codec.scene_from_document(scenario.base_scene.document)

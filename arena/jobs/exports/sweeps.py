@@ -1,0 +1,96 @@
+"""A sweep as a table and as a chart of scores over values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from arena.exports.formats import Columns, Dtype, Sheet, drawings, sheet_of, table_formats
+from arena.results.exports.drawing import MARK, SOFT, house_style, write_figure
+from augment.services.judging.thresholds import SweepResult, driver_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_KEPT = "#a35a00"
+"""Colour of the value that was kept."""
+
+
+def sweep_sheet(result: SweepResult) -> Sheet:
+    """Return one row a drive, and one for a value that fits nowhere."""
+    open_line = dict.fromkeys(("driver", "state", "score", "lawful"))
+    lines = [
+        {
+            "value": line.row.value,
+            "driver": driver_of(drive),
+            "state": drive.state,
+            "score": drive.nuplan_score,
+            "lawful": is_lawful,
+            "reason": drive.reason,
+        }
+        for line in result.lines
+        for drive, is_lawful in line.cells
+    ]
+    lines += [
+        {**open_line, "value": line.row.value, "reason": line.row.reason}
+        for line in result.lines
+        if not line.drives
+    ]
+    columns: Columns = {
+        **Dtype.NUMBER.columns("value"),
+        **Dtype.TEXT.columns("driver", "state"),
+        "nuplan_score": ("score", Dtype.NUMBER),
+        **Dtype.YES_NO.columns("lawful"),
+        **Dtype.TEXT.columns("reason"),
+    }
+    sweep = result.sweep
+    facts = {
+        "scenario": sweep.scenario.slug,
+        "number": sweep.number,
+        "tested": driver_of(sweep),
+        "reactive": sweep.is_reactive,
+        "verdict": result.verdict,
+        "hardest_solved": None if result.hardest is None else result.hardest.value,
+    }
+    return sheet_of(lines, columns, name="sweep", digits=6, facts=facts)
+
+
+def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
+    """Draw the score over the values, a line a planner; a cross is a drive that fails."""
+    from matplotlib.figure import Figure
+
+    with house_style():
+        figure = Figure(figsize=(6.8, 3.4), layout="constrained")
+        axes = figure.add_subplot()
+        tested = driver_of(result.sweep)
+        others = [driver for driver in result.drivers if driver != tested]
+        for driver, stroke in zip(others, ("--", ":", "-."), strict=False):
+            _draw_curve(axes, result, driver, SOFT, stroke)
+        _draw_curve(axes, result, tested, MARK, "-")
+        for good, bad in result.edges:
+            axes.axvspan(min(good, bad), max(good, bad), color=MARK, alpha=0.15, linewidth=0)
+        if result.hardest is not None:
+            axes.axvline(result.hardest.value, color=_KEPT, label="hardest solved")
+        axes.grid()
+        axes.set_ylim(-4.0, 104.0)
+        axes.set_xlabel(result.sweep.number)
+        axes.set_ylabel("Score by nuPlan (%)")
+        figure.legend(loc="outside right upper", frameon=False, fontsize=7)
+        return write_figure(figure, file_format)
+
+
+def _draw_curve(axes: Axes, result: SweepResult, driver: str, colour: str, stroke: str) -> None:
+    trials = [
+        (line.row.value, 100.0 * trial.score, trial.is_lawful)
+        for line in result.lines
+        for trial in line.tried.trials
+        if trial.driver == driver
+    ]
+    values, scores, lawful = np.array(trials, dtype=float).reshape(-1, 3).T
+    axes.plot(values, scores, stroke, color=colour, linewidth=1.4, label=driver)
+    for chosen, marker in ((lawful > 0.0, "o"), (lawful == 0.0, "x")):
+        axes.plot(values[chosen], scores[chosen], marker, color=colour, markersize=5)
+
+
+SWEEP_FORMATS = table_formats(sweep_sheet) | drawings(sweep_chart)

@@ -1,0 +1,154 @@
+"""Sweeps and families of a scenario: started, followed, read."""
+
+import uuid
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils.text import slugify
+
+from arena.exports.formats import download
+from arena.jobs.exports.sweeps import SWEEP_FORMATS
+from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
+from arena.site.acts import looks_again, send_later, tell_errors
+from arena.site.forms import RequestForm, offer
+from augment.models import Scenario, Sweep
+from augment.services.inputs import inputs_of, read_request
+from augment.services.judging.simulations import allowed_planners
+from augment.services.judging.sweeps import (
+    LARGEST_FAMILY,
+    SweepRequest,
+    add_family,
+    numbers_of,
+    plan_sweep,
+)
+from augment.services.judging.thresholds import driver_of, result_of
+from augment.services.running.workers import workforce
+from augment.tasks import enqueue_scenario, enqueue_sweep
+
+
+class SweepForm(RequestForm):
+    """Which number of a scenario is swept."""
+
+    inputs = inputs_of(SweepRequest)
+    number = forms.ChoiceField(label="Number")
+    planner = forms.ChoiceField(label="Planner under test")
+
+    def __init__(self, scenario: Scenario, data: Any = None, **more: Any) -> None:
+        super().__init__(data, **more)
+        numbers = numbers_of(scenario).items()
+        offer(self, "number", [(name, f"{name} (now {value:g})") for name, value in numbers])
+        offer(self, "planner", [(name, name) for name in allowed_planners()])
+
+
+class FamilyForm(forms.Form):
+    """How many scenarios are drawn."""
+
+    count = forms.IntegerField(
+        label="Scenarios", min_value=1, max_value=LARGEST_FAMILY, initial=10
+    )
+    seed = forms.IntegerField(
+        label="Seed",
+        min_value=0,
+        max_value=2**31 - 1,
+        initial=0,
+        help_text="Same seed, same draws.",
+    )
+
+
+@page_for(*STAFF)
+def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """List the sweeps of a scenario, with the forms of a new one and of a family."""
+    scenario = _scenario(code)
+    given = {name: request.GET[name] for name in ("number", "low", "high") if name in request.GET}
+    context = {
+        "scenario": scenario,
+        "sweeps": [(row, driver_of(row)) for row in scenario.sweeps.select_related("hardest")],
+        "form": SweepForm(scenario, initial=given),
+        "family": FamilyForm(),
+    }
+    return render(request, "scenarios/sweeps.html", context)
+
+
+@act_for(ADMIN, back="sweeps")
+def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
+    """Have the values driven by the workers."""
+    scenario = _scenario(code)
+    form = SweepForm(scenario, request.POST)
+    if not form.is_valid():
+        tell_errors(request, form)
+        return None
+    asked = read_request(SweepRequest, form.cleaned_data)
+    with transaction.atomic():
+        sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
+        send_later(request, enqueue_sweep, sweep.pk)
+    return redirect("sweep", code=sweep.code)
+
+
+@act_for(*STAFF, back="sweeps")
+def draw_family(request: HttpRequest, code: uuid.UUID) -> None:
+    """Add scenarios with numbers drawn from the intent's ranges."""
+    form = FamilyForm(request.POST)
+    if not form.is_valid():
+        tell_errors(request, form)
+        return
+    rows, refused = add_family(
+        scenario=_scenario(code), **form.cleaned_data, actor=user_of(request)
+    )
+    for row in rows:
+        send_later(request, enqueue_scenario, row.pk)
+    for member in refused:
+        messages.warning(request, f"Refused: {member.refusal}")
+    if rows:
+        names = f"{rows[0].slug} to {rows[-1].slug}" if rows[1:] else rows[0].slug
+        messages.success(request, f"{len(rows)} added: {names}.")
+
+
+@page_for(*STAFF)
+def sweep_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show the curve of a sweep, where the planner fails, and every drive."""
+    sweep = _sweep(code)
+    result = result_of(sweep)
+    context = {
+        "sweep": sweep,
+        "driver": driver_of(sweep),
+        "result": result,
+        "planned": result.planned,
+        "done": result.planned - result.under_way,
+        "finer": sorted(result.edges[0]) if result.edges else (),
+        "forms": list(SWEEP_FORMATS),
+        "look": looks_again(request, waits=bool(result.under_way)),
+        "workforce": workforce() if result.under_way else None,
+    }
+    return render(request, "scenarios/sweep.html", context)
+
+
+@page_for(*STAFF)
+def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """Answer with the table or the curve as a file."""
+    sweep = _sweep(code)
+    stem = f"sweep-{sweep.scenario.slug}-{slugify(sweep.number)}"
+    return download(SWEEP_FORMATS, form, stem, result_of(sweep))
+
+
+@act_for(ADMIN, back="scenarios")
+def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Delete a sweep with its drives; what it kept stays."""
+    sweep = _sweep(code)
+    sweep.delete()
+    messages.success(request, f"The sweep of {sweep.number} is deleted.")
+    return redirect("sweeps", code=sweep.scenario.code)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _scenario(code: uuid.UUID) -> Scenario:
+    return get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
+
+
+def _sweep(code: uuid.UUID) -> Sweep:
+    return get_object_or_404(Sweep.objects.select_related("scenario", "hardest"), code=code)

@@ -1,0 +1,78 @@
+"""Sweep one number of a scenario: where a planner fails, and the hardest value that is solved."""
+
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import CommandParser
+from django.db import transaction
+
+from augment.services.inputs import read_request
+from augment.services.judging import simulations
+from augment.services.judging.sweeps import SweepRequest, plan_sweep, write_values
+from augment.services.judging.thresholds import SweepResult, result_of
+from augment.services.scenarios.scenes import scenario_named
+from augment.services.terminal import TerminalCommand
+from augment.tasks import check_broker, enqueue_sweep
+
+
+class Command(TerminalCommand):
+    """sweep SCENARIO NUMBER --low A --high B [--count N] [--planner P] [--queue | --to FOLDER]."""
+
+    help = (
+        "Drive a scenario at several values of one of its numbers, with the planner under test "
+        "and with PDM-Closed and IDM. The hardest value that one of these solves and the planner "
+        "does not is kept as a scenario."
+    )
+    arguments = {"scenario": {"help": "its slug"}}
+    request = SweepRequest
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Add those of a sweep, and what becomes of it."""
+        super().add_arguments(parser)
+        where = parser.add_mutually_exclusive_group()
+        where.add_argument("--queue", action="store_true", help="leave the drives to the workers")
+        where.add_argument(
+            "--to", type=Path, help="drive nothing: write scenarios for `simulate --to` there"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Write the values, or plan their drives and drive or queue them."""
+        scenario = scenario_named(options["scenario"])
+        request, out = read_request(SweepRequest, options), options["to"]
+        if out is not None:
+            files = write_values(scenario, request)
+            out.mkdir(parents=True, exist_ok=True)
+            for name, content in files.items():
+                (out / name).write_bytes(content)
+            self.stdout.write(f"{len(files)} files are in {out}.")
+            return
+        also = () if options["queue"] else (request.planner,)
+        if options["queue"]:
+            check_broker()
+        with transaction.atomic():
+            sweep = plan_sweep(scenario=scenario, request=request, also=also)
+            if options["queue"]:
+                transaction.on_commit(lambda: enqueue_sweep(sweep.pk))
+        if options["queue"]:
+            self.stdout.write(f"{result_of(sweep).planned} drives wait for the workers.")
+            return
+        waiting = [drive.pk for line in result_of(sweep).lines for drive in line.drives]
+        for number, pk in enumerate(waiting, start=1):
+            simulations.Drives(also).perform(pk)
+            self.stderr.write(f"[{number}/{len(waiting)}]")
+        sweep.refresh_from_db()
+        self._say(result_of(sweep))
+
+    def _say(self, result: SweepResult) -> None:
+        for line in result.lines:
+            told = [
+                f"{trial.driver} {100.0 * trial.score:.1f}{'' if trial.is_lawful else ' (fails)'}"
+                for trial in line.tried.trials
+            ]
+            told += [drive.reason for drive in line.drives if drive.reason]
+            self.stdout.write(f"{line.row.value:g}: {'; '.join(told) or line.row.reason}")
+        self.stdout.write(result.verdict)
+        kept = result.sweep.hardest
+        self.stdout.write(
+            f"Kept as {kept.slug}." if kept else "No value is failed by it and solved by another."
+        )
