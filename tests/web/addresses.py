@@ -65,20 +65,8 @@ def _code(name: str, word: str, here: World) -> object:
             site, _ = Endpoint.objects.get_or_create(label="here", defaults=defaults)
             model, _ = EndpointModel.objects.get_or_create(endpoint=site, model="m")
             return site.code if word == "endpoints" else model.code
-        case "drives":
-            drive, _ = Simulation.objects.get_or_create(
-                scenario=scenario,
-                subject=Simulation.Subject.UNMODIFIED,
-                planner="idm",
-                offsets="paper",
-            )
-            return drive.code
-        case "sweeps":
-            sweep, _ = Sweep.objects.get_or_create(
-                scenario=scenario, number="add[0].x_m", planner="idm", offsets="paper"
-            )
-            sweep.values.get_or_create(value=20.0, defaults={"reason": "The lane ends."})
-            return sweep.code
+        case "drives" | "sweeps":
+            return _driven(word, scenario).code
         case "uploads" | "moments":
             upload, _ = SceneUpload.objects.get_or_create(
                 name="log.zip", size_bytes=1, state="failed"
@@ -110,6 +98,17 @@ def _code(name: str, word: str, here: World) -> object:
         "scenes": scenario.base_scene,
     }
     return rows[word].code if word in rows else STRANGER
+
+
+def _driven(word: str, scenario: Scenario) -> Simulation | Sweep:
+    """Return a drive, or a sweep with a value that fits nowhere."""
+    how = {"scenario": scenario, "planner": "idm", "offsets": "paper"}
+    if word == "drives":
+        subject = Simulation.Subject.UNMODIFIED
+        return Simulation.objects.get_or_create(subject=subject, **how)[0]
+    sweep, _ = Sweep.objects.get_or_create(number="add[0].x_m", **how)
+    sweep.values.get_or_create(value=20.0, defaults={"reason": "The lane ends."})
+    return sweep
 
 
 def _entered(word: str, scenario: Scenario) -> Benchmark | Submission:
