@@ -102,7 +102,7 @@ def _code(name: str, word: str, here: World) -> object:
 
 def _driven(word: str, scenario: Scenario) -> Simulation | Sweep:
     """Return a drive, or a sweep with a value that fits nowhere."""
-    how = {"scenario": scenario, "planner": "idm", "offsets": "paper"}
+    how: dict[str, Any] = {"scenario": scenario, "planner": "idm", "offsets": "paper"}
     if word == "drives":
         subject = Simulation.Subject.UNMODIFIED
         return Simulation.objects.get_or_create(subject=subject, **how)[0]
