@@ -9,10 +9,19 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
+from augment.scene.planned_motion import (
+    AtTime,
+    LanePath,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+    Trigger,
+)
 
 SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 """Mistakes that nobody makes who asks a function for poses on lanes."""
@@ -23,6 +32,7 @@ _NOTICEABLE_M, _NOTICEABLE_RAD = 1.0, 0.15
 
 Agents = tuple[TrafficAgent, ...]
 _Mistake = Callable[[Agents, EgoRoute, random.Random], Agents]
+_MotionMistake = Callable[[TrafficAgent, PlannedMotion, EgoRoute, random.Random], PlannedMotion]
 
 
 def dice(prompt: str) -> random.Random:
@@ -64,7 +74,11 @@ def bend(
         for name, mistake in MISTAKES.items()
         if name not in spared
     }
-    possible = sorted(name for name, agents in outcomes.items() if _differs(agents, shaky))
+    outcomes = {name: agents for name, agents in outcomes.items() if _differs(agents, shaky)}
+    for name, motion_mistake in MOTION_MISTAKES.items():
+        agents = _moving_otherwise(shaky, motion_mistake, route, rng)
+        outcomes |= {name: agents} if agents != shaky else {}
+    possible = sorted(outcomes)
     if not possible or rng.random() < _RIGHT_SHARE:
         return _with(right, shaky), "none"
     name = rng.choice(possible)
@@ -127,7 +141,7 @@ def heap(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
 def facing_away(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
     """Turn pedestrians away from the road that they are to cross, and let them go nowhere."""
     return tuple(
-        replace(agent, heading_rad=wrap(agent.heading_rad + math.pi), walk_to_m=None)
+        replace(agent, heading_rad=wrap(agent.heading_rad + math.pi), walk_to_m=None, motion=None)
         if agent.type is AgentType.PEDESTRIAN
         else agent
         for agent in agents
@@ -145,7 +159,89 @@ MISTAKES: dict[str, _Mistake] = {
 }
 
 
+def wrong_trigger(
+    agent: TrafficAgent, motion: PlannedMotion, route: EgoRoute, rng: random.Random
+) -> PlannedMotion:
+    """Let it begin at a moment instead of by somebody's place, or the other way round."""
+    is_timed, start = isinstance(motion.start, AtTime), AtTime(after_s=rng.uniform(0.0, 1.0))
+    other: Trigger = NearEgo(within_m=rng.uniform(5.0, 10.0)) if is_timed else start
+    return replace(motion, start=other)
+
+
+def late_start(
+    agent: TrafficAgent, motion: PlannedMotion, route: EgoRoute, rng: random.Random
+) -> PlannedMotion:
+    """Let it begin by the right event, some seconds late."""
+    start = motion.start
+    if isinstance(start, AtTime):
+        return replace(motion, start=AtTime(after_s=start.after_s + rng.uniform(2.0, 4.0)))
+    if isinstance(start, NearEgo):
+        return replace(motion, start=NearEgo(within_m=start.within_m * rng.uniform(0.3, 0.5)))
+    further_m = route.locate(start.x_m, start.y_m).ahead_m + rng.uniform(15.0, 30.0)
+    x_m, y_m = route.position(further_m)
+    return replace(motion, start=replace(start, x_m=x_m, y_m=y_m))
+
+
+def wrong_speed(
+    agent: TrafficAgent, motion: PlannedMotion, route: EgoRoute, rng: random.Random
+) -> PlannedMotion:
+    """Take half of its speeds, or much more."""
+    factor, speeds = rng.choice([0.5, 1.6]), motion.speeds or ((0.0, agent.speed_mps),)
+    return replace(motion, speeds=tuple((s, factor * mps) for s, mps in speeds))
+
+
+def wrong_deceleration(
+    agent: TrafficAgent, motion: PlannedMotion, route: EgoRoute, rng: random.Random
+) -> PlannedMotion:
+    """Let it come to its speeds much later or sooner."""
+    factor = rng.choice([0.4, 2.5])
+    return replace(motion, speeds=tuple((factor * s, mps) for s, mps in motion.speeds))
+
+
+def wrong_way(
+    agent: TrafficAgent, motion: PlannedMotion, route: EgoRoute, rng: random.Random
+) -> PlannedMotion:
+    """Stay in the lane, turn where the lanes part otherwise, or go a lane beside the points."""
+    path = motion.path
+    if isinstance(path, PointPath):
+        (x_m, y_m), aside_m = path.points_m[-1], rng.choice([-3.5, 3.5])
+        way_rad = math.atan2(y_m - agent.y_m, x_m - agent.x_m)
+        step_m = (-aside_m * math.sin(way_rad), aside_m * math.cos(way_rad))
+        return replace(motion, path=_shifted_path(path, step_m))
+    for number, (before, after) in enumerate(pairwise(path.lane_ids if path else ()), start=1):
+        assert isinstance(path, LanePath)
+        following = route.graph.successors(before)
+        others = () if after not in following else [s for s in following if s != after][:1]
+        if others or after not in following:
+            return replace(motion, path=replace(path, lane_ids=(*path.lane_ids[:number], *others)))
+    return motion
+
+
+MOTION_MISTAKES: dict[str, _MotionMistake] = {
+    "wrong-trigger": wrong_trigger,
+    "late-start": late_start,
+    "wrong-speed": wrong_speed,
+    "wrong-deceleration": wrong_deceleration,
+    "wrong-way": wrong_way,
+}
+
+
 # Private
+
+
+def _moving_otherwise(
+    agents: Agents, mistake: _MotionMistake, route: EgoRoute, rng: random.Random
+) -> Agents:
+    """Make a mistake in every motion; without any the dice stay where they are."""
+    return tuple(
+        replace(agent, motion=mistake(agent, agent.motion, route, rng)) if agent.motion else agent
+        for agent in agents
+    )
+
+
+def _shifted_path(path: PointPath, step_m: tuple[float, float]) -> PointPath:
+    points_m = tuple((x_m + step_m[0], y_m + step_m[1]) for x_m, y_m in path.points_m)
+    return replace(path, points_m=points_m)
 
 
 def _with(right: Modification, agents: Agents) -> Modification:
@@ -173,12 +269,14 @@ def _shifted(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.
 def put(
     agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float | None = None
 ) -> TrafficAgent:
-    """Put the agent in another place; its walk goes along."""
-    walk = agent.walk_to_m
+    """Put the agent in another place; its walk and the points of its motion go along."""
+    walk, motion, step_m = agent.walk_to_m, agent.motion, (x_m - agent.x_m, y_m - agent.y_m)
     if walk is not None:
-        walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)
+        walk = (walk[0] + step_m[0], walk[1] + step_m[1])
+    if motion is not None and isinstance(motion.path, PointPath):
+        motion = replace(motion, path=_shifted_path(motion.path, step_m))
     heading = agent.heading_rad if heading_rad is None else heading_rad
-    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading, walk_to_m=walk)
+    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading, walk_to_m=walk, motion=motion)
 
 
 def _differs(agents: Agents, others: Agents) -> bool:

@@ -13,6 +13,8 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm import careless, sight
@@ -20,10 +22,11 @@ from augment.fake_llm.sight import Heard, KnownTasks, Task
 from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
 from augment.prompts.calls import TOOL
-from augment.prompts.vectors import DEFAULT_RADIUS_M, lane_curves, short_names
+from augment.prompts.vectors import DEFAULT_RADIUS_M, lane_curves, motion_parts, short_names
 from augment.scene.codec import intent_to_parts
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.motion import FloatArray, motion_of
 from augment.variants.respondents import ModelRole
 
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
@@ -73,7 +76,7 @@ class Character:
         if any(message.role == "assistant" for message in request.messages):
             block = {"verdict": "feedback" if problems else "accept", "feedback": problems}
             return _fenced("I have weighed the answers.", block), ()
-        names = [agent.id for agent in sight.added_agents(task.prompt)] if task else []
+        names = [agent.id for agent in sight.changed_agents(task.prompt)] if task else []
         questions = [f"In which lane does {name} stand?" for name in names[:6]]
         questions += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
         questions += ["Is the ego alone in its lane?"]
@@ -113,18 +116,24 @@ def _rate(problems: list[Problem]) -> str:
 def problems_of(task: Task) -> list[Problem]:
     """Return what is wrong with the work in the task, by the stand-in's own placement."""
     try:
-        right = list(place(task.scene, task.intent).modification.added)
+        right = list(place(task.scene, task.intent).modification.changed)
     except CannotPlace:
         return []
-    added = sight.added_agents(task.prompt)
-    if len(added) != len(right):
-        said = f"{len(added)} agents were added, {len(right)} were asked for."
+    changed = sight.changed_agents(task.prompt)
+    if len(changed) != len(right):
+        said = f"{len(changed)} agents were added or moved, {len(right)} were asked for."
         return [_problem(said, "Count.")]
+    some_move = any(agent.motion for agent in (*changed, *right))
+    ways, right_ways = (
+        _ways(task.scene, agents) if some_move else {} for agents in (changed, right)
+    )
     problems = []
-    for agent in added:
+    for agent in changed:
         meant = min(right, key=lambda one: _distance_m(one, agent))
         right.remove(meant)
         problem = _difference(agent, meant)
+        if problem is None and some_move:
+            problem = _motion_difference(agent, meant, ways[agent.id] - right_ways[meant.id])
         if problem is not None:
             problems.append(problem)
     return problems
@@ -161,6 +170,8 @@ def _fields(agent: TrafficAgent) -> dict[str, object]:
     fields["lane"] = agent.lane_id
     if agent.type is AgentType.PEDESTRIAN and agent.walk_to_m is not None:
         fields["walk_to"] = [round(value, 3) for value in agent.walk_to_m]
+    if agent.motion is not None:
+        fields["motion"] = motion_parts(agent.motion)
     return fields
 
 
@@ -208,6 +219,26 @@ def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
         said = f"{agent.id} is turned by {math.degrees(turned):.0f} degrees."
         return _problem(said, f"Turn it to {meant.heading_rad:.3f} rad.")
     return None
+
+
+def _ways(scene: Scene, agents: Sequence[TrafficAgent]) -> dict[str, FloatArray]:
+    """Return where everybody is over time (T, 2), by id, with some that were changed."""
+    names = {agent.id for agent in agents}
+    others = tuple(agent for agent in scene.agents if agent.id not in names)
+    motion = motion_of(replace(scene, agents=(*others, *agents)))
+    return {one.agent.id: one.states[:, :2] for one in motion.others}
+
+
+def _motion_difference(
+    agent: TrafficAgent, meant: TrafficAgent, apart_m: FloatArray
+) -> Problem | None:
+    """Compare where they get to, but for where they begin; either may leave the map."""
+    gap_m = float(np.nanmax(np.hypot(*(apart_m - apart_m[0]).T)))
+    if gap_m <= _FAR_M:
+        return None
+    motion = json.dumps(motion_parts(meant.motion)) if meant.motion else "none"
+    said = f"{agent.id} gets up to {gap_m:.0f} m away from where it is to be at that moment."
+    return _problem(said, f"Its motion is to be {motion}.")
 
 
 def _problem(said: str, action: str) -> Problem:

@@ -11,12 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from augment.fake_llm.wire import ChatRequest
 from augment.prompts.fill import QUOTE, read_text
 from augment.prompts.vectors import LaneFormat, scene_text, short_names, with_short_ids
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import Intent
+from augment.scene.planned_motion import PlannedMotion
 from augment.variants.respondents import ModelRole
+
+_MOTION = TypeAdapter(PlannedMotion)
 
 KnownTasks = Callable[[str], Sequence[tuple[Scene, Intent]]]
 """Scenes that an instruction is put to, each with what it asks for, looked up by its text."""
@@ -115,10 +120,11 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
     )
 
 
-def added_agents(prompt: str) -> list[TrafficAgent]:
-    """Return the agents that a prompt lists as added."""
-    title = "\nAdded agents:\n"
-    vectors, _ = json.JSONDecoder().raw_decode(prompt, prompt.index(title) + len(title))
+def changed_agents(prompt: str) -> list[TrafficAgent]:
+    """Return the agents that a prompt lists as added, then those that it lists as moved."""
+    vectors: dict[str, list[Any]] = {}
+    for title in ("\nAdded agents:\n", "\nMoved agents:\n"):
+        vectors |= json.JSONDecoder().raw_decode(prompt, prompt.index(title) + len(title))[0]
     return [
         TrafficAgent(
             id=name,
@@ -128,8 +134,15 @@ def added_agents(prompt: str) -> list[TrafficAgent]:
             heading_rad=float(heading_rad),
             width_m=float(width_m),
             length_m=float(length_m),
+            speed_mps=float(speed_mps),
+            lane_id=lane,
+            motion=_MOTION.validate_python(last[0])
+            if last and isinstance(last[0], dict)
+            else None,
         )
-        for name, (kind, x_m, y_m, heading_rad, width_m, length_m, *_) in vectors.items()
+        for name, (kind, x_m, y_m, heading_rad, width_m, length_m, speed_mps, lane, *last) in (
+            vectors.items()
+        )
     ]
 
 
