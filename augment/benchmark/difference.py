@@ -17,7 +17,8 @@ from augment.formats.reading import place_on_lanes
 from augment.geometry import frames
 from augment.geometry.polyline import FloatArray
 from augment.metrics.displacement import CLASS_OF
-from augment.scene.entities import Modification, Origin, Scene, TrafficAgent
+from augment.scene.entities import Modification, Origin, Point, Scene, TrafficAgent
+from augment.scene.planned_motion import AtPlace, PointPath
 
 NEAR_M, NEAR_RAD, NEAR_MPS = 0.02, 0.005, 0.05
 """What a format's rounding may change."""
@@ -95,11 +96,24 @@ def number_added(scene: Scene, modification: Modification) -> Modification:
     Names that a submission gives may tell who made it, and pictures show them.
     """
     fresh = _free_ids({agent.id for agent in scene.everyone})
-    added = (replace(agent, id=next(fresh)) for agent in modification.added)
-    return replace(modification, added=tuple(added))
+    names = {agent.id: next(fresh) for agent in modification.added}
+    added, moved = (
+        tuple(_renamed(agent, names) for agent in agents)
+        for agents in (modification.added, modification.moved)
+    )
+    return replace(modification, added=added, moved=moved)
 
 
 # Private
+
+
+def _renamed(agent: TrafficAgent, names: Mapping[str, str]) -> TrafficAgent:
+    """The agent by its new name, and so whom its motion waits for."""
+    motion = agent.motion
+    if motion is not None and isinstance(motion.start, AtPlace):
+        who = names.get(motion.start.agent_id, motion.start.agent_id)
+        motion = replace(motion, start=replace(motion.start, agent_id=who))
+    return replace(agent, id=names.get(agent.id, agent.id), motion=motion)
 
 
 def _align(before: Scene, after: Scene, view: SourceView) -> tuple[list[TrafficAgent], list[str]]:
@@ -129,11 +143,20 @@ def _is_zero(pose: frames.Pose) -> bool:
 
 def _seen_from(agent: TrafficAgent, seen: frames.Pose) -> TrafficAgent:
     """An agent told from the pose, in the frame that the pose is told in."""
-    points = [(agent.x_m, agent.y_m), *([agent.walk_to_m] if agent.walk_to_m else [])]
-    (x_m, y_m), *walk = seen.to_parent(np.array(points)).tolist()
+
+    def placed(*points: Point) -> tuple[Point, ...]:
+        return tuple((x_m, y_m) for x_m, y_m in seen.to_parent(np.array(points)).tolist())
+
+    walk_to_m, motion = agent.walk_to_m and placed(agent.walk_to_m)[0], agent.motion
+    if motion is not None and isinstance(motion.path, PointPath):
+        motion = replace(motion, path=replace(motion.path, points_m=placed(*motion.path.points_m)))
+    if motion is not None and isinstance(motion.start, AtPlace):
+        ((x_m, y_m),) = placed((motion.start.x_m, motion.start.y_m))
+        motion = replace(motion, start=replace(motion.start, x_m=x_m, y_m=y_m))
+    ((x_m, y_m),) = placed((agent.x_m, agent.y_m))
     heading_rad = frames.wrap(agent.heading_rad + seen.heading_rad)
-    walk_to_m = (walk[0][0], walk[0][1]) if walk else None
-    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk_to_m)
+    here = {"x_m": x_m, "y_m": y_m, "heading_rad": heading_rad}
+    return replace(agent, **here, walk_to_m=walk_to_m, motion=motion)  # type: ignore[arg-type]
 
 
 def _pair(view: SourceView, agents: list[TrafficAgent]) -> tuple[dict[str, str], list[str]]:
@@ -225,6 +248,8 @@ def _changed_state(
     ends = agent.walk_to_m, shown.walk_to_m
     if (None in ends and ends != (None, None)) or _apart_m(*ends) > near_m:
         changes["walk_to_m"] = agent.walk_to_m
+    if agent.motion != shown.motion:
+        changes["motion"] = agent.motion
     if not changes:
         return source
     return replace(source, **changes, lane_id=agent.lane_id)  # type: ignore[arg-type]

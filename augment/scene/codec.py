@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 
+from augment.errors import InvalidModification
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -24,6 +25,7 @@ from augment.scene.entities import (
 )
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
 from augment.scene.planned_motion import EGO_ID as EGO_ID
+from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path
 
@@ -48,6 +50,10 @@ def _scene_problems(scene: Scene) -> Iterator[Problem]:
     yield from _second_egos(agents=scene.agents)
     yield from _motion_problems(agents=scene.agents)
     yield from _reference_problems(scene)
+    try:
+        check_scene_motions(scene)
+    except InvalidModification as fault:
+        yield "agents", str(fault)
     for index, area in enumerate(scene.areas):
         if len(set(area.boundary_m)) < 3:
             yield path("areas", index, "boundary_m"), "an area needs three distinct points"

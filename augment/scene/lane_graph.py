@@ -95,6 +95,7 @@ class LaneGraph:
         self.lanes: dict[str, AnyLane] = {lane.id: lane for lane in lanes}
         self._next: dict[str, list[str]] = {lane_id: [] for lane_id in self.lanes}
         self._previous: dict[str, list[str]] = {lane_id: [] for lane_id in self.lanes}
+        self._ahead: dict[str, tuple[str, ...]] = {}
         joints: list[tuple[str | None, str | None]] = [
             (lane.id, following) for lane in scene.lanes for following in lane.successors
         ]
@@ -117,7 +118,9 @@ class LaneGraph:
 
     def successors(self, lane_id: str) -> tuple[str, ...]:
         """Return ids of what follows, straightest first by the turn from end to end."""
-        return self._straightest(lane_id, self._next[lane_id], at_share=1.0)
+        if lane_id not in self._ahead:
+            self._ahead[lane_id] = self._straightest(lane_id, self._next[lane_id], at_share=1.0)
+        return self._ahead[lane_id]
 
     def predecessors(self, lane_id: str) -> tuple[str, ...]:
         """Return ids of what leads here, straightest first by the turn from start to start.
@@ -246,11 +249,13 @@ class LaneGraph:
     ) -> list[str]:
         """Return ids of the lanes from this one on, until `length_m` of them are collected."""
         route, total = [lane_id], self.lane(lane_id).centerline.length_m
+        seen = {lane_id}
         while total < length_m:
             following = self._choose(route[-1], turn)
-            if following is None or following in route:
+            if following is None or following in seen:
                 break
             route.append(following)
+            seen.add(following)
             total += self.lanes[following].centerline.length_m
         return route
 

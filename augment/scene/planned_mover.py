@@ -15,8 +15,12 @@ from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, apply
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, LanePath, NearEgo, PointPath
+from augment.scene.schema import MOST_OBJECTS
 
 SAMPLE_M = 0.5
+MOST_SAMPLES = 20_000
+"""Of one line: paths of strangers may be as long as they like, lines of 10 km are exact."""
+MOST_OF_CHANGE = 100
 REACH_M = 600.0
 """So far paths over lanes are followed past the last lane that is named."""
 MOST_LISTED = 80
@@ -166,7 +170,8 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
     if len(points) == 2:
         return Polyline(points)
     chords_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    samples_m = np.linspace(0.0, chords_m[-1], max(3, math.ceil(chords_m[-1] / SAMPLE_M) + 1))
+    count = min(max(3, math.ceil(chords_m[-1] / SAMPLE_M) + 1), MOST_SAMPLES)
+    samples_m = np.linspace(0.0, chords_m[-1], count)
     return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
@@ -189,7 +194,7 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
         begins_m = at_m if run is runs[0] else max(at_m, last_begins_m)
         points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
         target, last_begins_m = _followed(graph, run)
-        for s_m in _samples(begins_m, begins_m + path.change_m):
+        for s_m in _samples(begins_m, begins_m + path.change_m, most=MOST_OF_CHANGE):
             share = _smooth_share((s_m - begins_m) / path.change_m)
             start = line.position(s_m, d_m)
             end = target.position(target.project(*start).s_m)
@@ -201,16 +206,27 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
 
 
 def check_motions(scene: Scene, modification: Modification) -> None:
-    """Do nothing where every motion of a modification can be carried out in its scene.
+    """Do nothing where every motion can be carried out in the scene after a modification.
 
     Raises:
-        InvalidModification: A path leads over lanes that don't follow each other, or a trigger
-            waits for nobody's arrival.
+        InvalidModification: As `check_scene_motions`, or the modification does not fit.
     """
-    motions = [(one, one.motion) for one in modification.changed if one.motion is not None]
+    check_scene_motions(apply(scene, modification))
+
+
+def check_scene_motions(scene: Scene) -> None:
+    """Do nothing where every motion in a scene can be carried out.
+
+    Raises:
+        InvalidModification: A path leads over lanes that don't follow each other, a trigger
+            waits for nobody's arrival, or there are too many.
+    """
+    motions = [(one, one.motion) for one in scene.agents if one.motion is not None]
     if not motions:
         return
-    graph, names = LaneGraph(scene), {one.id for one in apply(scene, modification).everyone}
+    if len(motions) > MOST_OBJECTS:
+        raise InvalidModification(f"{len(motions)} agents have a motion; at most {MOST_OBJECTS}")
+    graph, names = LaneGraph(scene), {one.id for one in scene.everyone}
     for agent, motion in motions:
         try:
             if isinstance(motion.path, LanePath):
@@ -292,9 +308,9 @@ def _followed(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
     return Polyline(np.vstack([line.points_m for line in lines])), last_begins_m
 
 
-def _samples(start_m: float, end_m: float) -> list[float]:
+def _samples(start_m: float, end_m: float, *, most: int = MOST_SAMPLES) -> list[float]:
     """Stations after the start up to the end."""
-    count = math.ceil((end_m - start_m) / SAMPLE_M - 1e-9)
+    count = min(math.ceil((end_m - start_m) / SAMPLE_M - 1e-9), most)
     return np.linspace(start_m, end_m, count + 1)[1:].tolist() if count > 0 else []
 
 

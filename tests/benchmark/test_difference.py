@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.benchmark.difference import SourceView, find_difference
+from augment.benchmark.difference import SourceView, find_difference, number_added
 from augment.benchmark.source_views import identify, show_source
 from augment.benchmark.submitted_file import FileContent, read_file
 from augment.formats.writers import writer_named
 from augment.formats.writing import Cell
 from augment.metrics.displacement import are_alike
-from augment.scene.entities import AgentType, Modification, Origin, Scene, apply
+from augment.scene.entities import AgentType, Modification, Origin, Scene, TrafficAgent, apply
+from augment.scene.planned_motion import AtPlace, PlannedMotion, PointPath
 from tests.benchmark.sets import KINDS, street, street_set
 from tests.properties import examples
 from tests.scenes import pose_in_parent, vehicle
@@ -162,6 +163,32 @@ def test_an_ego_elsewhere_is_aligned_where_the_frames_are_the_same() -> None:
     elsewhere = replace(ego, frame="another")
     _, notes = find_difference(source, replace(source, origin=elsewhere))
     assert notes == ("Its frame, 'another', is not known here: its ego is taken for the source's",)
+
+
+def test_a_motion_is_a_change_in_the_sources_frame_and_waits_for_who_is_meant() -> None:
+    source = replace(street(), origin=Origin(frame="city", x_m=0.0, y_m=0.0, heading_rad=0.0))
+    ego = Origin(frame="city", x_m=10.0, y_m=0.0, heading_rad=math.pi / 2.0)
+    given = Modification(
+        added=(_that_waits("Agent50", for_whom="Agent51"), _that_waits("Agent51", for_whom="me")),
+        moved=(_that_waits("Agent3", for_whom="Agent50"),),
+    )
+    after = replace(source, origin=ego, agents=given.changed)
+    found, _ = find_difference(source, after)
+    named = number_added(source, found)
+    assert [one.id for one in named.added] == ["Agent12", "Agent13"]
+    starts = {one.id: one.motion.start for one in named.changed if one.motion is not None}
+    waits = {name: one.agent_id for name, one in starts.items() if isinstance(one, AtPlace)}
+    assert waits == {"Agent12": "Agent13", "Agent13": "me", "Agent3": "Agent12"}
+    # 5 m ahead and 1 m left of an ego that stands at (10, 0) and looks left.
+    (path,) = {one.motion.path for one in named.changed if one.motion is not None}
+    assert isinstance(path, PointPath)
+    assert path.points_m[0] == pytest.approx((9.0, 5.0))
+
+
+def _that_waits(name: str, *, for_whom: str) -> TrafficAgent:
+    start = AtPlace(agent_id=for_whom, x_m=5.0, y_m=1.0)
+    motion = PlannedMotion(path=PointPath(points_m=((5.0, 1.0),)), start=start)
+    return replace(vehicle(name, 30.0, 0.0), motion=motion)
 
 
 def test_what_a_format_can_not_say_is_named_and_stays(tmp_path: Path) -> None:

@@ -8,7 +8,11 @@ from scipy.integrate import quad
 
 from augment.errors import InvalidDocument, InvalidModification
 from augment.geometry.polyline import Polyline
-from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    scene_to_document,
+)
 from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
 from augment.scene.motion import MotionSource, Movement, motion_of
 from augment.scene.planned_motion import (
@@ -155,6 +159,33 @@ def test_what_cannot_be_carried_out_is_refused(motion: PlannedMotion, sentence: 
     car = with_motion(vehicle("Agent2", 0.0, 0.0), motion)
     with pytest.raises(InvalidModification, match=sentence):
         check_motions(junction(), Modification(added=(car,)))
+    with pytest.raises(InvalidDocument, match=f"agents: .*{sentence}"):
+        scene_to_document(replace(junction(), agents=(car,)))
+
+
+def test_paths_without_an_end_and_rings_of_lanes_are_bounded() -> None:
+    corners = tuple((1e5 * (-1) ** n, 1e5 * (-1) ** (n // 2)) for n in range(200))
+    car = with_motion(
+        vehicle("Agent2", 0.0, 3.5), PlannedMotion(path=PointPath(points_m=corners)), speed_mps=9.0
+    )
+    assert moved(two_lanes(), car).is_present.all()
+    # Two lanes of 1 mm that follow each other: one time around, and the car is past the map.
+    ring = tuple(
+        Lane(id=name, centerline=Polyline(points), width_m=3.5, successors=(follower,))
+        for name, follower, points in (
+            ("Lane1", "Lane2", [(0.0, 0.0), (0.001, 0.0)]),
+            ("Lane2", "Lane1", [(0.001, 0.0), (0.0, 0.0)]),
+        )
+    )
+    path = LanePath(lane_ids=("Lane1", "Lane2") * 10)
+    goes_round = with_motion(
+        vehicle("Agent2", 0.0, 0.0), PlannedMotion(path=path), speed_mps=9.0, lane_id="Lane1"
+    )
+    around = moved(replace(two_lanes(), lanes=ring), goes_round)
+    assert np.flatnonzero(around.is_present).tolist() == [0]
+    crowd = tuple(replace(goes_round, id=f"Agent{n}") for n in range(2, 103))
+    with pytest.raises(InvalidModification, match="101 agents have a motion; at most 100"):
+        check_motions(junction(), Modification(added=crowd))
 
 
 def test_a_motion_is_written_and_read_and_a_walk_beside_it_is_refused() -> None:

@@ -24,6 +24,7 @@ from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
 from augment.services.texts import check_prose
@@ -411,13 +412,13 @@ def seed_of(slug: str) -> int:
 
 
 def check_reference(scene: entities.Scene, modification: entities.Modification) -> None:
-    """Whether a modification fits the scene, with its lanes.
+    """Whether a modification fits the scene, with its lanes and motions.
 
     Raises:
-        InvalidModification: An agent does not fit.
+        InvalidModification: An agent does not fit, or can't move as it is to.
         InvalidDocument: An agent names a lane that the scene does not have.
     """
-    entities.check_fits(scene, modification)
+    check_motions(scene, modification)
     known = LaneGraph(scene).lanes
     problems = [
         (f"{agent.id}.lane_id", f"{agent.lane_id!r} is not a lane or connector of the scene")
