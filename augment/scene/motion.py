@@ -45,7 +45,7 @@ class Movement:
     Attributes:
         agent: As it is at t0, or where it is first seen.
         states: (T, 4): x_m, y_m, heading_rad, speed_mps of the box centre; NaN where it is not.
-        started_s: When a planned motion set out, None where it never does or there is none.
+        started_s: When a planned motion or a walk set out, None where it never does or has none.
     """
 
     agent: TrafficAgent
@@ -243,7 +243,7 @@ def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
     states[times_s >= since_s, 2] = math.atan2(walk[1], walk[0])
     states[(times_s >= since_s) & (walked < 1.0), 3] = pace_mps
     states[0, 2] = agent.heading_rad
-    return Movement(agent=agent, source=MotionSource.WALK, states=states)
+    return Movement(agent=agent, source=MotionSource.WALK, states=states, started_s=float(since_s))
 
 
 def walking_pace_mps(agent: TrafficAgent) -> float:

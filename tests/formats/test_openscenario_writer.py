@@ -13,12 +13,21 @@ from augment.formats.openscenario.writer import REAR_AXLE_SHARE, write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_from_document
-from augment.scene.entities import Lane, Scene
+from augment.scene.entities import AgentType, Lane, Scene
 from augment.scene.lane_graph import AnyLane
+from augment.scene.planned_motion import (
+    AtPlace,
+    AtTime,
+    LanePath,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+)
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
-from tests.scenes import curve
+from tests.scene.test_planned_motion import two_lanes, with_motion
+from tests.scenes import curve, pedestrian, vehicle
 
 SCENES = Path(__file__).parents[2] / "fixtures" / "scenes"
 NOT_FOR_US = "check_asam_xodr_junctions_connection_one_link_to_incoming"
@@ -47,6 +56,7 @@ def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) 
         cell(crossing(), added=OF_EACH_TYPE, stem="crossing"),
         cell(before, recording=recording, keeps_traffic=True, added=(), stem="recorded"),
         cell(log, recording=seen, keeps_traffic=True, added=(), stem="log"),
+        scene_of_motions(),
         cell(authored("station-cross"), added=(), stem="left-hand"),
         cell(authored("reservoir-road"), added=(), stem="bends"),
     ]
@@ -121,13 +131,13 @@ def test_places_are_those_of_the_rear_axle_and_boxes_lie_around_the_centre() -> 
 def test_a_walker_sets_out_when_the_ego_is_near() -> None:
     scenario, _ = files(cell())
     (near,) = scenario.findall(".//RelativeDistanceCondition")
-    assert (near.attrib["entityRef"], float(near.attrib["value"])) == ("Agent1", 50.0)
+    # At 2.6 s the ego is at 20.8, its rear axle 1.461 m behind; the walker is at (70, -4).
+    assert near.attrib["entityRef"] == "Agent1"
+    assert float(near.attrib["value"]) == pytest.approx(math.hypot(70.0 - 19.339, 4.0), abs=2e-4)
     (walk,) = scenario.findall(".//Trajectory[@name='Agent5 trajectory']")
-    vertices = walk.findall(".//Vertex")
-    assert [float(one.attrib["time"]) for one in vertices] == pytest.approx([0.0, 15.0])
-    last = vertices[-1].find(".//WorldPosition")
-    assert last is not None
-    assert (float(last.attrib["x"]), float(last.attrib["y"])) == (70.0, 8.0)
+    ends = {round(float(one.attrib["time"]), 1): place_of(one) for one in walk.iter("Vertex")}
+    assert ends[0.0] == pytest.approx((70.0, -4.0))
+    assert ends[15.0] == pytest.approx((70.0, 8.0))
 
 
 def test_recorded_agents_come_drive_and_go() -> None:
@@ -157,6 +167,193 @@ def test_a_map_that_no_road_can_follow_is_refused() -> None:
         "bent: Lane9 turns too sharply between two points for a smooth road",
         "bare: OpenDRIVE needs at least one road, and there is no lane",
     ]
+
+
+WAITS = {
+    "Agent2": (
+        vehicle("Agent2", 30.0, 3.5),
+        4.0,
+        PlannedMotion(
+            path=LanePath(lane_ids=("Lane2", "Lane1"), change_m=20.0), start=NearEgo(within_m=15.0)
+        ),
+    ),
+    "Agent3": (
+        pedestrian("Agent3", 60.0, -5.0),
+        0.0,
+        PlannedMotion(
+            path=PointPath(points_m=((60.0, 1.0), (64.0, 5.0))),
+            speeds=((0.0, 1.0), (1.0, 3.0)),
+            start=AtPlace(x_m=40.0, y_m=0.0, within_m=3.0),
+        ),
+    ),
+    "Agent4": (
+        vehicle("Agent4", 200.0, 0.0, np.pi),
+        0.0,
+        PlannedMotion(
+            speeds=((2.0, 6.0),), start=AtPlace(agent_id="Agent2", x_m=50.0, y_m=3.0, within_m=2.0)
+        ),
+    ),
+    "Agent5": (
+        vehicle("Agent5", -20.0, 0.0),
+        10.0,
+        PlannedMotion(speeds=((2.0, 0.0),), start=AtTime(after_s=1.05)),
+    ),
+    "Agent6": (
+        vehicle("Agent6", 380.0, 3.5),
+        9.0,
+        PlannedMotion(path=LanePath(lane_ids=("Lane2",)), start=AtTime(after_s=1.0)),
+    ),
+    "Agent7": (
+        vehicle("Agent7", 385.0, 0.0),
+        9.0,
+        PlannedMotion(path=LanePath(lane_ids=("Lane1",)), start=NearEgo(within_m=5.0)),
+    ),
+    "Agent8": (vehicle("Agent8", 399.5, 3.5), 9.0, PlannedMotion(start=AtTime(after_s=5.0))),
+}
+"""Agents with speed and motion; by hand the first sets out at 3.9 s (test_planned_motion.py)."""
+
+
+def scene_of_motions() -> Cell:
+    lanes = {3.5: "Lane2", 0.0: "Lane1"}
+    added = tuple(
+        with_motion(agent, motion, speed_mps=speed_mps, lane_id=lanes.get(agent.y_m))
+        for agent, speed_mps, motion in WAITS.values()
+    )
+    return cell(two_lanes(), added=added)
+
+
+@pytest.mark.parametrize("step_s", [0.1, 0.02])
+def test_a_player_of_the_file_moves_everybody_as_we_do(step_s: float) -> None:
+    given = scene_of_motions()
+    scenario, _ = files(given)
+    played = Player(scenario)
+    began: dict[str, float] = {}
+    for now in np.arange(round(15.0 / step_s) + 1) * step_s:
+        played.go_on(float(now), began)
+        if math.isclose(now, round(now), abs_tol=1e-9):
+            for one in given.motion.others:
+                state = one.states[round(now / 0.1)]
+                there = played.centre(one.agent.id)
+                assert (there is None) == bool(np.isnan(state[0])), (one.agent.id, now)
+                if there is not None:
+                    assert math.dist(there, state[:2]) < 0.1, (one.agent.id, now)
+    assert began["Agent2 sets out"] == pytest.approx(3.9)
+    assert began["Agent5 sets out"] == pytest.approx(1.05, abs=step_s)
+    assert {"Agent7 sets out", "Agent8 sets out"}.isdisjoint(began)
+
+
+def test_what_holds_with_our_ego_alone_is_named() -> None:
+    said = lines(scene_of_motions())
+    text = "its distance is told between rear axles: the same moment with our ego, else up to"
+    assert f"street by rule: Agent2: {text} 2.8 m off" in said
+    assert f"street by rule: Agent3: {text} 1.5 m off" in said
+    for name, words in {
+        "Agent2": "sets out from where it is with our ego; with others it jumps",
+        "Agent7": "the motion is left out: where it begins hangs on when it starts",
+    }.items():
+        assert any(line.startswith(f"street by rule: {name}: {words}") for line in said)
+    assert not any("Agent5" in line or "too early" in line for line in said)
+
+
+def test_a_door_is_an_obstacle_that_moves() -> None:
+    slab = replace(vehicle("Agent2", 10.0, -2.0), type=AgentType.GENERIC_OBJECT)
+    path = PointPath(points_m=((10.0, -1.0),), keeps_heading=True)
+    door = replace(slab, motion=PlannedMotion(path=path, speeds=((0.0, 1.0),)))
+    given = cell(added=(door,))
+    played = Player(files(given)[0])
+    for now in (0.0, 0.5):
+        played.go_on(now, {})
+    assert played.centre("Agent2") == pytest.approx((10.0, -1.5))
+    assert any("players may leave obstacles standing" in line for line in lines(given))
+
+
+class Player:
+    """Plays a file's events step by step, by the standard and by nothing of ours."""
+
+    def __init__(self, scenario: ET.Element) -> None:
+        self.ahead_m = {
+            one.attrib["name"]: float(one.find(".//Center").attrib["x"])  # type: ignore[union-attr]
+            for one in scenario.iter("ScenarioObject")
+        }
+        self.poses = {
+            one.attrib["entityRef"]: pose_of(one)
+            for one in scenario.find(".//Init").iter("Private")  # type: ignore[union-attr]
+        }
+        self.waiting = [
+            (group.find(".//EntityRef").attrib["entityRef"], event)  # type: ignore[union-attr]
+            for group in scenario.iter("ManeuverGroup")
+            for event in group.iter("Event")
+        ]
+        self.running: dict[str, tuple[str, float, np.ndarray]] = {}
+        self.ended: set[str] = set()
+
+    def centre(self, name: str) -> tuple[float, float] | None:
+        if name not in self.poses:
+            return None
+        x_m, y_m, heading = self.poses[name]
+        ahead_m = self.ahead_m[name]
+        return x_m + ahead_m * math.cos(heading), y_m + ahead_m * math.sin(heading)
+
+    def go_on(self, now: float, began: dict[str, float]) -> None:
+        for who in self.running:
+            self._follow(who, now)
+        for who, event in [one for one in self.waiting if self._fires(one[1], now)]:
+            self.waiting.remove((who, event))
+            began[event.attrib["name"]] = now
+            self._begin(who, event, now)
+
+    def _begin(self, who: str, event: ET.Element, now: float) -> None:
+        if event.find(".//DeleteEntityAction") is not None:
+            del self.poses[who]
+            self.running.pop(who, None)
+        elif (follow := event.find(".//FollowTrajectoryAction")) is not None:
+            assert who not in self.running or event.attrib["priority"] == "override"
+            rows = [(float(one.attrib["time"]), *pose_of(one)) for one in follow.iter("Vertex")]
+            timing = follow.find(".//Timing")
+            is_relative = (
+                timing is not None and timing.attrib["domainAbsoluteRelative"] == "relative"
+            )
+            self.running[who] = event.attrib["name"], now if is_relative else 0.0, np.array(rows)
+            self._follow(who, now)
+
+    def _follow(self, who: str, now: float) -> None:
+        name, began, rows = self.running[who]
+        at = [float(np.interp(now - began, rows[:, 0], rows[:, column])) for column in (1, 2, 3)]
+        self.poses[who] = at[0], at[1], at[2]
+        if now - began > rows[-1, 0] + 1e-9:
+            self.ended.add(name)
+
+    def _fires(self, event: ET.Element, now: float) -> bool:
+        condition = event.find("StartTrigger//Condition")
+        assert condition is not None
+        groups = [*condition.iter("EntityCondition"), *condition.iter("ByValueCondition")]
+        (kind,) = (one for group in groups for one in group)
+        if kind.tag == "SimulationTimeCondition":
+            return now >= float(kind.attrib["value"]) - 1e-9
+        if kind.tag == "StoryboardElementStateCondition":
+            assert kind.attrib["state"] == "endTransition"
+            return kind.attrib["storyboardElementRef"] in self.ended
+        who = condition.find(".//EntityRef").attrib["entityRef"]  # type: ignore[union-attr]
+        other = (
+            pose_of(kind)
+            if kind.tag == "DistanceCondition"
+            else self.poses[kind.attrib["entityRef"]]
+        )
+        assert (kind.attrib["freespace"], kind.attrib["rule"]) == ("false", "lessOrEqual")
+        assert kind.attrib["relativeDistanceType"] == "euclidianDistance"
+        return math.dist(self.poses[who][:2], other[:2]) <= float(kind.attrib["value"])
+
+
+def pose_of(element: ET.Element) -> tuple[float, float, float]:
+    """The first position in an element."""
+    position = element.find(".//WorldPosition")
+    assert position is not None
+    given = position.attrib
+    return float(given["x"]), float(given["y"]), float(given.get("h", "0"))
+
+
+def place_of(element: ET.Element) -> tuple[float, float]:
+    return pose_of(element)[:2]
 
 
 def _sampled(road: ET.Element) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Scenarios as OpenSCENARIO XML 1.2, each with its map as OpenDRIVE.
 
-Everybody that moves follows a trajectory with times; people with a walk set out when the ego comes
-near. Frame: the ego frame of t0. The files are made by scenariogeneration. Source: ASAM
-OpenSCENARIO XML 1.2.
+Everybody that moves follows a trajectory with times; who has a motion or a walk of its own sets
+out once its trigger fires (triggers.py). Frame: the ego frame of t0. The files are made by
+scenariogeneration. Source: ASAM OpenSCENARIO XML 1.2.
 """
 
 import math
@@ -15,9 +15,17 @@ import numpy as np
 
 from augment.formats import writing
 from augment.formats.openscenario.roads import map_of
+from augment.formats.openscenario.triggers import (
+    held_states,
+    motion_in,
+    states_since_start,
+    with_motion,
+    written_distance,
+)
 from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.motion import SETS_OUT_WITHIN_M, FloatArray, Movement, walking_pace_mps
+from augment.scene.motion import FloatArray, Movement
+from augment.scene.planned_motion import EGO_ID, AtTime
 
 MINOR_VERSION: Final = 2
 REAR_AXLE_SHARE: Final = 1.461 / 5.176
@@ -133,15 +141,10 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
     """What somebody does: come, follow a trajectory, go. Nothing for who stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
-    walk = None if agent.walk_to_m is None else _walk(agent)
-    if walk is not None:
-        yield _event(
-            xosc,
-            f"{agent.id} walks",
-            _follow(xosc, agent, *walk, is_relative=True),
-            _near(xosc, cell, agent),
-        )
-    if walk is not None or movement.stands:
+    if (mover := with_motion(agent)) is not None:
+        yield from _own_events(xosc, cell, movement, mover)
+        return
+    if movement.stands:
         return
     seen = np.flatnonzero(movement.is_present)
     first, last = int(seen[0]), int(seen[-1])
@@ -156,43 +159,72 @@ def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
         yield _event(xosc, f"{agent.id} is gone", action, float(times_s[last + 1]))
 
 
-def _walk(agent: TrafficAgent) -> tuple[FloatArray, FloatArray] | None:
-    """Times from setting out on and states at the two ends; None for a walk of no length."""
-    ends = np.array([(agent.x_m, agent.y_m), agent.walk_to_m], dtype=np.float64)
-    east_m, north_m = ends[1] - ends[0]
-    length_m, pace_mps = float(np.hypot(east_m, north_m)), walking_pace_mps(agent)
-    if length_m < 1e-6 or pace_mps <= 0.0:
-        return None
-    state = [math.atan2(north_m, east_m), pace_mps]
-    return np.array([0.0, length_m / pace_mps]), np.column_stack([ends, [state, state]])
+def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) -> Iterator[Any]:
+    """What it does until its motion starts, and from then on; past the map it is gone."""
+    started_s, times_s = movement.started_s, cell.motion.times_s
+    if agent.speed_mps > 0.0 and started_s != 0.0:
+        states = held_states(cell, agent)
+        follow = _follow(xosc, agent, times_s, states, is_relative=False)
+        yield from _until_gone(
+            xosc, agent, states, _event(xosc, f"{agent.id} goes on", follow, 0.0)
+        )
+    by_clock = isinstance(motion_in(agent).start, AtTime)
+    if started_s is None and (by_clock or agent.speed_mps > 0.0):
+        return  # after the end; or where its path begins would depend on the ego
+    states = states_since_start(cell, agent, started_s or 0.0)
+    if np.isnan(states).all():
+        return  # it has left the map by then
+    since_s = times_s + (started_s or 0.0) if by_clock else times_s
+    follow = _follow(xosc, agent, since_s, states, is_relative=not by_clock)
+    begins = _trigger(xosc, cell, agent, started_s)
+    event = _event(xosc, f"{agent.id} sets out", follow, begins, xosc.Priority.override)
+    yield from _until_gone(xosc, agent, states, event)
 
 
-def _near(xosc: Any, cell: Cell, agent: TrafficAgent) -> Any:
-    """The moment at which the ego is near."""
-    distance = xosc.RelativeDistanceCondition(
-        SETS_OUT_WITHIN_M,
-        xosc.Rule.lessThan,
-        xosc.RelativeDistanceType.euclidianDistance,
-        cell.after.ego.id,
-        freespace=False,
-    )
-    name = f"{agent.id} sees the ego"
-    return xosc.EntityTrigger(name, 0.0, xosc.ConditionEdge.none, distance, agent.id)
+def _until_gone(xosc: Any, agent: TrafficAgent, states: FloatArray, event: Any) -> Iterator[Any]:
+    """An event of following states; whom they lead past the map is taken away at their end."""
+    yield event
+    if np.isnan(states).any():
+        ended = xosc.StoryboardElementStateCondition(
+            xosc.StoryboardElementType.event, event.name, xosc.StoryboardElementState.endTransition
+        )
+        name = f"{event.name} and is gone"
+        trigger = xosc.ValueTrigger(f"{name} end", 0.0, xosc.ConditionEdge.none, ended)
+        yield _event(xosc, name, xosc.DeleteEntityAction(agent.id), trigger)
+
+
+def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None) -> Any:
+    """The moment at which a motion starts."""
+    start, name = motion_in(agent).start, f"{agent.id} sets out"
+    if isinstance(start, AtTime):
+        return _at(xosc, name, start.after_s)
+    apart = written_distance(cell, agent, start, started_s, _ahead_m)
+    given = apart.within_m, xosc.Rule.lessOrEqual
+    kind = xosc.RelativeDistanceType.euclidianDistance
+    condition = xosc.RelativeDistanceCondition(*given, kind, EGO_ID, freespace=False)
+    if apart.place_m is not None:
+        place = xosc.WorldPosition(*apart.place_m)
+        condition = xosc.DistanceCondition(*given, place, freespace=False, distance_type=kind)
+    edge = xosc.ConditionEdge.none
+    return xosc.EntityTrigger(f"{name} trigger", 0.0, edge, condition, apart.who)
 
 
 def _follow(
     xosc: Any, agent: TrafficAgent, times_s: FloatArray, states: FloatArray, *, is_relative: bool
 ) -> Any:
     trajectory = xosc.Trajectory(f"{agent.id} trajectory", False)
-    positions = [_position(xosc, agent, state) for state in states]
-    trajectory.add_shape(xosc.Polyline([round(float(t), 6) for t in times_s], positions))
+    seen = np.flatnonzero(~np.isnan(states).any(axis=1))
+    places = np.append(seen, seen[-1:]) if len(seen) == 1 else seen  # a line has two points
+    positions = [_position(xosc, agent, state) for state in states[places]]
+    moments = [round(float(time_s), 6) for time_s in times_s[seen[0] : seen[0] + len(places)]]
+    trajectory.add_shape(xosc.Polyline(moments, positions))
     domain = xosc.ReferenceContext.relative if is_relative else xosc.ReferenceContext.absolute
     return xosc.FollowTrajectoryAction(trajectory, xosc.FollowingMode.position, domain, 1, 0)
 
 
-def _event(xosc: Any, name: str, action: Any, begins: Any) -> Any:
+def _event(xosc: Any, name: str, action: Any, begins: Any, priority: Any = None) -> Any:
     """An event that begins at a time or by a trigger."""
-    event = xosc.Event(name, xosc.Priority.parallel)
+    event = xosc.Event(name, priority or xosc.Priority.parallel)
     event.add_trigger(_at(xosc, name, begins) if isinstance(begins, float) else begins)
     event.add_action(f"{name} action", action)
     return event
@@ -208,8 +240,31 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
     )
 
 
+def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: TrafficAgent) -> None:
+    """Say what of a motion's start holds with our ego alone."""
+    start, started_s = motion_in(agent).start, movement.started_s
+    if agent.type in _THINGS:
+        report.lose(f"{agent.id}: moves, and players may leave obstacles standing")
+    if isinstance(start, AtTime):
+        return
+    if agent.speed_mps > 0.0 and started_s is None:
+        text = "the motion is left out: where it begins hangs on when it starts, and it never does"
+        report.lose(f"{agent.id}: {text}", changes_scene=True)
+        return
+    apart = written_distance(cell, agent, start, started_s, _ahead_m)
+    text = "its distance is told between rear axles: the same moment with our ego, else up to"
+    report.lose(f"{agent.id}: {text} {apart.off_m:.1f} m off")
+    if apart.early_s > 0.0:
+        report.lose(f"{agent.id}: sets out {apart.early_s:.1f} s too early", changes_scene=True)
+    if agent.speed_mps > 0.0:
+        report.lose(f"{agent.id}: sets out from where it is with our ego; with others it jumps")
+
+
 def _report(cell: Cell, report: LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
+    for one in cell.motion.others:
+        if (agent := with_motion(one.agent)) is not None:
+            _report_start(cell, report, one, agent)
     names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
     obstacles = [kind for kind, name in _THINGS.items() if name == "obstacle"]
