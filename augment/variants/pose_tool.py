@@ -14,7 +14,7 @@ Frame: ego frame; s along the shown part of a lane, from where it begins.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+from dataclasses import MISSING, asdict, dataclass, fields
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -29,8 +29,8 @@ from augment.prompts import vectors
 from augment.prompts.calls import TOOL
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
-from augment.scene.motion import LENGTH_S, Motion, Movement, motion_of
-from augment.scene.planned_motion import AtPlace, PlannedMotion
+from augment.scene.motion import LENGTH_S, Motion, Movement
+from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
 from augment.scene.schema import problems_of
 
@@ -226,32 +226,28 @@ class PoseTool:
     @cached_property
     def curves(self) -> dict[str, LaneCurve]:
         """The shown lanes and connectors by short id."""
-        return vectors.lane_curves(self.scene, self._names, self.radius_m)
+        names = vectors.short_names(self._shown)
+        return vectors.lane_curves(self._shown, names, self.radius_m)
 
     @cached_property
     def agents(self) -> dict[str, TrafficAgent]:
         """The shown agents by short id."""
-        shown = vectors.shown_agents(self.scene, self.radius_m)
-        return {self._names.agents[agent.id]: agent for agent in shown}
-
-    @cached_property
-    def _names(self) -> vectors.ShortNames:
-        return vectors.short_names(self.scene)
+        return {one.id: one for one in vectors.shown_agents(self._shown, self.radius_m)}
 
     @cached_property
     def _shown(self) -> Scene:
         """The scene in the ids that models read and write."""
-        return vectors.with_short_ids(self.scene, self._names)
+        return vectors.with_short_ids(self.scene, vectors.short_names(self.scene))
 
     @cached_property
     def _ground(self) -> Ground:
-        return Ground.of(self.scene)
+        return Ground.of(self._shown)
 
     @cached_property
     def _ego_route(self) -> frozenset[str]:
         """Short ids of the lanes that the ego's goal leads over."""
         route = self._ground.route
-        return frozenset(self._names.lanes[name] for name in (route.lane_ids if route else ()))
+        return frozenset(route.lane_ids if route else ())
 
     def _answer_at(
         self, call: _Call, distance_m: float, lateral_m: float, object_type: AgentType
@@ -266,14 +262,12 @@ class PoseTool:
     def _later(self, call: _Call, place: PoseOnLane, object_type: AgentType) -> dict[str, object]:
         """Return where an object is that many seconds after it stood at a place.
 
-        Nobody else moves but whom its trigger waits for, and whom they wait for.
-
         Raises:
             ToolError: Its motion can't be carried out.
         """
         length_m, width_m = LENGTH_WIDTH_M[object_type]
         agent = TrafficAgent(
-            id=self._names.next_agent,
+            id=vectors.short_names(self._shown).next_agent,
             type=object_type,
             **asdict(place.pose),
             width_m=width_m,
@@ -282,14 +276,12 @@ class PoseTool:
             lane_id=place.lane,
             motion=call.motion,
         )
+        change = Modification(added=(agent,))
         try:
-            check_motions(self._shown, Modification(added=(agent,)))
+            check_motions(self._shown, change)
         except InvalidModification as fault:
             raise ToolError(TOOL, str(fault)) from None
-        starts = [one.motion.start for one in (*self._shown.agents, agent) if one.motion]
-        awaited = {start.agent_id for start in starts if isinstance(start, AtPlace)}
-        others = tuple(a for a in self._shown.agents if a.motion or a.id in awaited)
-        motion = motion_of(replace(self._shown, agents=(*others, agent)))
+        motion = self._ground.motion_after(change, of_all=False)
         moved = motion.others[-1]
         found: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
         return found | ({"started_s": _rounded(moved.started_s)} if call.motion else {})
@@ -308,7 +300,7 @@ class PoseTool:
             "y_m": _rounded(y_m),
             "heading_rad": _rounded(heading_rad, 3),
             "speed_mps": _rounded(speed_mps),
-            "lane": lane_id and self._names.lanes[lane_id],
+            "lane": lane_id,
             "ego_distance_m": _rounded(ego_m),
         }
 
@@ -350,8 +342,8 @@ class PoseTool:
         if is_beside or past_m <= BESIDE_WITHIN_M:
             return place.s_m, place.d_m
         where = "before the beginning" if is_before else "past the end"
-        short = None if agent.lane_id is None else self._names.lanes.get(agent.lane_id)
-        advice = f'call with lane "{short}"' if short in self.curves else "name a lane beside it"
+        is_shown = agent.lane_id in self.curves
+        advice = f'call with lane "{agent.lane_id}"' if is_shown else "name a lane beside it"
         raise ToolError(
             TOOL,
             f"{start} is not beside this lane, it is {past_m:.1f} m {where} of it. To start from "
@@ -386,17 +378,16 @@ class PoseTool:
         if abs(lateral_m) <= counted.width_m / 2.0:
             return counted.id
         lane_id = self._ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
-        short = None if lane_id is None else self._names.lanes[lane_id]
-        return short if short in self.curves else None
+        return lane_id if lane_id in self.curves else None
 
     def _beside(self, curve: LaneCurve, centre: Pose) -> list[str]:
         """Return the shown lanes beside a place on a lane that a path may change to."""
         graph = self._ground.graph
         return [
-            self._names.lanes[one.lane_id]
+            one.lane_id
             for one in graph.beside(centre.x_m, centre.y_m)
             if one.beyond_m == 0.0
-            and self._names.lanes[one.lane_id] in self.curves
+            and one.lane_id in self.curves
             and run_beside(graph, curve.whole.id, one.lane_id)
         ]
 
