@@ -63,6 +63,7 @@ def work(self: Any, kind: str, pk: int) -> None:
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
+    enqueue(KINDS[kind], KINDS[kind].released_by(pk))
 
 
 @shared_task(name="augment.draw", acks_late=True, ignore_result=True)

@@ -39,7 +39,7 @@ class Task:
     """What somebody is asked to do.
 
     Attributes:
-        prompt: The text that it was found by.
+        prompt: The text that it was found by; of a follow-up that of the first task as well.
         scene: With the short ids of the prompt.
     """
 
@@ -57,9 +57,9 @@ class Heard:
         task: None where the list does not know the wish.
         may_call: Whether it can have a function called now.
         is_native: Whether natively.
-        results: Of the calls since the last feedback, in order; None for one that failed.
+        results: Of the calls since the last wish or feedback, in order; None for one that failed.
         called: Whether it has called anything since then.
-        feedback: What reviews sent back so far.
+        feedback: What reviews sent back since the last wish.
     """
 
     role: ModelRole
@@ -90,14 +90,12 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
     """Return what the conversation says about the answer that is due; by default a modifier's."""
     messages = request.messages
     system = next((message.text for message in messages if message.role == "system"), "")
-    told = [
-        number
-        for number, message in enumerate(messages)
-        if message.role == "user" and message.text.startswith(_FEEDBACK)
-    ]
+    said = [(n, one.text) for n, one in enumerate(messages) if one.role == "user"]
+    asked = max((n for n, text in said if _INSTRUCTION.search(text)), default=0)
+    told = [n for n, text in said if n > asked and text.startswith(_FEEDBACK)]
     results: list[dict[str, Any] | None] = []
     called = False
-    for message in messages[max(told, default=0) :]:
+    for message in messages[max(told, default=asked) :]:
         is_written = message.text.startswith(_RESULT)
         called |= message.role == "tool" or is_written
         if message.role == "tool":
@@ -150,15 +148,17 @@ def changed_agents(prompt: str) -> list[TrafficAgent]:
 
 
 def _task(request: ChatRequest, known: KnownTasks) -> Task | None:
-    """Return the task in the first message of a user that holds a wish of the list.
+    """Return the task of the last wish that a user has said.
 
-    Where the list puts the wish to several scenes, the one that the message shows counts.
+    Where the list puts the wish to several scenes, the one that the first wish's message shows
+    counts.
     """
     texts = [message.text for message in request.messages if message.role == "user"]
-    prompt, quoted = next(((t, q) for t in texts if (q := _INSTRUCTION.search(t))), ("", None))
-    if quoted is None:
+    wishes = [text for text in texts if _INSTRUCTION.search(text)]
+    if not wishes:
         return None
-    lines = quoted.group(1).split("\n")
+    prompt = "\n".join(dict.fromkeys((wishes[0], wishes[-1])))
+    lines = _INSTRUCTION.findall(wishes[-1])[-1].split("\n")
     tasks = known(same_text("\n".join(line.removeprefix(QUOTE) for line in lines)))
     if len(tasks) > 1:
         forms = [(task, scene_text(task[0], lanes=form)) for task in tasks for form in LaneFormat]

@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 DEFAULT_MAX_TOKENS = 8192
 
@@ -83,6 +84,21 @@ class Message:
         parts: list[dict[str, object]] = [{"type": "text", "text": self.text}]
         parts += [{"type": "image_url", "image_url": {"url": image_url(i)}} for i in self.images]
         return {"role": self.speaker.value, "content": parts}
+
+
+def message_from_document(document: Mapping[str, Any]) -> Message:
+    """Return the message that `to_document` wrote, for one without images."""
+    calls = []
+    for call in document.get("tool_calls", ()):
+        extra = {name: call[name] for name in call if name not in ("id", "type", "function")}
+        written = json.dumps(extra) if extra else ""
+        calls.append(ToolCall(id=call["id"], **call["function"], extra=written))
+    return Message(
+        speaker=Speaker(document["role"]),
+        text=document["content"] or "",
+        calls=tuple(calls),
+        answers=document.get("tool_call_id", ""),
+    )
 
 
 class LengthName(StrEnum):

@@ -222,7 +222,7 @@ def are_alike(one: Modification, other: Modification) -> bool:
     return (
         set(one.removed) == set(other.removed)
         and moved[0].keys() == moved[1].keys()
-        and all(_look_alike(agent, moved[1][name]) for name, agent in moved[0].items())
+        and all(look_alike(agent, moved[1][name]) for name, agent in moved[0].items())
         and _all_matched(one.added, other.added)
     )
 
@@ -233,12 +233,13 @@ def _all_matched(one: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> 
 
     if len(one) != len(other):
         return False
-    apart = np.array([[not _look_alike(a, b) for b in other] for a in one])
+    apart = np.array([[not look_alike(a, b) for b in other] for a in one])
     rows, columns = linear_sum_assignment(apart.reshape(len(one), len(other)))
     return not apart.reshape(len(one), len(other))[rows, columns].any()
 
 
-def _look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
+def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
+    """Return whether two objects look the same, whatever their ids."""
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
     gaps_m = [

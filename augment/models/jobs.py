@@ -99,6 +99,14 @@ class Augmentation(Work):
         related_name="corrections",
         help_text="what a person corrected by it",
     )
+    follows = models.ForeignKey(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.SET_NULL,
+        related_name="follow_ups",
+        help_text="its contestant's own answer to the scenario that its scenario follows",
+    )
     made_by = account_column(
         help_text="whose hand made the modification; null where no person did"
     )

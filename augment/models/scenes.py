@@ -117,6 +117,14 @@ class Scenario(models.Model):
         related_name="paraphrases",
         help_text="the scenario that it asks for in other words",
     )
+    follows = models.ForeignKey(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="follow_ups",
+        help_text="the scenario whose results its instruction asks to change further",
+    )
     original_image = models.CharField(
         max_length=120, blank=True, help_text="name of the picture before any change"
     )
@@ -157,6 +165,17 @@ class Scenario(models.Model):
     def in_catalogue(self) -> bool:
         """Whether it comes with the project; its file alone changes it then."""
         return bool(self.catalogue_set)
+
+    @property
+    def wording(self) -> str:
+        """The instruction; of a follow-up all that was said up to it, a numbered line each."""
+        said, before = [self.instruction], self.follows
+        while before is not None:
+            said.insert(0, before.instruction)
+            before = before.follows
+        if len(said) == 1:
+            return self.instruction
+        return "\n".join(f"{number}. {text}" for number, text in enumerate(said, start=1))
 
     def get_type_display(self) -> str:
         """What people read for its type."""

@@ -132,6 +132,11 @@ def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) ->
     return (*messages, model_message(answer), said_by_user(asked))
 
 
+def follow_up_messages(messages: Messages, instruction: str) -> Messages:
+    """Return the conversation up to the modifier's last answer, and what the user wishes next."""
+    return (*messages, said_by_user(fill_text("follow_up.md", quoted=quote(instruction))))
+
+
 def regenerate_messages(
     messages: Messages, feedback: Sequence[str], *, is_measured: bool
 ) -> Messages:

@@ -196,6 +196,10 @@ class WorkKind(ABC, Generic[Row]):
         lost = f"Lost {row.lost + 1} workers in a row at this one"
         return Settlement(state=FAILED, reason=f"{lost}; look for the cause, then retry.")
 
+    def released_by(self, pk: int) -> list[int]:
+        """Return the waiting rows that could not be taken before that one had its outcome."""
+        return []
+
     def tidy(self, now: Moment) -> None:
         """Clean up what else a lost worker may leave behind."""
 

@@ -83,19 +83,22 @@ def run(
     others: Mapping[ModelRole, RespondentClient] | None = None,
     intent: Intent | None = None,
     sampling: Sampling | None = None,
+    begun: Messages = (),
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
     Args:
         recipe: The variant, within whatever limits.
         scene: The scene before the change.
-        instruction: The user's wish in natural language.
+        instruction: The user's wish in natural language; of a follow-up all wishes so far.
         modifier: Who modifies.
         transcript: Is handed every raw answer before it is read.
         patience: How faults that may pass are waited out; by default three attempts.
         others: Who plays the reviewers' roles; by default the modifier's model does.
         intent: What a geometric review holds modifications against, where that is stored.
         sampling: What every request is sent with.
+        begun: The modifier's conversation up to the wish that it is to meet now; by default it is
+            given its task.
 
     Raises:
         ModelFault: The wire or the endpoint broke; the same run may succeed later if it says so.
@@ -109,7 +112,12 @@ def run(
         re_asks=recipe.limits.re_asks,
     )
     work = _Work(
-        recipe=recipe, scene=scene, instruction=instruction, respondents=respondents, intent=intent
+        recipe=recipe,
+        scene=scene,
+        instruction=instruction,
+        respondents=respondents,
+        intent=intent,
+        begun=begun,
     )
     try:
         kept, remark = work.modify_and_review()
@@ -186,6 +194,7 @@ class _Work:
     instruction: str
     respondents: Respondents
     intent: Intent | None
+    begun: Messages
 
     @cached_property
     def ground(self) -> Ground:
@@ -203,7 +212,7 @@ class _Work:
         note = self.respondents.transcript.note
         native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
         form = form_of(self.recipe, native_tools=native)
-        messages = fill.modifier_messages(self.scene, self.instruction, form)
+        messages = self.begun or fill.modifier_messages(self.scene, self.instruction, form)
         rounds: list[_Round] = []
         while True:
             number, fault = len(rounds) + 1, ""

@@ -52,7 +52,8 @@ class Closure:
     """A study and all that its rows lead to.
 
     Attributes:
-        jobs: Whose augmentations are shown, whole, and those that they took answers from.
+        jobs: Whose augmentations are shown, whole, and those that they took answers from, go on
+            from or correct.
         accounts: The names that accounts get instead of their own, by key.
         names: The same by their own names.
     """
@@ -79,10 +80,12 @@ class Closure:
 
     @property
     def scenarios(self) -> Rows:
-        """The same with what its paraphrases say in other words."""
+        """The same with what its paraphrases say in other words and its follow-ups follow."""
         named = self.named_scenarios
-        originals = named.exclude(paraphrase_of=None).values("paraphrase_of")
-        return Scenario.objects.filter(Q(pk__in=named.values("pk")) | Q(pk__in=originals))
+        found = Q(pk__in=named.values("pk"))
+        for column in ("paraphrase_of", "follows", "follows__follows"):
+            found |= Q(pk__in=named.exclude(**{column: None}).values(column))
+        return Scenario.objects.filter(found)
 
     @property
     def readings(self) -> Rows:
@@ -184,8 +187,14 @@ def close_over(study: Study) -> Closure:
     while new:
         closure.jobs |= new
         sources = ModelCall.objects.filter(copies__attempt__augmentation__job__in=new)
-        found = sources.exclude(attempt=None).values_list("attempt__augmentation__job", flat=True)
-        new = set(found) - closure.jobs
+        found = set(
+            sources.exclude(attempt=None).values_list("attempt__augmentation__job", flat=True)
+        )
+        rows = Augmentation.objects.filter(job__in=new)
+        for column in ("follows", "corrects"):
+            named = rows.exclude(**{column: None})
+            found.update(named.values_list(f"{column}__job", flat=True))
+        new = found - closure.jobs
     # In the order of their names, so that whatever is ordered by name stays as it is.
     # Sorted here: databases order letters each in its own way.
     named = User.objects.filter(pk__in=_people(closure)).values_list("username", "pk")

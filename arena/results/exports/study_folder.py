@@ -110,6 +110,7 @@ _SCENARIO: dict[str, str] = {
     "provenance": "base_scene.provenance",
     "set": "catalogue_set",
     "paraphrase_of": "paraphrase_of.slug",
+    "follows": "follows.slug",
 }
 
 _AT_ONCE = 100
@@ -250,7 +251,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
     yield "contestants.json", _json([_contestant_document(row) for row in contestants])
     if frozen := study.preregistration.encode():
         yield FILE_NAME, frozen
-    named = closure.named_scenarios.select_related("base_scene", "paraphrase_of")
+    named = closure.named_scenarios.select_related("base_scene", "paraphrase_of", "follows")
     scenarios = sorted(named, key=lambda row: str(row.slug))
     for scenario in scenarios:
         yield f"scenarios/{scenario.slug}.json", _json(_document(scenario, _SCENARIO))

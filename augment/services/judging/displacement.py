@@ -13,6 +13,7 @@ from augment.errors import InvalidDocument
 from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
+from augment.metrics.kept import KeptObject, KeptSummary, kept_objects, summarise_kept
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
@@ -54,12 +55,19 @@ class Measured:
     Attributes:
         displacement: None where there is a reason why not; all missing for an answer that was
             unreadable or refused.
+        kept: Of a follow-up what was to stay of the answer before; of all others nothing.
         why_not: The reason, None where it was measured.
     """
 
     row: Augmentation
     displacement: Displacement | None = None
+    kept: tuple[KeptObject, ...] = ()
     why_not: Unmeasured | None = None
+
+    @property
+    def kept_summary(self) -> KeptSummary | None:
+        """How much was to stay and did, None without any."""
+        return summarise_kept(self.kept)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,11 +76,13 @@ class Group:
 
     Attributes:
         heading: What they have in common: a type, a variant, or the contestant's name.
+        kept: What follow-ups were to leave alone, None without any.
     """
 
     heading: str
     contestant: Contestant
     summary: Summary
+    kept: KeptSummary | None
 
 
 def of_job(job: GenerationJob) -> list[Measured]:
@@ -110,6 +120,7 @@ def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
             heading=_group_of(cell[0].row, by)[1],
             contestant=cell[0].row.contestant,
             summary=summarise([one.displacement for one in cell if one.displacement is not None]),
+            kept=summarise_kept([thing for one in cell for thing in one.kept]),
         )
         for _, cell in sorted(cells.items())
     ]
@@ -194,18 +205,22 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
 
 
 def _rows() -> QuerySet[Augmentation]:
-    rows = Augmentation.objects.select_related("scenario", "contestant")
+    rows = Augmentation.objects.select_related("scenario", "contestant", "follows__scenario")
     rows = rows.defer("notes", "scenario__instruction")
     return rows.order_by("scenario__slug", "contestant__slug", "sample")
 
 
 def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
     references: dict[int, Modification | None] = {}
-    measured = []
-    for row in rows:
+
+    def reference_to(row: Augmentation) -> Modification | None:
         if row.scenario_id not in references:
             references[row.scenario_id] = _read(row.scenario.reference)
-        reference, answer = references[row.scenario_id], _answer_of(row)
+        return references[row.scenario_id]
+
+    measured = []
+    for row in rows:
+        reference, answer, before = reference_to(row), _answer_of(row), row.follows
         if row.state not in Augmentation.SHOWABLE:
             measured.append(Measured(row=row, why_not=Unmeasured.UNFINISHED))
         elif reference is None:
@@ -213,7 +228,15 @@ def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
         elif answer is None and row.state == State.DONE:
             measured.append(Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW))
         else:
-            measured.append(Measured(row=row, displacement=displacement(answer, reference)))
+            own = None if before is None else _answer_of(before)
+            earlier = None if before is None else reference_to(before)
+            kept: tuple[KeptObject, ...] = ()
+            if own is not None and earlier is not None:
+                kept = kept_objects(
+                    own, answer, reference_before=earlier, reference_after=reference
+                )
+            found = displacement(answer, reference)
+            measured.append(Measured(row=row, displacement=found, kept=kept))
     return measured
 
 

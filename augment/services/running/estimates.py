@@ -10,7 +10,7 @@ from augment.llm.costs import usd_of
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
 from augment.services.endpoints.known_models import price_of
 from augment.services.endpoints.treatments import options_of, respondents_of
-from augment.services.running.jobs import JobScope
+from augment.services.running.jobs import JobScope, with_followed
 from augment.variants.options import recipe_with
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole
@@ -95,7 +95,7 @@ def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEst
     if who is None:
         rows = Contestant.objects.filter(slug__in=scope.contestants)
         who = list(rows.select_related("endpoint").order_by("slug"))
-    scenarios = Scenario.objects.filter(slug__in=scope.scenarios).count()
+    scenarios = len(with_followed(Scenario.objects.filter(slug__in=scope.scenarios)))
     cells = scenarios * scope.samples
     asking = [row for row in who if row.endpoint is not None and cells]
     return JobEstimate(

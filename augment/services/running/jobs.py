@@ -1,6 +1,6 @@
 """Generation jobs: launched, paused, resumed, cancelled, retried, finished."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -66,12 +66,17 @@ class JobRequest(JobScope, Caps):
 
 
 @transaction.atomic
-def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
+def launch(
+    request: JobRequest, actor: User | None = None, *, follows: Augmentation | None = None
+) -> GenerationJob:
     """Write a job and its waiting rows; the caller sends the messages.
+
+    A follow-up goes on from its contestant's answer to the scenario before it, in the same job.
 
     Args:
         request: What it runs; a slug given twice counts once.
         actor: Who launches it, None for the machine.
+        follows: The answer, of another job, that its only row goes on from.
 
     Raises:
         InvalidDocument: The name is empty, too long or not one line; or a number can't be.
@@ -85,6 +90,8 @@ def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
     loosen_unanswered(Contestant.objects.filter(slug__in=request.contestants))
     who = _in_order(Contestant.objects.all(), request.contestants, "contestant")
     where = _in_order(Scenario.objects.all(), request.scenarios, "scenario")
+    if follows is None:
+        where = with_followed(where)
     refuse_impossible(who, where, samples=request.samples)
     job = GenerationJob.objects.create(
         name=name,
@@ -96,16 +103,33 @@ def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
     )
     job.contestants.set(who)
     job.scenarios.set(where)
-    Augmentation.objects.bulk_create(
-        Augmentation(job=job, scenario=scenario, contestant=contestant, sample=sample)
+    rows = Augmentation.objects.bulk_create(
+        Augmentation(
+            job=job, scenario=scenario, contestant=contestant, sample=sample, follows=follows
+        )
         for sample in range(1, job.samples + 1)
         for scenario in where
         for contestant in who
     )
+    if follows is None:
+        _let_follow(rows)
     settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": limit_of(job)}
     slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
     _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
+
+
+def with_followed(scenarios: Iterable[Scenario]) -> list[Scenario]:
+    """Return the scenarios, each behind those that it follows."""
+    ordered: dict[int, Scenario] = {}
+    for scenario in scenarios:
+        chain: list[Scenario] = []
+        step: Scenario | None = scenario
+        while step is not None:
+            chain.insert(0, step)
+            step = step.follows
+        ordered |= {one.pk: one for one in chain}
+    return list(ordered.values())
 
 
 @transaction.atomic
@@ -235,6 +259,15 @@ def _finish(job_pk: int, now: Moment) -> int:
     if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():
         return 0
     return running.update(state=JobState.FINISHED, finished_at=now)
+
+
+def _let_follow(rows: Sequence[Augmentation]) -> None:
+    """Tie each follow-up of a new job to the answer that it goes on from."""
+    cells = {(row.scenario_id, row.contestant_id, row.sample): row for row in rows}
+    later = [row for row in rows if row.scenario.follows_id is not None]
+    for row in later:
+        row.follows = cells[row.scenario.follows_id or 0, row.contestant_id, row.sample]
+    Augmentation.objects.bulk_update(later, ["follows"])
 
 
 def _let_wait(

@@ -30,6 +30,7 @@ from augment.errors import (
 from augment.llm.client import ChatClient
 from augment.llm.messages import shorten
 from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
+from augment.prompts.fill import Messages, follow_up_messages
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.services.clock import Moment
@@ -37,6 +38,7 @@ from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.treatments import Treatment, respondents_of, treatment_of
 from augment.services.running import budget, jobs, workers
 from augment.services.running.calls import RowTranscript, insist_wanted, sentence_of
+from augment.services.running.follow_ups import conversation_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.services.scenarios.submissions import find_entry
@@ -79,14 +81,19 @@ class Augmentations(WorkKind[Augmentation]):
     model = Augmentation
     queue = "models"
     lost_limit = 5
-    related = ("job", "scenario__base_scene", "contestant__endpoint")
+    related = ("job", "scenario__base_scene", "contestant__endpoint", "follows")
 
     def __init__(self, connect: Connect | None = None) -> None:
         self._connect = connect
 
     def waiting(self) -> QuerySet[Augmentation]:
-        """None of a job that was cancelled, is paused or stopped at its cap."""
-        return super().waiting().exclude(job__in=CLOSED)
+        """None of a held or cancelled job, none that goes on from what is still under way."""
+        unanswered = self.rows.filter(state__in=Augmentation.UNDER_WAY)
+        return super().waiting().exclude(job__in=CLOSED).exclude(follows__in=unanswered)
+
+    def released_by(self, pk: int) -> list[int]:
+        """Return the follow-ups that have waited for this row."""
+        return list(self.waiting().filter(follows=pk, sent_at=None).values_list("pk", flat=True))
 
     def run(self, row: Augmentation, held: Held) -> Settlement:
         """Ask, keep, draw. Every foreseen fault is a failed outcome with a sentence."""
@@ -213,6 +220,10 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
             status=status, modification=entry.modification, reason=entry.reason, notes=notes
         )
     if contestant.endpoint is not None:
+        before = row.follows
+        if before is not None and before.state in (State.UNREADABLE, State.REFUSED):
+            reason = f"It would go on from an answer that is none: {before.reason}"
+            return Outcome(status=OutcomeStatus(before.state), reason=reason)
         return _ask_model(row, contestant.endpoint, scene, held, connect)
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
     if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
@@ -230,6 +241,9 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
 def _ask_model(
     row: Augmentation, endpoint: Endpoint, scene: Scene, held: Held, connect: Connect | None
 ) -> Outcome:
+    begun: Messages = ()
+    if row.scenario.follows_id is not None:
+        begun = follow_up_messages(conversation_of(row.follows), row.scenario.instruction)
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
     options = treatment.options
@@ -254,7 +268,7 @@ def _ask_model(
         return pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
             scene=scene,
-            instruction=row.scenario.instruction,
+            instruction=row.scenario.wording,
             modifier=modifier,
             transcript=RowTranscript(
                 held,
@@ -266,4 +280,5 @@ def _ask_model(
             others=playing,
             intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),
+            begun=begun,
         )

@@ -83,6 +83,12 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
         raise Conflict(f"A benchmark holds 1 to {MOST_TASKS} scenarios; these are {len(slugs)}.")
     found = Scenario.objects.select_related("paraphrase_of").in_bulk(slugs, field_name="slug")
     rows = [found[slug] for slug in slugs]
+    for row in rows:
+        if row.follows is not None:
+            raise Conflict(
+                f"“{row.slug}” says how to change an answer to “{row.follows.slug}”: alone it is "
+                "no task of a benchmark."
+            )
     sizes = {
         row.slug: measure_task(scenes.intent_of(row), scenes.reference_of(row)) for row in rows
     }

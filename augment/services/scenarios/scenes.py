@@ -125,6 +125,7 @@ def add_scenario(
     traffic: Sequence[entities.TrafficAgent] | None = None,
     interplan: dict[str, Any] | None = None,
     derives: bool = False,
+    follows: str = "",
     actor: User | None = None,
 ) -> Scenario:
     """Keep an instruction for a scene, with its intent and reference if there are any.
@@ -143,10 +144,12 @@ def add_scenario(
         traffic: Who is spawned, where that is known already; None to spawn it.
         interplan: The parts of interPlan's file that it comes from, with a generated instruction.
         derives: Whether the reference says what is asked for, see `derive_intent`.
+        follows: The slug of a scenario of the scene whose results the instruction asks to change
+            further; traffic, density and goal are that one's then.
         actor: Who did it.
 
     Raises:
-        UnknownName: No such scene.
+        UnknownName: No such scene, or no such scenario on it.
         InvalidDocument: One of these breaks its format.
         InvalidModification: The reference does not fit the scene.
         Conflict: The slug is taken, or traffic is to be kept and spawned.
@@ -161,6 +164,13 @@ def add_scenario(
     scenario = Scenario(
         slug=slug or _free_slug(base_scene, type), base_scene=base_scene, interplan=interplan
     )
+    if follows:
+        first = _find_followed(follows, base_scene)
+        scenario.slug = slug or _numbered_slug(f"{first.slug}-then")
+        scenario.follows, scenario.interplan = first, first.interplan
+        keep_traffic, density, goal = first.keep_traffic, first.traffic_density, first.goal
+        spawned = first.spawned
+        traffic = codec.modification_from_document(spawned).added if spawned else ()
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, reference)
     if derives:
         type, instruction = derive_intent(scenario, type, instruction)
@@ -190,18 +200,27 @@ def add_variant(
         actor: Who did it.
     """
     kept = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
+    more = ("spawned", "interplan", "language", "follows")
     variant = Scenario(
         slug=_numbered_slug(scenario.slug),
         instruction=shorten(f"{scenario.instruction} ({difference})", INSTRUCTION_LENGTH),
         reference=codec.modification_to_document(reference),
         instruction_is_generated=True,
-        **{name: getattr(scenario, name) for name in (*kept, "spawned", "interplan", "language")},
+        **{name: getattr(scenario, name) for name in (*kept, *more)},
     )
     if intent is not None:
         variant.intent = codec.intent_to_document(intent)
         variant.intent_origin = IntentOrigin.DERIVED
     _insert(variant, actor)
     return variant
+
+
+def _find_followed(slug: str, scene: BaseScene) -> Scenario:
+    first = scene.scenarios.filter(slug=slug).first()
+    if first is None:
+        known = list(scene.scenarios.values_list("slug", flat=True))
+        raise UnknownName(f"scenario of the scene “{scene.slug}”", slug, known)
+    return first
 
 
 def _set_intent(scenario: Scenario, intent: object, origin: IntentOrigin) -> None:
@@ -227,6 +246,7 @@ def _insert(scenario: Scenario, actor: User | None) -> None:
         "has_reference": scenario.reference is not None,
         "keep_traffic": scenario.keep_traffic,
         "intent": scenario.intent_origin or None,
+        **({"follows": scenario.follows.slug} if scenario.follows else {}),
     }
     log_change(scenario, "add", actor, after=after)
 
@@ -276,12 +296,15 @@ def change_surroundings(
     Raises:
         InvalidDocument: There is no such density or goal.
         InvalidModification: The reference does not fit any more.
-        Conflict: Traffic is to be kept and spawned.
+        Conflict: Traffic is to be kept and spawned, or it follows another scenario.
     """
     before = scenario.keep_traffic, scenario.traffic_density
     is_same_traffic = before == (keep_traffic, density or entities.TrafficDensity.NONE)
     if is_same_traffic and scenario.goal == goal:
         return
+    if scenario.follows is not None:
+        first = scenario.follows.slug
+        raise Conflict(f"It follows “{first}”: its traffic and goal are that one's.")
     traffic = None
     if is_same_traffic and scenario.spawned is not None:
         traffic = codec.modification_from_document(scenario.spawned).added

@@ -1,0 +1,93 @@
+"""What a follow-up was to leave alone: how far it moved that from the answer before.
+
+An object is to be kept if both references have it alike, and if the answer before had placed it.
+Any frame, the same for all four changes.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from augment.metrics.displacement import displacement, look_alike
+from augment.scene.entities import Modification
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptObject:
+    """An object of the answer before that was to stay.
+
+    Attributes:
+        id: In the answer before.
+        distance_m: Between its places in both answers, None where the later one has none for it.
+        is_kept: Whether it looks the same in both.
+    """
+
+    id: str
+    distance_m: float | None
+    is_kept: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptSummary:
+    """What some follow-ups were to keep, taken together.
+
+    Attributes:
+        to_keep: Objects that were to stay.
+        kept: Of these, those that look the same after the follow-up.
+        moved_mean_m: The mean distance of those that are still there, None where none is.
+    """
+
+    to_keep: int
+    kept: int
+    moved_mean_m: float | None
+
+
+def kept_objects(
+    before: Modification,
+    after: Modification | None,
+    *,
+    reference_before: Modification,
+    reference_after: Modification,
+) -> tuple[KeptObject, ...]:
+    """Return what was to stay of an answer, and whether the next one has left it alone.
+
+    Args:
+        before: The answer that the follow-up goes on from.
+        after: The answer to the follow-up, None where it is none: nothing was kept.
+        reference_before: Of the scenario that is followed.
+        reference_after: Of the follow-up.
+    """
+    alike = {
+        one.id
+        for one in reference_before.changed
+        if any(look_alike(one, other) for other in reference_after.changed)
+    }
+    matches = displacement(before, reference_before).matches
+    to_keep = {match.generated for match in matches if match.reference in alike}
+    steps = {step.reference: step for step in displacement(after, before).matches}
+    old = {agent.id: agent for agent in before.changed}
+    new = {agent.id: agent for agent in after.changed} if after else {}
+    found = []
+    for name in (agent.id for agent in before.changed if agent.id in to_keep):
+        step = steps.get(name)
+        found.append(
+            KeptObject(
+                id=name,
+                distance_m=None if step is None else step.distance_m,
+                is_kept=step is not None and look_alike(old[name], new[step.generated]),
+            )
+        )
+    return tuple(found)
+
+
+def summarise_kept(objects: Collection[KeptObject]) -> KeptSummary | None:
+    """Return their summary, None without any."""
+    distances_m = [one.distance_m for one in objects if one.distance_m is not None]
+    if not objects:
+        return None
+    return KeptSummary(
+        to_keep=len(objects),
+        kept=sum(one.is_kept for one in objects),
+        moved_mean_m=float(np.mean(distances_m)) if distances_m else None,
+    )

@@ -1,0 +1,231 @@
+"""Follow-ups: whose conversation goes on with what, when, and what is measured of it."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from augment.baselines.rule_placer import place
+from augment.errors import Conflict, UnknownName
+from augment.fake_llm.server import running
+from augment.llm.messages import Message, Speaker, ToolCall, message_from_document
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.intent import Body, Intent, Shape
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
+from augment.services.judging.displacement import of_job
+from augment.services.running import jobs
+from augment.services.running.estimates import estimate
+from augment.services.running.follow_ups import (
+    FollowUpRequest,
+    ask_follow_up,
+    conversation_of,
+    steps_to,
+)
+from augment.services.running.jobs import JobRequest, JobScope
+from augment.services.running.runner import AUGMENTATIONS
+from augment.services.scenarios.prompts import stored_tasks
+from augment.services.scenarios.scenes import add_scenario, change_surroundings, scene_of
+from tests.intents import cones, parked
+from tests.jobs import rows
+from tests.jobs.scripted import Scripted, add
+from tests.llm.json_server import serving
+from tests.variants.playing import answer, block, car, rating
+
+pytestmark = pytest.mark.django_db(transaction=True)
+
+State = Augmentation.State
+WISH, NEXT = "Add a parked car 20 m ahead.", "Four metres further, and make it a bus."
+
+
+@pytest.fixture
+def server() -> Iterator[Scripted]:
+    with serving(Scripted()) as made:
+        yield made
+
+
+def two_steps(*, intents: bool = False) -> tuple[Scenario, Scenario]:
+    """A car and two cones; then the car becomes a bus 4 m further on, and the cones stay."""
+    stay = cones(40.0, 2, Shape.LINE).requests
+    asked = [
+        Intent(requests=(*parked(ahead_m, body=body).requests, *stay))
+        for ahead_m, body in ((20.0, Body.CAR), (24.0, Body.BUS))
+    ]
+    first = rows.add_scenario("street", instruction=WISH, intent=intent_to_document(asked[0]))
+    made = [place(scene_of(first), intent).modification for intent in asked]
+    Scenario.objects.filter(pk=first.pk).update(reference=modification_to_document(made[0]))
+    follow_up = add_scenario(
+        scene=first.base_scene.slug,
+        type=first.type,
+        instruction=NEXT,
+        reference=modification_to_document(made[1]),
+        intent=intent_to_document(asked[1]),
+        follows="street",
+    )
+    return first, follow_up
+
+
+def launched(*contestants: str) -> list[Augmentation]:
+    """The rows of a job on the follow-up alone, each behind the one that it follows."""
+    job = jobs.launch(JobRequest(name="J", contestants=contestants, scenarios=["street-then-1"]))
+    return list(job.augmentations.order_by("contestant__slug", "scenario__slug"))
+
+
+def run(*waiting: Augmentation) -> None:
+    for row in waiting:
+        assert AUGMENTATIONS.perform(row.pk)
+        row.refresh_from_db()
+
+
+def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
+    server: Scripted,
+) -> None:
+    two_steps()
+    add(server, "ann")
+    server.script = [car(20.0), car(24.0, type="BUS")]
+    scope = JobScope(contestants=["ann"], scenarios=["street-then-1"])
+    assert estimate(scope).rows == 2
+    first, second = launched("ann")
+    assert (second.follows, second.scenario.wording) == (first, f"1. {WISH}\n2. {NEXT}")
+    assert AUGMENTATIONS.take(second.pk) is None  # as long as the first is under way
+    assert AUGMENTATIONS.released_by(first.pk) == []
+    run(first)
+    assert AUGMENTATIONS.released_by(first.pk) == [second.pk]
+    run(second)
+    assert (first.state, second.state) == (State.DONE, State.DONE)
+    one, two = (body["messages"] for body in server.bodies)
+    assert two[:2] == one
+    assert two[2] == {"role": "assistant", "content": car(20.0)}
+    assert f"<instruction>\n> {NEXT}\n</instruction>" in two[3]["content"]
+    assert [step.pk for step in steps_to(second)] == [first.pk, second.pk]
+
+
+def test_it_goes_on_from_the_round_that_counted(server: Scripted) -> None:
+    two_steps()
+    add(server, "ann", "tqa")
+    server.script = [car(10.0), rating(2, 2, 2, "a"), car(20.0), rating(3, 4, 4, "b"), car(30.0)]
+    server.script += [rating(1, 1, 1, "c"), car(24.0), rating(5, 5, 5)]
+    first, second = launched("ann")
+    run(first, second)
+    talk = server.bodies[6]["messages"]
+    assert talk[-2]["content"] == car(20.0)
+    assert talk[2]["content"] == car(10.0)
+    assert len(talk) == 6
+    reviewed = server.bodies[7]["messages"][1]["content"]
+    assert f"> 1. {WISH}\n> 2. {NEXT}" in reviewed
+
+
+@pytest.mark.parametrize(
+    ("said", "state"), [(answer(block()), State.REFUSED), ("There.", State.UNREADABLE)]
+)
+def test_whoever_has_no_answer_of_its_own_has_none_to_the_follow_up(
+    server: Scripted, said: str, state: str
+) -> None:
+    two_steps()
+    add(server, "ann")
+    server.script = [said]
+    first, second = launched("ann")
+    run(first)
+    asked = len(server.bodies)
+    run(second)
+    assert (first.state, second.state, len(server.bodies)) == (state, state, asked)
+    assert second.reason.startswith("It would go on from an answer that is none: ")
+
+
+def test_a_fault_of_the_first_is_one_of_the_second_and_both_run_again(server: Scripted) -> None:
+    two_steps()
+    add(server, "ann")
+    first, second = launched("ann")
+    held = AUGMENTATIONS.take(first.pk)
+    assert held is not None
+    assert held.settle(rows.failed())
+    run(second)
+    assert (second.state, second.reason) == (
+        State.FAILED,
+        "There is no answer to go on from: m OTM on street is failed.",
+    )
+    jobs.retry_failed(first.job)
+    server.script = [car(20.0), car(24.0)]
+    run(first, second)
+    assert second.state == State.DONE
+
+
+def test_somebody_says_what_to_change_and_may_go_back_and_say_something_else(
+    server: Scripted,
+) -> None:
+    first_scenario, _ = two_steps()
+    add(server, "ann")
+    server.script = [car(20.0), car(22.0), car(18.0)]
+    first, _ = launched("ann")
+    run(first)
+    further = ask_follow_up(first, FollowUpRequest(instruction="Further.", cap_calls=3))
+    nearer = ask_follow_up(first, FollowUpRequest(instruction="Nearer."))
+    assert further.job.cap_calls == 3
+    scenario = further.scenario
+    assert (scenario.slug, scenario.follows) == ("street-then-2", first_scenario)
+    assert (scenario.retired_at is None, scenario.reference) == (False, None)
+    run(further, nearer)
+    placed = [row.modification["add"][0]["x_m"] for row in (first, further, nearer)]
+    assert placed == [20.0, 22.0, 18.0]
+    last = ask_follow_up(further, FollowUpRequest(instruction="A bus."))
+    assert last.scenario.wording == f"1. {WISH}\n2. Further.\n3. A bus."
+    assert [step.pk for step in steps_to(last)] == [first.pk, further.pk, last.pk]
+
+
+def test_only_a_language_models_finished_answer_on_record_can_go_on(server: Scripted) -> None:
+    two_steps()
+    add(server, "ann")
+    rows.add_kind("reference")
+    mine, theirs = launched("ann", "reference")[::2]
+    request = FollowUpRequest(instruction="Further.")
+    with pytest.raises(Conflict, match="m OTM on street is waiting"):
+        ask_follow_up(mine, request)
+    run(mine, theirs)
+    with pytest.raises(Conflict, match="No language model gave this answer"):
+        ask_follow_up(theirs, request)
+    with pytest.raises(Conflict, match="was deleted"):
+        conversation_of(None)
+
+
+def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
+    first, follow_up = two_steps()
+    assert scene_of(first) == scene_of(follow_up)
+    with pytest.raises(Conflict, match="It follows “street”"):
+        change_surroundings(follow_up, keep_traffic=True, density="", goal="")
+    rows.add_scenario("elsewhere")
+    with pytest.raises(UnknownName, match=r"'elsewhere'\. Known: street, street-then-1"):
+        add_scenario(
+            scene=first.base_scene.slug, type=first.type, instruction=NEXT, follows="elsewhere"
+        )
+
+
+def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the_rest_alone() -> (
+    None
+):
+    two_steps()
+    with running(known=stored_tasks) as stand_in:
+        request = EndpointRequest(label="fake", base_url=stand_in.url, is_simulated=True)
+        endpoint = ensure_endpoint(request)
+        for model in ("fake-good", "fake-careless"):
+            rows.add_model(model, endpoint=endpoint, model=model)
+        careless_first, careless, good_first, good = launched("fake-good", "fake-careless")
+        run(careless_first, careless, good_first, good)
+    found = {one.row.pk: one for one in of_job(good.job)}
+    assert found[good_first.pk].kept == ()
+    best = found[good.pk]
+    assert best.displacement is not None
+    assert best.displacement.error_m == pytest.approx(0.0, abs=0.01)
+    assert best.kept_summary is not None
+    assert (best.kept_summary.to_keep, best.kept_summary.kept) == (2, 2)
+    worse = found[careless.pk].kept_summary
+    assert worse is not None
+    assert (worse.to_keep, worse.kept) == (2, 0)
+
+
+def test_a_message_with_calls_comes_back_as_it_was_written() -> None:
+    call = ToolCall(id="c1", name="pose_on_lane", arguments='{"lane": 1', extra='{"seal": "x"}')
+    said = (
+        Message(speaker=Speaker.ASSISTANT, text="", calls=(call,)),
+        Message(speaker=Speaker.TOOL, text="{}", answers="c1"),
+        Message(speaker=Speaker.USER, text="Go on."),
+    )
+    assert tuple(message_from_document(one.to_document()) for one in said) == said
