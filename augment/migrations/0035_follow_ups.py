@@ -7,7 +7,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('augment', '0030_submissions'),
+        ('augment', '0036_sweeps'),
     ]
 
     operations = [

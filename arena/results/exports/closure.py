@@ -192,8 +192,8 @@ def close_over(study: Study) -> Closure:
         )
         rows = Augmentation.objects.filter(job__in=new)
         for column in ("follows", "corrects"):
-            named = rows.exclude(**{column: None})
-            found.update(named.values_list(f"{column}__job", flat=True))
+            tied = rows.exclude(**{column: None})
+            found.update(tied.values_list(f"{column}__job", flat=True))
         new = found - closure.jobs
     # In the order of their names, so that whatever is ordered by name stays as it is.
     # Sorted here: databases order letters each in its own way.
