@@ -164,7 +164,7 @@ def test_somebody_says_what_to_change_and_may_go_back_and_say_something_else(
     assert (scenario.slug, scenario.follows) == ("street-then-2", first_scenario)
     assert (scenario.retired_at is None, scenario.reference) == (False, None)
     run(further, nearer)
-    placed = [row.modification["add"][0]["x_m"] for row in (first, further, nearer)]
+    placed = [(row.modification or {})["add"][0]["x_m"] for row in (first, further, nearer)]
     assert placed == [20.0, 22.0, 18.0]
     last = ask_follow_up(further, FollowUpRequest(instruction="A bus."))
     assert last.scenario.wording == f"1. {WISH}\n2. Further.\n3. A bus."
