@@ -119,21 +119,7 @@ def run(
         intent=intent,
         begun=begun,
     )
-    try:
-        kept, remark = work.modify_and_review()
-    except ReplyUnreadable as unreadable:
-        reason = "; ".join(unreadable.problems)
-        return Outcome(status=OutcomeStatus.UNREADABLE, reason=reason)
-    except ModelRefused as refused:
-        return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
-    if kept.read.modification.is_empty:
-        return Outcome(status=OutcomeStatus.REFUSED, reason=kept.read.notes or LEFT_ALONE)
-    return Outcome(
-        status=OutcomeStatus.DONE,
-        modification=kept.read.modification,
-        notes="\n\n".join(part for part in (kept.read.notes, remark) if part),
-        is_accepted=None if kept.verdict is None else kept.verdict.is_accepted,
-    )
+    return work.outcome()
 
 
 def ask_for_intent(
@@ -200,6 +186,24 @@ class _Work:
     def ground(self) -> Ground:
         """The scene, laid out for the checks once for all rounds."""
         return Ground.of(self.scene)
+
+    def outcome(self) -> Outcome:
+        """Return what came of it, an answer that is none included."""
+        try:
+            kept, remark = self.modify_and_review()
+        except ReplyUnreadable as unreadable:
+            reason = "; ".join(unreadable.problems)
+            return Outcome(status=OutcomeStatus.UNREADABLE, reason=reason)
+        except ModelRefused as refused:
+            return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
+        if kept.read.modification.is_empty:
+            return Outcome(status=OutcomeStatus.REFUSED, reason=kept.read.notes or LEFT_ALONE)
+        return Outcome(
+            status=OutcomeStatus.DONE,
+            modification=kept.read.modification,
+            notes="\n\n".join(part for part in (kept.read.notes, remark) if part),
+            is_accepted=None if kept.verdict is None else kept.verdict.is_accepted,
+        )
 
     def modify_and_review(self) -> tuple[_Round, str]:
         """Return the round that counts, and how it came to, for people; empty without a review.

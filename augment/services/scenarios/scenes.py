@@ -154,23 +154,11 @@ def add_scenario(
         InvalidModification: The reference does not fit the scene.
         Conflict: The slug is taken, or traffic is to be kept and spawned.
     """
-    base_scene = BaseScene.objects.filter(slug=scene).first()
-    if base_scene is None:
-        raise UnknownName("scene", scene, list(BaseScene.objects.values_list("slug", flat=True)))
-    if base_scene.retired_at is not None:
-        raise Conflict(f"The scene “{base_scene.slug}” is retired; offer it again first.")
-    if slug is not None:
-        check_slug(slug, what="scenario")
-    scenario = Scenario(
-        slug=slug or _free_slug(base_scene, type), base_scene=base_scene, interplan=interplan
-    )
-    if follows:
-        first = _find_followed(follows, base_scene)
-        scenario.slug = slug or _numbered_slug(f"{first.slug}-then")
-        scenario.follows, scenario.interplan = first, first.interplan
+    scenario = _new_scenario(_find_scene(scene), type, slug, follows)
+    scenario.interplan, first = interplan, scenario.follows
+    if first is not None:
+        scenario.interplan, traffic = first.interplan, _spawned_in(first)
         keep_traffic, density, goal = first.keep_traffic, first.traffic_density, first.goal
-        spawned = first.spawned
-        traffic = codec.modification_from_document(spawned).added if spawned else ()
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, reference)
     if derives:
         type, instruction = derive_intent(scenario, type, instruction)
@@ -215,12 +203,26 @@ def add_variant(
     return variant
 
 
-def _find_followed(slug: str, scene: BaseScene) -> Scenario:
-    first = scene.scenarios.filter(slug=slug).first()
+def _find_scene(slug: str) -> BaseScene:
+    row = BaseScene.objects.filter(slug=slug).first()
+    if row is None:
+        raise UnknownName("scene", slug, list(BaseScene.objects.values_list("slug", flat=True)))
+    if row.retired_at is not None:
+        raise Conflict(f"The scene “{row.slug}” is retired; offer it again first.")
+    return row
+
+
+def _new_scenario(scene: BaseScene, type: str, slug: str | None, follows: str) -> Scenario:
+    if slug is not None:
+        check_slug(slug, what="scenario")
+    if not follows:
+        return Scenario(slug=slug or _free_slug(scene, type), base_scene=scene)
+    first = scene.scenarios.filter(slug=follows).first()
     if first is None:
         known = list(scene.scenarios.values_list("slug", flat=True))
-        raise UnknownName(f"scenario of the scene “{scene.slug}”", slug, known)
-    return first
+        raise UnknownName(f"scenario of the scene “{scene.slug}”", follows, known)
+    slug = slug or _numbered_slug(f"{first.slug}-then")
+    return Scenario(slug=slug, base_scene=scene, follows=first)
 
 
 def _set_intent(scenario: Scenario, intent: object, origin: IntentOrigin) -> None:
@@ -305,11 +307,14 @@ def change_surroundings(
     if scenario.follows is not None:
         first = scenario.follows.slug
         raise Conflict(f"It follows “{first}”: its traffic and goal are that one's.")
-    traffic = None
-    if is_same_traffic and scenario.spawned is not None:
-        traffic = codec.modification_from_document(scenario.spawned).added
+    traffic = (_spawned_in(scenario) or None) if is_same_traffic else None
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, scenario.reference)
     scenario.original_image, scenario.windows = "", {}
+
+
+def _spawned_in(scenario: Scenario) -> tuple[entities.TrafficAgent, ...]:
+    spawned = scenario.spawned
+    return () if spawned is None else codec.modification_from_document(spawned).added
 
 
 def _set_surroundings(
