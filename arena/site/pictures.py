@@ -1,9 +1,12 @@
 """How a picture goes out: private, and saying nothing about its file."""
 
 from django.core.files.storage import default_storage
-from django.http import FileResponse, Http404, HttpRequest
+from django.http import FileResponse, Http404, HttpRequest, JsonResponse
+from django.http.response import HttpResponseBase
 
-from augment.services.scenarios.pictures import WIDTHS_PX, thumbnail_of
+from augment.services.scenarios.pictures import WIDTHS_PX, film_document, thumbnail_of
+
+_KEPT = "private, max-age=31536000, immutable"
 
 
 def picture_response(name: str) -> FileResponse:
@@ -19,12 +22,33 @@ def picture_response(name: str) -> FileResponse:
         raise Http404
     response = FileResponse(default_storage.open(name), content_type="image/png")
     response["Content-Disposition"] = "inline"
-    response["Cache-Control"] = "private, max-age=31536000, immutable"
+    response["Cache-Control"] = _KEPT
     return response
 
 
-def sized_picture_response(request: HttpRequest, name: str) -> FileResponse:
-    """The stored PNG of that name, or made smaller where the address says `?width=`.
+def shown_response(request: HttpRequest, name: str) -> HttpResponseBase:
+    """The stored PNG of that name; its film where the address says `?film`, and what that needs.
+
+    `?film=ground` is the picture that the film plays over.
+
+    Raises:
+        Http404: There is no such file.
+    """
+    if "film" not in request.GET:
+        return picture_response(name)
+    film = film_document(name)
+    if film is None:
+        raise Http404
+    if request.GET["film"] == "ground":
+        return picture_response(film["ground"])
+    film["ground"] = f"{request.path}?film=ground&v={film['window']}"
+    return JsonResponse(
+        film, headers={"Cache-Control": _KEPT}, json_dumps_params={"separators": (",", ":")}
+    )
+
+
+def sized_picture_response(request: HttpRequest, name: str) -> HttpResponseBase:
+    """What `shown_response` answers, or the PNG made smaller where the address says `?width=`.
 
     For pages of staff, who may know which pictures were made together.
 
@@ -33,7 +57,7 @@ def sized_picture_response(request: HttpRequest, name: str) -> FileResponse:
     """
     width = request.GET.get("width", "")
     if not width:
-        return picture_response(name)
+        return shown_response(request, name)
     if width not in map(str, WIDTHS_PX):
         raise Http404
     return picture_response(thumbnail_of(name, int(width)))

@@ -16,6 +16,7 @@ from django.utils.safestring import SafeString
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.progress import JobCounts
+from augment.services.scenarios.pictures import film_name
 
 register = template.Library()
 
@@ -50,6 +51,12 @@ class Mark:
 def mark(row: Augmentation | GenerationJob | Study) -> Mark:
     """The mark of a row with a state."""
     return _mark(row.state, row.get_state_display())
+
+
+@register.filter
+def has_film(picture: str) -> bool:
+    """Whether the picture of that name has a film."""
+    return bool(film_name(picture))
 
 
 @register.filter

@@ -62,6 +62,9 @@ class MatchupDocument(serializers.Serializer[Any]):
     unchanged = serializers.ListField(
         child=serializers.CharField(), help_text="Which of a and b show the scene as it was."
     )
+    is_filmed = serializers.BooleanField(
+        help_text="Both pictures have films: at their addresses with `?film`, as JSON."
+    )
     px_per_m = serializers.FloatField()
     ego_px = serializers.ListField(child=serializers.FloatField())
     width = serializers.IntegerField()

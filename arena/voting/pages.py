@@ -15,7 +15,7 @@ from django.views.decorators.cache import never_cache
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Study, Vote
 from arena.site.access import ADMIN, EXPERT, form_for, page_for, user_of
-from arena.site.pictures import picture_response
+from arena.site.pictures import shown_response
 from arena.studies.services.experts import answer_practice, is_due, practice_pairs, skip_practice
 from arena.voting.queries.ballots import own_votes
 from arena.voting.queries.showings import drives_of_pair, picture_shown
@@ -64,8 +64,8 @@ def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @page_for(EXPERT, ADMIN)
 @strangers_find_nothing
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
-    """One side of a matchup, by a token that says nothing."""
-    return picture_response(picture_shown(user=user_of(request), token=token))
+    """One side of a matchup or its film, by a token that says nothing."""
+    return shown_response(request, picture_shown(user=user_of(request), token=token))
 
 
 @page_for(EXPERT, ADMIN)

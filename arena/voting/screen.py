@@ -49,7 +49,9 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         return None
     switches, progress = voting_switches(expert), context["progress"]
     # Nothing tells of what the study does not have.
+    is_filmed = study.matchups.filter(left_image__contains="-film/").exists()
     has = {
+        **dict.fromkeys(("play", "back", "on", "rate"), is_filmed),
         "replay": study.allow_replay,
         "both_miss": study.allow_both_miss,
         "rings": not study.rules.get("hide_rings"),
@@ -65,6 +67,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     last = {vote.pk: vote for vote in (*context["last"], *on_them.reverse())}
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
+        "is_filmed": is_filmed,
         "alts": alts,
         "modules": MODULES,
         "legend": switches["legend"],

@@ -18,7 +18,7 @@ from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, stack_png
 from augment.render.labels import draw_badges, draw_ghosts, draw_labels, place_badges
 from augment.render.legend import draw_legend
-from augment.render.marks import draw_mark, draw_motion, draw_walks, is_small
+from augment.render.marks import draw_mark, draw_motion, draw_trails, draw_walks, is_small
 from augment.render.palette import MarkStyle
 from augment.render.road import (
     Corner,
@@ -40,6 +40,8 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane
+from augment.scene.recording import Recording
+from augment.scene.trails import trails_of
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named for reviewers, and lie over the boxes."""
@@ -52,19 +54,28 @@ _LEAST_WIDTH_M = 20.0
 _CLOSER_RATIO = 1.5
 
 
-def draw(scene: Scene, modification: Modification, camera: Camera) -> bytes:
+def draw(
+    scene: Scene, modification: Modification, camera: Camera, recording: Recording | None = None
+) -> bytes:
     """Draw the scene after a change, as the bytes of a PNG.
 
     Args:
         scene: The scene before the change.
         modification: What changes; removed agents are gone, added and moved ones are marked.
         camera: The window that all pictures of a scenario share (`camera_for`).
+        recording: What was recorded after t0: by it motions set out.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    ground, _ = _paint_scene(scene, modification, camera, ghosts=False)
+    ground, _ = _paint_scene(scene, modification, camera, recording, ghosts=False)
     return ground.png()
+
+
+def draw_empty(scene: Scene, camera: Camera) -> bytes:
+    """Draw what stays while everybody moves: road, goal, lights and scale, nobody on it."""
+    corner = scale_corner(scene, camera)
+    return _still(replace(scene, agents=()), camera, corner).png()
 
 
 def draw_for_review(scene: Scene, modification: Modification, camera: Camera) -> tuple[bytes, ...]:
@@ -118,7 +129,12 @@ def lanes_near(scene: Scene, agents: tuple[TrafficAgent, ...]) -> list[AnyLane]:
 
 
 def _paint_scene(
-    scene: Scene, modification: Modification, camera: Camera, *, ghosts: bool = True
+    scene: Scene,
+    modification: Modification,
+    camera: Camera,
+    recording: Recording | None = None,
+    *,
+    ghosts: bool = True,
 ) -> tuple[Canvas, list[Box]]:
     """Draw all of a picture but its labels; return the boxes in pixels that text keeps free of."""
     after = apply(scene, modification)
@@ -129,6 +145,7 @@ def _paint_scene(
     ground = _unchanged(rest, camera, corner).copy()
     if ghosts:
         draw_ghosts(ground, scene, modification)
+    draw_trails(ground, trails_of(scene, modification, recording))
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
     lost = [one for one in modification.changed if not ground.shows(ground.at(one.x_m, one.y_m))]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
@@ -141,12 +158,18 @@ def _paint_scene(
 @lru_cache(maxsize=4)
 def _unchanged(rest: Scene, camera: Camera, corner: Corner) -> Canvas:
     """Draw everything that a change leaves as it is; nobody draws on it, only on copies."""
+    ground = _still(rest, camera, corner)
+    traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]
+    _paint(ground, [*traffic, (rest.ego, palette.EGO_MARK)])
+    return ground
+
+
+def _still(rest: Scene, camera: Camera, corner: Corner) -> Canvas:
+    """Draw all but who is there, on a surface of its own."""
     ground = _flat(replace(rest, agents=()), camera).copy()
     draw_goal(ground, rest)
     draw_signals(ground, rest)
     draw_scale(ground, scale_box(camera, corner))
-    traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]
-    _paint(ground, [*traffic, (rest.ego, palette.EGO_MARK)])
     return ground
 
 

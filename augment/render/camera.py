@@ -20,8 +20,10 @@ from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
 from augment.render.shapes import ring_of, sides
-from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.entities import Modification, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
+from augment.scene.recording import Recording
+from augment.scene.trails import ego_spots, has_motion, trails_of
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0
@@ -46,13 +48,18 @@ LOOK = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """A window of the ego frame and its scale, the same on both axes."""
+    """A window of the ego frame and its scale, the same on both axes.
+
+    Attributes:
+        is_filmed: Whether its pictures have a film: all of a scenario, or none.
+    """
 
     x_min_m: float
     x_max_m: float
     y_min_m: float
     y_max_m: float
     px_per_m: float
+    is_filmed: bool = False
 
     @property
     def width_px(self) -> int:
@@ -73,7 +80,8 @@ class Camera:
         """Look and window in short: two pictures that share it can stand side by side."""
         edges = (self.x_min_m, self.x_max_m, self.y_min_m, self.y_max_m, self.px_per_m)
         shown = " ".join(f"{value:.6f}" for value in edges)
-        return f"{LOOK}-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
+        window = f"{LOOK}-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
+        return f"{window}-film" if self.is_filmed else window
 
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
         """Return points (N, 2) of the ego frame as pixels (N, 2), also outside the picture."""
@@ -97,9 +105,11 @@ AROUND_THE_EGO = Camera(x_min_m=-60.0, x_max_m=100.0, y_min_m=-60.0, y_max_m=60.
 """The same for every scene, and wide: on it objects are placed by hand."""
 
 
-@lru_cache(maxsize=16)
 def camera_for(
-    scene: Scene, reference: Modification | None, changes: tuple[Modification, ...] = ()
+    scene: Scene,
+    reference: Modification | None,
+    changes: tuple[Modification, ...] = (),
+    recording: Recording | None = None,
 ) -> Camera:
     """Return the window of a scenario, the same for all its contestants.
 
@@ -108,18 +118,47 @@ def camera_for(
     ego; of those on a raster of 1 m the one that shows most of the ground. Of places too far apart
     for the widest window the nearest to the ego are kept.
 
+    Where anybody has a motion, it holds as well where they and the ego come within 60 m of where
+    the ego is at t0.
+
     Args:
         scene: The scene before the change; the old places of what is moved or removed belong
             into the picture as well.
         reference: The scenario's reference, None without one.
         changes: What the scenario's contestants made of it.
+        recording: What was recorded after t0, for motions.
     """
+    moving = [one for one in (reference, *changes) if one is not None and has_motion(one)]
+    spots = [
+        spot
+        for change in moving
+        for trail in trails_of(scene, change, recording)
+        for spot in trail.spots
+    ]
+    spots += ego_spots(scene, recording) if moving else ()
+    places = [tuple(map(tuple, spot.box.corners_m.tolist())) for spot in spots]
+    camera = _camera_for(scene, reference, changes, tuple(places))
+    return replace(camera, is_filmed=True) if moving else camera
+
+
+# Private
+
+
+@lru_cache(maxsize=16)
+def _camera_for(
+    scene: Scene,
+    reference: Modification | None,
+    changes: tuple[Modification, ...],
+    passed: tuple[tuple[Point, ...], ...],
+) -> Camera:
+    """The window that holds what is changed, and of the places that are passed the near ones."""
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
     behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
     for change in changes:
         places += [one for one in _places(scene, change) if _distance_m(one) <= FOLLOWED_M]
+    places += [one for one in map(np.array, passed) if _distance_m(one) <= FOLLOWED_M]
     for place in sorted(places, key=_distance_m):
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
@@ -127,9 +166,6 @@ def camera_for(
         if _width_m(more) <= MAX_WIDTH_M:
             need = more
     return _best(need, scene)
-
-
-# Private
 
 
 def _width_m(need: FloatArray) -> float:

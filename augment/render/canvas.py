@@ -40,6 +40,7 @@ _SMALL_COLOURS = 64
 
 _INKS = palette.inks()
 _FLAT_PALETTE = [value for colour in _INKS for value in colour]
+_FIRST_OF_TRAILS = _INKS[palette.TRAIL[0]]
 
 
 class Canvas:
@@ -159,7 +160,10 @@ class Canvas:
 
     def png(self) -> bytes:
         """Return the finished picture: the same drawing gives the same bytes, and no metadata."""
-        return _packed(self._finished())
+        finished = self._finished()
+        if np.asarray(finished).max() < _FIRST_OF_TRAILS:
+            finished.putpalette(_FLAT_PALETTE[: 3 * _FIRST_OF_TRAILS])
+        return _packed(finished)
 
     def _finished(self) -> Image.Image:
         finished = self.copy()

@@ -23,6 +23,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
+from augment.scene.trails import has_motion
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
@@ -145,6 +146,8 @@ def _entries(scene: Scene, modification: Modification) -> Iterator[tuple[_Sample
         yield _walk, "to where a walk ends"
     if any(abs(agent.speed_mps) > 0.0 and agent.walk_to_m is None for agent in everyone):
         yield _motion, "way in one second"
+    if has_motion(modification):
+        yield _solid(palette.TRAIL[0]), "motion, an outline each second; dashed: not within 6 s"
     if modification.moved or modification.removed:
         yield _dashes(palette.GHOST, 5.0, 4.0), "where something was before"
     yield from _map_entries(scene)
@@ -239,6 +242,8 @@ def _agent_keys(agent: TrafficAgent) -> set[str]:
     keys = {_AGENT_KEYS[agent.type]} if agent.type in _AGENT_KEYS else set()
     if is_walking(agent):
         keys.add("walk")
+    elif agent.motion is not None:
+        keys.add("trail")
     elif not stands(agent):
         keys.add("motion")
     return keys

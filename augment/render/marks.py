@@ -17,6 +17,7 @@ from augment.render.canvas import Canvas
 from augment.render.palette import Colour, MarkStyle
 from augment.render.shapes import stripes
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.trails import Trail
 
 # The body of a person: on the smallest screen without scrolling, half as many.
 PERSON_PX = 28.0
@@ -64,6 +65,29 @@ def draw_walks(ground: Canvas, walkers: list[tuple[TrafficAgent, MarkStyle]]) ->
         _arrow_head(ground, line, style.fill, 7.0)
 
 
+def draw_trails(ground: Canvas, trails: Sequence[Trail]) -> None:
+    """Draw ways, dashed where nobody sets out soon, and outlines every second that fade."""
+    for trail in trails:
+        line = ground.px(trail.way_m)
+        if len(line) > 1 and trail.sets_out:
+            ground.stroke(line, palette.TRAIL[2], 1.5)
+        elif len(line) > 1:
+            ground.dashed(line, palette.TRAIL[0], 2.5, 9.0, 9.0)
+    spots = [(number, spot) for trail in trails for number, spot in enumerate(trail.spots)]
+    for number, spot in sorted(spots, key=lambda one: -one[0]):
+        colour = palette.TRAIL[min(number, len(palette.TRAIL) - 1)]
+        if spot.type is AgentType.PEDESTRIAN:
+            radius_px = PERSON_PX / 2.0 - 3.0
+            turns = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+            ring = np.stack([np.cos(turns), np.sin(turns)], axis=1) * radius_px
+            ground.stroke(ring + ground.at(spot.x_m, spot.y_m), colour, 2.0, closed=True)
+            continue
+        ground.stroke(ground.px(spot.box.corners_m), colour, 2.0, closed=True)
+        half_m, side_m = spot.length_m / 2.0, 0.3 * spot.width_m
+        tip = np.array([[half_m - side_m, side_m], [half_m, 0.0], [half_m - side_m, -side_m]])
+        ground.stroke(ground.px(spot.pose.to_parent(tip)), colour, 2.0)
+
+
 def draw_mark(ground: Canvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """Draw one agent where it is; nothing for one that is out of the picture."""
     box = agent.box.corners_m
@@ -78,8 +102,17 @@ def is_walking(agent: TrafficAgent) -> bool:
 
 
 def stands(agent: TrafficAgent) -> bool:
-    """Return whether no arrow shows a motion."""
-    return agent.walk_to_m is not None or abs(agent.speed_mps) < _STANDING_MPS
+    """Return whether no arrow shows a motion; a trail shows a planned one."""
+    return (
+        agent.motion is not None
+        or agent.walk_to_m is not None
+        or abs(agent.speed_mps) < _STANDING_MPS
+    )
+
+
+def is_upright(agent: TrafficAgent) -> bool:
+    """Return whether the mark stands upright in the picture, whatever the heading."""
+    return agent.type in _UPRIGHT
 
 
 def is_small(agent: TrafficAgent) -> bool:
@@ -279,3 +312,4 @@ _SMALL = frozenset(
         *(AgentType.CONSTRUCTION_SIGN, AgentType.BARRIER),
     }
 )
+_UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})

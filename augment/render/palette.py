@@ -77,7 +77,9 @@ OTHER_MARK = MarkStyle(
 
 
 def inks() -> dict[Colour, int]:
-    """Every colour of the pictures with its number in their palettes; smooth text comes last.
+    """Every colour of the pictures with its number in their palettes; smooth text comes late.
+
+    Last are those of trails, which only pictures with a trail have in theirs.
 
     The numbers go by the order of this file, so the same drawing gives the same bytes.
     """
@@ -89,7 +91,7 @@ def inks() -> dict[Colour, int]:
                     counts.setdefault(colour, len(counts))
         elif _is_colour(value):
             counts.setdefault(value, len(counts))
-    for step in TEXT_RAMP:
+    for step in (*TEXT_RAMP, *TRAIL):
         counts.setdefault(step, len(counts))
     return counts
 
@@ -107,3 +109,9 @@ TEXT_RAMP: tuple[Colour, ...] = tuple(
     for step in range(1, 8)
 )
 """From almost paper to ink."""
+
+TRAIL: tuple[Colour, ...] = (
+    *((40, 76, 200), (62, 94, 204), (84, 112, 208)),
+    *((106, 130, 213), (128, 148, 217), (150, 166, 222)),
+)
+"""Where somebody is after each second: from almost the blue of a change to almost the road."""

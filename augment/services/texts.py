@@ -69,6 +69,7 @@ _PICTURE = re.compile(rf"bev/(?:[0-9a-z-]+/)?{_DIGEST}\.png")
 _STORED = re.compile(
     rf"(?:asked|marked|references)/{_DIGEST}\.png|prompts/{_DIGEST}\.(?:png|json)"
     rf"|scenes/{_DIGEST}-[0-9a-f-]+-(?:kept|cleared|backdrop)\.png"
+    rf"|bev/[0-9a-z-]+-film/{_DIGEST}\.json|references/[0-9a-z-]+-film/{_DIGEST}\.(?:png|json)"
     rf"|previews/{_CODE}\.png|uploads/{_CODE}(?:_[A-Za-z0-9]{{7}})?"
 )
 

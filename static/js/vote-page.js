@@ -95,6 +95,7 @@ export function drawLens(lens) {
   const states = { original: lens.isFlipped, zoom: lens.isZoomed, "ruler-switch": lens.isRuling };
   for (const name of ["blink", "difference"]) states[`${name}-switch`] = lens.stands === name;
   for (const [name, isOn] of Object.entries(states)) at(name).ariaPressed = isOn;
+  body.classList.toggle("shows-still", lens.isFlipped || lens.stands !== "");
   const said = lens.isFlipped ? text("original") : lens.reading || (lens.stands && text(lens.stands));
   for (const reading of all(".reading")) reading.textContent = said;
 }

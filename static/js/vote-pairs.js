@@ -11,6 +11,10 @@ function picture(url, alt) {
   return image;
 }
 
+// null where they can't be loaded.
+const filmed = (pictures) =>
+  import("./films.js").then(({ load }) => load(pictures.map((url) => `${url}?film`))).catch(() => null);
+
 export class Pair {
   constructor(shown, alts, changed) {
     Object.assign(this, { alts, changed });
@@ -23,6 +27,8 @@ export class Pair {
     this.state = this.state ? "again" : "loading";
     this.images = [picture(shown.a, this.alts.a), picture(shown.b, this.alts.b)];
     const decoded = this.warm();
+    this.films = shown.is_filmed ? filmed([shown.a, shown.b]) : null;
+    this.films?.then((films) => { this.films = films; });
     decoded.then(() => { this.state = "ready"; }, () => { this.state = "broken"; })
       .then(() => this.changed(this));
     // The original isn't needed for a vote, so it waits for the two that are.

@@ -31,6 +31,8 @@ let paintedAt = Infinity;
 let hiddenMs = 0;
 let isLeaving = false;
 
+const bar = document.querySelector(".film-bar");
+const player = bar && new (await import("./films.js")).Player(bar);
 const pairs = new Pairs(given.alts, fetchPairs, draw);
 const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens, given.rings);
 const outbox = new Outbox(given.outbox, urls, {
@@ -95,6 +97,7 @@ function paint(pair) {
   if (isNew) {
     page.drawPair(pair.shown);
     lens.show(pair, preferences.keep_zoom);
+    roll(pair);
     form.dataset.matchup = pair.shown.matchup;
     form.elements.report_side.value = "both";
   }
@@ -107,6 +110,15 @@ function paint(pair) {
     if (isNew) [shownAt, hiddenMs] = [paintedAt, 0];
     setTimeout(afterwards);
   });
+}
+
+// The films of a pair, both at once, in the frame of its stills where they are there already.
+function roll(pair) {
+  player?.clear();
+  if (!pair.shown.is_filmed) return;
+  if (!pair.films) page.note(text("film-lost"));
+  else if (pair.films instanceof Promise) pair.films.then(() => pair === painted && roll(pair));
+  else player.show(pair.films, lens.scenes);
 }
 
 // What need not be in the same frame.
@@ -272,6 +284,10 @@ const actions = {
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
   replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
+  play: () => player?.play(),
+  back: () => player?.back(),
+  on: () => player?.on(),
+  rate: () => player?.rate(),
   blink: () => compare("blink", true),
   difference: () => compare("difference"),
   rings: () => given.rings && ask(urls.preferences, { rings: page.toggleRings() }),

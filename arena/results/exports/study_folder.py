@@ -31,6 +31,7 @@ from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
+from augment.services.scenarios.pictures import film_document, film_name
 
 File = tuple[str, bytes]
 
@@ -190,6 +191,9 @@ def _fill(study: Study, root: Path, say: Callable[[str], None]) -> None:
     folder = _Folder(root)
     counts = {label_of(rows.model): folder.write_rows(closure, rows) for rows in closure.tables()}
     say(f"rows: {sum(counts.values())} of {len(counts)} tables")
+    for name in folder.media | folder.named:
+        if (film := film_document(name)) is not None:
+            folder.media |= {film_name(name), film["ground"]}
     for name in sorted(folder.media | folder.named):
         if default_storage.exists(name):
             with default_storage.open(name) as file:

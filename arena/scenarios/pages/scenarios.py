@@ -89,7 +89,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "scenario": scenario,
         "paraphrases": scenario.paraphrases.all(),
         "has_picture": has_picture,
-        "reference_version": reference[-16:-4],
+        "reference_name": reference,
         "look": look,
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),

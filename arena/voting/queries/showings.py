@@ -12,7 +12,7 @@ from arena.models import LabelTask, Matchup, PracticePair
 from arena.people.queries import role_of
 from augment.models import Augmentation, Simulation
 from augment.services.judging.simulations import blind_drive
-from augment.services.scenarios.pictures import window_of
+from augment.services.scenarios.pictures import film_name, window_of
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -73,6 +73,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "b": reverse("matchup-image", args=[matchup.right_token]),
         "original": reverse("matchup-image", args=[original]) if original else None,
         "unchanged": _unchanged(matchup),
+        "is_filmed": bool(film_name(matchup.left_image)),
         **view_shown(matchup),
     }
     if legend := (matchup.view or {}).get(LEGEND):

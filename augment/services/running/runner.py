@@ -118,7 +118,7 @@ class Augmentations(WorkKind[Augmentation]):
             if outcome.notes:
                 columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
             held.note(**columns)  # a second try only has to draw
-            image = picture_of(scene, outcome.modification, camera_of(row.scenario))
+            image = picture_of(row.scenario, outcome.modification, camera_of(row.scenario))
             return Settlement(state=State.DONE, columns=columns | {"image": image})
         except JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))

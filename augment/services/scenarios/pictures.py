@@ -16,14 +16,22 @@ from numpy.typing import NDArray
 
 from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.render.bev import draw, draw_for_review
+from augment.render.bev import draw, draw_empty, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink, shrink_png
+from augment.render.film import film_of
 from augment.render.legend import change_keys, scene_keys
 from augment.scene import codec
-from augment.scene.entities import Modification, Scene, without_traffic
+from augment.scene.entities import Modification, without_traffic
+from augment.scene.trails import has_motion
 from augment.services.events import log_change
-from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
+from augment.services.scenarios.scenes import (
+    content_hash,
+    recording_of,
+    reference_of,
+    scene_key,
+    scene_of,
+)
 
 FOLDER = "bev"
 
@@ -49,7 +57,7 @@ def original_picture(scenario: Scenario) -> str:
     if kept and window_of(kept) == camera.key and default_storage.exists(kept):
         return kept
     scene = scene_of(scenario)
-    name = picture_of(scene, Modification(), camera)
+    name = picture_of(scenario, Modification(), camera)
     noted = {camera.key: {"image": name, "view": view_of(camera)}}
     before = camera_for(scene, reference_of(scenario))
     if window_of(kept) == before.key:  # of before windows were noted
@@ -73,7 +81,9 @@ def camera_of(scenario: Scenario) -> Camera:
     changes = tuple(
         codec.modification_from_document(document) for document in documents if document
     )
-    return camera_for(scene_of(scenario), reference_of(scenario), changes)
+    reference = reference_of(scenario)
+    recording = recording_of(scenario) if has_motion(reference, *changes) else None
+    return camera_for(scene_of(scenario), reference, changes, recording)
 
 
 def view_of(camera: Camera) -> dict[str, Any]:
@@ -87,13 +97,32 @@ def view_of(camera: Camera) -> dict[str, Any]:
     }
 
 
-def picture_of(scene: Scene, modification: Modification, camera: Camera) -> str:
-    """Draw a scene after a change and return the picture's name.
+def picture_of(scenario: Scenario, modification: Modification, camera: Camera) -> str:
+    """Draw a scenario's scene after a change, with its film, and return the picture's name.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    return store(draw(scene, modification, camera), folder=f"{FOLDER}/{camera.key}")
+    png, film = _drawn(scenario, modification, camera)
+    # Pictures that look the same may move differently.
+    name = f"{FOLDER}/{camera.key}/{hashlib.sha256(png + film).hexdigest()}.png"
+    _keep(name, png, film)
+    return name
+
+
+def film_name(picture: str) -> str:
+    """The name of the film of a picture, "" of one that has none."""
+    return f"{picture.removesuffix('.png')}.json" if "-film/" in picture else ""
+
+
+def film_document(picture: str) -> dict[str, Any] | None:
+    """The film of a picture, with the name of the picture that it plays over; None without one."""
+    name = film_name(picture)
+    if not name or not default_storage.exists(name):
+        return None
+    with default_storage.open(name) as file:
+        document: dict[str, Any] = json.load(file)
+    return document
 
 
 def shrunken_picture(name: str, widest: int) -> NDArray[np.uint8] | None:
@@ -137,8 +166,8 @@ def redraw(scenario: Scenario) -> int:
     redrawn = 0
     # Another worker may store a change that widens the window while this one draws.
     while outdated := _list_outdated(scenario):
-        scene, camera = scene_of(scenario), camera_of(scenario)
-        drawn = [(row, picture_of(scene, _shown(row), camera)) for row in outdated]
+        camera = camera_of(scenario)
+        drawn = [(row, picture_of(scenario, _shown(row), camera)) for row in outdated]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
             original_picture(scenario)
@@ -164,6 +193,26 @@ def draw_with_ids(row: Augmentation) -> bytes:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _drawn(scenario: Scenario, modification: Modification, camera: Camera) -> tuple[bytes, bytes]:
+    """A picture and its film, which names the picture that it plays over; no bytes for none."""
+    scene = scene_of(scenario)
+    if not camera.is_filmed:
+        return draw(scene, modification, camera), b""
+    recording = recording_of(scenario)
+    film = film_of(scene, modification, camera, recording, keeps_traffic=scenario.keep_traffic)
+    ground = store(draw_empty(scene, camera), folder=f"{FOLDER}/{camera.key}")
+    document = {"ground": ground} | json.loads(film)
+    return draw(scene, modification, camera, recording), json.dumps(
+        document, separators=(",", ":")
+    ).encode()
+
+
+def _keep(picture: str, png: bytes, film: bytes) -> None:
+    if film:
+        store_as(film_name(picture), film)
+    store_as(picture, png)
 
 
 def _list_outdated(scenario: Scenario) -> list[Augmentation]:
@@ -203,7 +252,8 @@ def reference_picture(scenario: Scenario) -> str:
         return ""
     shown = [LOOK, scene_key(scenario), scenario.reference]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-    return f"references/{digest}.png"
+    folder = f"references/{LOOK}-film" if has_motion(reference_of(scenario)) else "references"
+    return f"{folder}/{digest}.png"
 
 
 def is_drawn(name: str) -> bool:
@@ -242,8 +292,9 @@ def draw_scenario(scenario_pk: int) -> None:
     name, reference = reference_picture(row), reference_of(row)
     if reference is None or is_drawn(name):
         return
-    scene = scene_of(row)
-    store_as(name, draw(scene, reference, camera_for(scene, reference)))
+    recording = recording_of(row) if has_motion(reference) else None
+    camera = camera_for(scene_of(row), reference, recording=recording)
+    _keep(name, *_drawn(row, reference, camera))
 
 
 THUMBNAILS = "thumbnails"
@@ -325,7 +376,7 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
         document = codec.modification_to_document(change)
         checks = row.augmentations.filter(contestant__kind=Contestant.Kind.CHECK, state=State.DONE)
         if not checks.filter(modification=document).exists():
-            image = picture_of(scene_of(row), change, camera_of(row))
+            image = picture_of(row, change, camera_of(row))
             drawn.append(Augmentation(scenario=row, modification=document, image=image))
     kept = _keep_checks(drawn, actor) if drawn else []
     for made in kept:

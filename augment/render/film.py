@@ -1,0 +1,152 @@
+"""The moving picture of a scene, as data: marks as the still draws them, and where they are when.
+
+In: what `bev.draw` takes. Out: the bytes of a JSON document that a browser plays over the picture
+without anybody (`bev.draw_empty`). No id and no text is in it; its bytes depend on the scene, the
+change, the camera and the recording alone.
+
+A document: `window`, which films over one ground share; `step_s`, `steps`; `width`, `height` in
+picture pixels; `marks`, each a list of shapes {fill or stroke, points or disc, width} in tenths of
+a pixel about the middle of who faces right (x right, y down); `movers` in the order of painting,
+each [mark, first step, last step, values]: x and y in tenths of a pixel and the turn in degrees,
+clockwise, at the first step, then, of who moves, what is added at each.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from augment.geometry.polyline import FloatArray
+from augment.render import palette
+from augment.render.camera import Camera
+from augment.render.canvas import Canvas, Spot
+from augment.render.marks import draw_mark, is_small, is_upright
+from augment.render.palette import Colour, MarkStyle
+from augment.render.shapes import runs
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.motion import STEP_S, Movement, motion_of
+from augment.scene.recording import Recording
+from augment.scene.trails import SHOWN_S
+
+STEPS = round(SHOWN_S / STEP_S) + 1
+_FINE = 10.0
+"""Parts of a pixel."""
+_MARGIN_M = 3.0
+
+Entry = list[Any]
+
+
+def film_of(
+    scene: Scene,
+    modification: Modification,
+    camera: Camera,
+    recording: Recording | None = None,
+    *,
+    keeps_traffic: bool = False,
+) -> bytes:
+    """Return the film of a scene after a change, from t0 on.
+
+    Args:
+        scene: The scene before the change.
+        modification: What changes.
+        camera: The window.
+        recording: What was recorded after t0; the ego drives as it did, and reacts to nobody.
+        keeps_traffic: Whether who was recorded later comes into the picture.
+
+    Raises:
+        InvalidModification: The change does not fit the scene.
+    """
+    replaced = frozenset([*(one.id for one in modification.moved), *modification.removed])
+    motion = motion_of(
+        apply(scene, modification),
+        recording=recording,
+        replaced=replaced,
+        with_later=keeps_traffic,
+    )
+    changed = {agent.id for agent in modification.changed}
+    styled = [(motion.ego, palette.EGO_MARK)]
+    styled += [
+        (one, palette.CHANGED_MARK if one.agent.id in changed else palette.OTHER_MARK)
+        for one in motion.others
+    ]
+    movers: list[tuple[tuple[Any, ...], Entry]] = []
+    for movement, style in styled:
+        for first, last, values in _stretches(movement, camera):
+            mark = json.dumps(_shapes(movement.agent, style, camera.px_per_m))
+            movers.append((_order(movement.agent, style), [mark, first, last, values]))
+    # By what they look like and where they are: their order tells nothing of their ids.
+    movers.sort(key=lambda one: (*one[0], one[1]))
+    marks = sorted({entry[0] for _, entry in movers})
+    document = {
+        "window": camera.key,
+        "step_s": STEP_S,
+        "steps": STEPS,
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "marks": [json.loads(mark) for mark in marks],
+        "movers": [[marks.index(entry[0]), *entry[1:]] for _, entry in movers],
+    }
+    return json.dumps(document, separators=(",", ":")).encode()
+
+
+# Private
+
+
+class _Sketch(Canvas):
+    """Notes the shapes of a mark instead of drawing them."""
+
+    def __init__(self, px_per_m: float) -> None:
+        self.camera = Camera(x_min_m=0.0, x_max_m=0.0, y_min_m=0.0, y_max_m=0.0, px_per_m=px_per_m)
+        self.shapes: list[dict[str, Any]] = []
+
+    def fill(self, points: FloatArray, colour: Colour) -> None:
+        self.shapes.append({"fill": _hex(colour), "points": _flat(points)})
+
+    def disc(self, centre: Spot, radius: float, colour: Colour) -> None:
+        self.shapes.append({"fill": _hex(colour), "disc": _flat([[*centre, radius]])})
+
+    def stroke(
+        self, points: FloatArray, colour: Colour, width: float, *, closed: bool = False
+    ) -> None:
+        self.shapes.append({"stroke": _hex(colour), "points": _flat(points), "width": width})
+
+
+def _shapes(agent: TrafficAgent, style: MarkStyle, px_per_m: float) -> list[dict[str, Any]]:
+    sketch = _Sketch(px_per_m)
+    draw_mark(sketch, replace(agent, x_m=0.0, y_m=0.0, heading_rad=0.0), style)
+    return sketch.shapes
+
+
+def _flat(values: Any) -> list[int]:
+    return [int(value) for value in np.round(np.asarray(values) * _FINE).ravel().tolist()]
+
+
+def _hex(colour: Colour) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def _stretches(movement: Movement, camera: Camera) -> Iterator[tuple[int, int, list[int]]]:
+    """First and last step and values of each stretch in which one is there; seen ones alone."""
+    agent, states = movement.agent, movement.states[:STEPS]
+    reach_m = agent.length_m / 2.0 + _MARGIN_M
+    for first, last in runs(movement.is_present[:STEPS]):
+        part = states[first : last + 1]
+        if not camera.shows(part[:, :2], margin_m=reach_m):
+            continue
+        # A film that goes on after a recording ends keeps its last moment.
+        end = STEPS - 1 if last == len(states) - 1 else last
+        pixels = camera.to_pixels(part[:, :2]) * _FINE
+        turns = np.zeros(len(part)) if is_upright(agent) else -np.degrees(np.unwrap(part[:, 2]))
+        rows = np.round(np.column_stack([pixels, turns])).astype(int)
+        steps = np.diff(rows, axis=0)
+        moves = rows[:1] if not steps.any() else np.vstack([rows[:1], steps])
+        yield first, end, moves.ravel().tolist()
+
+
+def _order(agent: TrafficAgent, style: MarkStyle) -> tuple[Any, ...]:
+    """As the still paints: what is changed above, people above vehicles, the small over large."""
+    is_ego = agent.type is AgentType.EGO_VEHICLE
+    is_changed = style is palette.CHANGED_MARK
+    return is_changed, is_small(agent), is_ego, -agent.length_m * agent.width_m

@@ -1,0 +1,126 @@
+"""Where those with a planned motion come along: what stills show of it, and what windows hold.
+
+Frame: ego frame of t0. P points.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from augment.scene.entities import Modification, Scene, TrafficAgent, apply
+from augment.scene.motion import STEP_S, FloatArray, motion_of
+from augment.scene.planned_motion import AtPlace, AtTime
+from augment.scene.recording import Recording
+
+SHOWN_S = 6.0
+"""So much of a motion is shown: in a still since it set out, in a film since t0."""
+EVERY_S = 1.0
+_LEAST_M = 0.3
+
+_STEPS, _EVERY = round(SHOWN_S / STEP_S), round(EVERY_S / STEP_S)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trail:
+    """One changed agent with a motion.
+
+    Attributes:
+        way_m: (P, 2) centres from t0 to `SHOWN_S` after it set out; of one that does not set out
+            within that time, where it would go if it did so at once.
+        spots: The agent every second since it set out, but where it has hardly moved.
+        sets_out: Whether it does within `SHOWN_S`; without, there are no spots.
+    """
+
+    agent: TrafficAgent
+    way_m: FloatArray
+    spots: tuple[TrafficAgent, ...]
+    sets_out: bool
+
+
+def has_motion(*modifications: Modification | None) -> bool:
+    """Return whether somebody in them has a motion of their own."""
+    changes = [one for one in modifications if one is not None]
+    return any(agent.motion is not None for one in changes for agent in one.changed)
+
+
+def trails_of(
+    scene: Scene, modification: Modification, recording: Recording | None = None
+) -> tuple[Trail, ...]:
+    """Return the trail of every changed agent with a motion, in the order of the modification.
+
+    Args:
+        scene: Before the change.
+        modification: What changes.
+        recording: What was recorded after t0; triggers fire by it as they do in `motion_of`.
+
+    Raises:
+        InvalidModification: The change does not fit the scene, or a path its lanes.
+    """
+    if not has_motion(modification):
+        return ()
+    after = apply(scene, modification)
+    replaced = frozenset([*(one.id for one in modification.moved), *modification.removed])
+    motion = motion_of(_concerned(after), recording=recording, replaced=replaced)
+    started = {one.agent.id: _trail_since(one.started_s, one.states) for one in motion.others}
+    waiting = {name for name, found in started.items() if found is None}
+    at_once = replace(
+        after,
+        agents=tuple(
+            replace(one, motion=replace(one.motion, start=AtTime()))
+            for one in after.agents
+            if one.motion is not None and one.id in waiting
+        ),
+    )
+    would = {one.agent.id: one.states[: _STEPS + 1, :2] for one in motion_of(at_once).others}
+    trails = []
+    for agent in modification.changed:
+        if agent.motion is None:
+            continue
+        states = started[agent.id]
+        if states is None:
+            way_m = would[agent.id]
+            trails.append(Trail(agent=agent, way_m=_there(way_m), spots=(), sets_out=False))
+        else:
+            way_m, spots_at = states
+            spots = _spots(agent, spots_at)
+            trails.append(Trail(agent=agent, way_m=_there(way_m), spots=spots, sets_out=True))
+    return tuple(trails)
+
+
+def ego_spots(scene: Scene, recording: Recording | None = None) -> tuple[TrafficAgent, ...]:
+    """Return the ego every second of a film, as recorded or at its speed."""
+    motion = motion_of(replace(scene, agents=()), recording=recording)
+    return _spots(scene.ego, motion.ego.states[: _STEPS + 1 : _EVERY])
+
+
+# Private
+
+
+def _concerned(after: Scene) -> Scene:
+    """Only who has a motion and for whom somebody waits: the others change nothing about them."""
+    motions = [(one.id, one.motion) for one in after.agents if one.motion is not None]
+    names = {name for name, _ in motions}
+    names |= {one.start.agent_id for _, one in motions if isinstance(one.start, AtPlace)}
+    return replace(after, agents=tuple(one for one in after.agents if one.id in names))
+
+
+def _trail_since(
+    started_s: float | None, states: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """The way (P, 2) and the states (K, 4) every second, None where it sets out too late."""
+    if started_s is None or started_s > SHOWN_S:
+        return None
+    start = round(started_s / STEP_S)
+    return states[: start + _STEPS + 1, :2], states[start : start + _STEPS + 1 : _EVERY]
+
+
+def _there(points_m: FloatArray) -> FloatArray:
+    return points_m[~np.isnan(points_m).any(axis=1)]
+
+
+def _spots(agent: TrafficAgent, states: FloatArray) -> tuple[TrafficAgent, ...]:
+    spots = [agent]
+    for x_m, y_m, heading_rad, _ in states[~np.isnan(states).any(axis=1)].tolist():
+        if np.hypot(x_m - spots[-1].x_m, y_m - spots[-1].y_m) >= _LEAST_M:
+            spots.append(replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad))
+    return tuple(spots[1:])

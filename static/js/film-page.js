@@ -1,0 +1,26 @@
+// Films on pages without a vote: each group of pictures has a bar, and loads when it is first played.
+import { load, Player } from "./films.js";
+
+for (const group of document.querySelectorAll("[data-films]")) {
+  const bar = group.querySelector(".film-bar");
+  const images = [...group.querySelectorAll("img[data-film]")];
+  if (!bar || !images.length) continue;
+  const frames = images.map((image) => {
+    const frame = Object.assign(document.createElement("span"), { className: "reel-frame" });
+    image.replaceWith(frame);
+    frame.append(image);
+    return frame;
+  });
+  const player = new Player(bar);
+  const begin = async (plays) => {
+    for (const name of ["click", "input"]) bar.removeEventListener(name, first, true);
+    player.show(await load(images.map((image) => image.dataset.film)), frames, plays);
+  };
+  const first = (event) => {
+    event.stopPropagation();
+    begin(event.type === "click");
+  };
+  bar.hidden = false;
+  if (group.dataset.films === "auto") begin();
+  else for (const name of ["click", "input"]) bar.addEventListener(name, first, true);
+}
