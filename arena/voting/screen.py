@@ -28,7 +28,8 @@ LONGEST = 3
 """How many instructions: which of them takes most lines depends on words and fonts."""
 
 MODULES = tuple(
-    f"js/vote-{name}.js" for name in ("outbox", "pace", "page", "pairs", "lens", "keys", "tabs")
+    f"js/vote-{name}.js"
+    for name in ("outbox", "pace", "page", "pairs", "lens", "keys", "tabs", "film")
 )
 """What vote.js imports, named in the page so that all of it loads at once."""
 
@@ -48,14 +49,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     if not pairs and changed is None:
         return None
     switches, progress = voting_switches(expert), context["progress"]
-    # Nothing tells of what the study does not have.
-    is_filmed = study.matchups.filter(left_image__contains="-film/").exists()
-    has = {
-        **dict.fromkeys(("play", "back", "on", "rate"), is_filmed),
-        "replay": study.allow_replay,
-        "both_miss": study.allow_both_miss,
-        "rings": not study.rules.get("hide_rings"),
-    }
+    has = _has(study)
     keys = {name: keys for name, keys in KEYS.items() if has.get(name, True)}
     alts = {
         "a": _("Image A, edited scene"),
@@ -67,7 +61,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     last = {vote.pk: vote for vote in (*context["last"], *on_them.reverse())}
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
-        "is_filmed": is_filmed,
+        "is_filmed": has["play"],
         "alts": alts,
         "modules": MODULES,
         "legend": switches["legend"],
@@ -107,6 +101,17 @@ def over_context(study: Study, expert: User) -> dict[str, Any]:
         "progress": voting_progress(study=study, expert=expert),
         "last": list(own_votes(study, expert).reverse()[:undoable]) if is_open else [],
         "enrolled": enrolled_voters(study).filter(expert=expert).first(),
+    }
+
+
+def _has(study: Study) -> dict[str, bool]:
+    """Which of the keys there are that not every study has: nothing tells of the others."""
+    is_filmed = study.matchups.filter(left_image__contains="-film/").exists()
+    return {
+        **dict.fromkeys(("play", "back", "on", "rate"), is_filmed),
+        "replay": study.allow_replay,
+        "both_miss": study.allow_both_miss,
+        "rings": not study.rules.get("hide_rings"),
     }
 
 

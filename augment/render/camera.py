@@ -156,9 +156,9 @@ def _camera_for(
     behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
-    for change in changes:
-        places += [one for one in _places(scene, change) if _distance_m(one) <= FOLLOWED_M]
-    places += [one for one in map(np.array, passed) if _distance_m(one) <= FOLLOWED_M]
+    followed = [place for change in changes for place in _places(scene, change)]
+    followed += map(np.array, passed)
+    places += [one for one in followed if _distance_m(one) <= FOLLOWED_M]
     for place in sorted(places, key=_distance_m):
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))

@@ -1,7 +1,8 @@
 // Films of pictures that stand side by side, on one clock: data that is drawn over the picture of
-// the empty scene, as the still was. At 0 s, not playing, the stills themselves are seen.
+// the empty scene, as the still was. After each round, and at 0 s where nothing plays, the stills
+// themselves are seen.
 const RATES = [1, 0.5, 0.25, 2];
-const REST_STEPS = 5;
+const [END_STEPS, STILL_STEPS] = [5, 15];
 const KEPT = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -137,13 +138,15 @@ export class Player {
   #tick(now) {
     if (!this.isPlaying) return;
     const gone = this.#from + (Math.max(0, now - this.begun) * RATES[this.#rate]) / (1000 * this.films[0].step_s);
-    this.step = Math.min(gone % (this.last + REST_STEPS), this.last);
-    this.#paint();
+    const at = gone % (this.last + END_STEPS + STILL_STEPS);
+    const rests = at > this.last + END_STEPS;
+    this.step = rests ? 0 : Math.min(at, this.last);
+    this.#paint(rests);
     requestAnimationFrame((later) => this.#tick(later));
   }
 
-  #paint() {
-    const isStill = !this.isPlaying && this.step === 0;
+  #paint(rests = !this.isPlaying) {
+    const isStill = rests && this.step === 0;
     this.canvases.forEach((canvas, place) => {
       canvas.hidden = isStill;
       if (!isStill) draw(canvas, this.films[place], this.step);

@@ -1,6 +1,7 @@
 // The voting loop: pairs are decoded ahead; a vote is written down in the browser, the next pair
 // is painted, and the vote goes out in the background. A pair stays until its last question is
 // answered.
+import { filmActions, roll } from "./vote-film.js";
 import { actionOf } from "./vote-keys.js";
 import { Lens } from "./vote-lens.js";
 import { ask, Outbox } from "./vote-outbox.js";
@@ -31,8 +32,6 @@ let paintedAt = Infinity;
 let hiddenMs = 0;
 let isLeaving = false;
 
-const bar = document.querySelector(".film-bar");
-const player = bar && new (await import("./films.js")).Player(bar);
 const pairs = new Pairs(given.alts, fetchPairs, draw);
 const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens, given.rings);
 const outbox = new Outbox(given.outbox, urls, {
@@ -97,7 +96,7 @@ function paint(pair) {
   if (isNew) {
     page.drawPair(pair.shown);
     lens.show(pair, preferences.keep_zoom);
-    roll(pair);
+    roll(pair, lens.scenes, () => pair === painted);
     form.dataset.matchup = pair.shown.matchup;
     form.elements.report_side.value = "both";
   }
@@ -110,15 +109,6 @@ function paint(pair) {
     if (isNew) [shownAt, hiddenMs] = [paintedAt, 0];
     setTimeout(afterwards);
   });
-}
-
-// The films of a pair, both at once, in the frame of its stills where they are there already.
-function roll(pair) {
-  player?.clear();
-  if (!pair.shown.is_filmed) return;
-  if (!pair.films) page.note(text("film-lost"));
-  else if (pair.films instanceof Promise) pair.films.then(() => pair === painted && roll(pair));
-  else player.show(pair.films, lens.scenes);
 }
 
 // What need not be in the same frame.
@@ -272,10 +262,7 @@ const actions = {
   b_clearly: () => given.ask_strength && prefer("B", "clearly"),
   both_miss: () => given.allow_both_miss && page.maybeNeither(question()) && decide("E", { both_miss: true }),
   undo: () => undo(),
-  skip: () => page.showPop("skip"),
-  report: () => page.showPop("report"),
-  comment: () => page.showPop("comment"),
-  tools: () => page.showPop("tools"),
+  ...Object.fromEntries(["skip", "report", "comment", "tools"].map((name) => [name, () => page.showPop(name)])),
   rest,
   leave,
   original: () => lens.flip(true),
@@ -284,10 +271,7 @@ const actions = {
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
   replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
-  play: () => player?.play(),
-  back: () => player?.back(),
-  on: () => player?.on(),
-  rate: () => player?.rate(),
+  ...filmActions,
   blink: () => compare("blink", true),
   difference: () => compare("difference"),
   rings: () => given.rings && ask(urls.preferences, { rings: page.toggleRings() }),

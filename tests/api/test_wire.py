@@ -32,6 +32,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
             "b": f"/i/{matchup.right_token}",
             "original": f"/i/{matchup.original_token}",
             "unchanged": ["a"],
+            "is_filmed": False,
             **VIEW_OF_OLD,
             "legend": ["ego", "grid", "motion", "other", "own", "walkway"],
         }

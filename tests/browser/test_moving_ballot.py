@@ -1,14 +1,13 @@
 """Pairs that move are voted on by keys alone: both sides in step, within a few hundred kB."""
 
 from collections.abc import Iterator
-from statistics import median
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 from pytest_django.live_server_helper import LiveServer
 
-from tests.browser.booth import Booth, all_sent, let_bounce, press, ready
+from tests.browser.booth import Booth, press, ready
 from tests.moving import a_moving_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]

@@ -1,0 +1,16 @@
+// The films of the pair on the page, in studies that have some.
+import { note, text } from "./vote-page.js";
+
+const bar = document.querySelector(".film-bar");
+const player = bar && new (await import("./films.js")).Player(bar);
+
+export const filmActions = Object.fromEntries(["play", "back", "on", "rate"].map((name) => [name, () => player[name]()]));
+
+// Both at once, in the frame of their stills where they are there already.
+export function roll(pair, frames, isShown) {
+  player?.clear();
+  if (!player || !pair.shown.is_filmed) return;
+  if (!pair.films) note(text("film-lost"));
+  else if (pair.films instanceof Promise) pair.films.then(() => isShown() && roll(pair, frames, isShown));
+  else player.show(pair.films, frames);
+}

@@ -1,0 +1,133 @@
+"""What moves: in stills as trails, in films as data that tell nothing of who made them."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import ImageColor
+
+from augment.geometry.frames import wrap
+from augment.render import palette
+from augment.render.bev import draw
+from augment.render.camera import camera_for
+from augment.render.film import STEPS, film_of
+from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.motion import motion_of
+from augment.scene.planned_motion import AtTime, NearEgo, PlannedMotion
+from augment.scene.trails import ego_spots, trails_of
+from tests.moving import cutting_in
+from tests.render.pictures import opened
+from tests.scenes import cone, pedestrian, scene, vehicle
+
+STREET = scene(agents=(vehicle("Agent2", 20.0, -3.0), pedestrian("Agent3", 25.0, 5.0)))
+
+
+def film(change: Modification, base: Scene = STREET) -> dict[str, object]:
+    document: dict[str, object] = json.loads(film_of(base, change, camera_for(base, change)))
+    return document
+
+
+def braking(start: AtTime | NearEgo) -> TrafficAgent:
+    """A car that drives 10 m/s and stands 2 s after its start: 10 m later."""
+    motion = PlannedMotion(speeds=((2.0, 0.0),), start=start)
+    return replace(vehicle("New1", 20.0, 0.0), speed_mps=10.0, lane_id="Lane1", motion=motion)
+
+
+@pytest.mark.parametrize(
+    ("start", "places_m"),
+    [
+        (AtTime(), [27.5, 30.0]),  # 20 + 10 t - 2.5 t^2
+        (AtTime(after_s=1.0), [30.0, 37.5, 40.0]),  # where it sets out, and on
+        (AtTime(after_s=6.0), [80.0, 87.5, 90.0]),
+        (AtTime(after_s=6.1), []),
+        (NearEgo(within_m=5.0), []),
+    ],
+)
+def test_a_trail_has_a_spot_each_second_since_it_sets_out(
+    start: AtTime | NearEgo, places_m: list[float]
+) -> None:
+    (trail,) = trails_of(STREET, Modification(added=(braking(start),)))
+    assert trail.sets_out == bool(places_m)
+    assert [spot.x_m for spot in trail.spots] == pytest.approx(places_m)
+    # Of one that does not set out, the way that it would take is told from where it is.
+    assert trail.way_m[-1, 0] == pytest.approx(places_m[-1] if places_m else 30.0)
+
+
+def test_who_has_no_motion_leaves_no_trail_and_the_ego_is_followed_for_six_seconds() -> None:
+    assert trails_of(STREET, Modification(added=(cone("New1", 9.0, 0.0),))) == ()
+    assert [spot.x_m for spot in ego_spots(STREET)] == pytest.approx(
+        [8.0 * n for n in range(1, 7)]
+    )
+
+
+def test_the_window_holds_the_way_near_the_ego_and_has_films() -> None:
+    change = Modification(added=(cutting_in(0.5),))
+    camera = camera_for(STREET, None, (change,))
+    for spot in (*ego_spots(STREET), *trails_of(STREET, change)[0].spots):
+        if np.hypot(*spot.box.corners_m.T).max() <= 60.0:
+            assert camera.x_min_m <= spot.x_m <= camera.x_max_m
+            assert camera.y_min_m <= spot.y_m <= camera.y_max_m
+    standing = replace(camera, is_filmed=False)
+    assert camera.key == f"{standing.key}-film"
+
+
+def test_a_picture_shows_a_trail_and_one_without_has_the_palette_that_it_had() -> None:
+    moving = Modification(added=(cutting_in(0.5),))
+    camera = camera_for(STREET, moving)
+    colours = {
+        change: {
+            colour for _, colour in opened(draw(STREET, change, camera)).convert("RGB").getcolors()
+        }
+        for change in (moving, Modification())
+    }
+    assert set(palette.TRAIL) <= colours[moving]
+    assert not set(palette.TRAIL) & colours[Modification()]
+    png = draw(STREET, Modification(), camera)
+    entry = png.index(b"PLTE")
+    assert int.from_bytes(png[entry - 4 : entry]) == 3 * palette.inks()[palette.TRAIL[0]]
+
+
+def test_a_film_names_nobody_and_is_the_same_whatever_they_are_called() -> None:
+    cars = (cutting_in(0.5), vehicle("New2", 40.0, 0.0), cone("New3", 30.0, 2.0))
+    change = Modification(added=cars)
+    camera = camera_for(STREET, change)
+    other = Modification(
+        added=tuple(replace(one, id=f"X{9 - n}") for n, one in enumerate(cars))[::-1]
+    )
+    renamed = scene(agents=tuple(replace(one, id=f"R{one.id}") for one in STREET.agents))
+    shown = film_of(STREET, change, camera)
+    assert film_of(renamed, other, camera) == shown
+    assert not any(name in shown.decode() for name in ("New", "Agent", "Lane"))
+    assert len(shown) < 5_000
+
+
+def test_a_film_says_where_everybody_is_when() -> None:
+    car = cutting_in(0.5)
+    change = Modification(added=(car,))
+    camera = camera_for(STREET, change)
+    document = json.loads(film_of(STREET, change, camera))
+    assert (document["steps"], document["step_s"]) == (STEPS, 0.1) == (61, 0.1)
+    mark, first, last, values = document["movers"][-1]  # what is changed is painted last
+    assert palette.CHANGED_MARK.fill in {
+        ImageColor.getrgb(shape["fill"]) for shape in document["marks"][mark]
+    }
+    assert (first, last) == (0, 60)
+    poses = np.array(values, dtype=float).reshape(-1, 3).cumsum(axis=0)
+    motion = motion_of(replace(STREET, agents=(car,))).others[0].states[:STEPS]
+    assert poses[:, :2] / 10.0 == pytest.approx(camera.to_pixels(motion[:, :2]), abs=0.051)
+    turns = [
+        wrap(-math.radians(turn) - heading)
+        for turn, heading in zip(poses[:, 2], motion[:, 2], strict=True)
+    ]
+    assert np.abs(turns).max() <= math.radians(0.51)
+
+
+def test_who_stands_is_one_pose_and_who_is_never_in_the_window_is_left_out() -> None:
+    far = vehicle("Far", 900.0, 0.0)
+    document = film(Modification(added=(cutting_in(0.5), far)))
+    movers = document["movers"]
+    assert isinstance(movers, list)
+    # The parked car, the person, the ego and the car that cuts in.
+    assert sorted(len(values) for *_, values in movers) == [3, 3, 3 * STEPS, 3 * STEPS]
