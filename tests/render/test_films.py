@@ -29,6 +29,11 @@ def film(change: Modification, base: Scene = STREET) -> dict[str, object]:
     return document
 
 
+def pixels_of(png: bytes) -> np.ndarray:
+    """The colours of a picture, (N, 3)."""
+    return np.unique(np.asarray(opened(png).convert("RGB")).reshape(-1, 3), axis=0)
+
+
 def braking(start: AtTime | NearEgo) -> TrafficAgent:
     """A car that drives 10 m/s and stands 2 s after its start: 10 m later."""
     motion = PlannedMotion(speeds=((2.0, 0.0),), start=start)
@@ -77,9 +82,7 @@ def test_a_picture_shows_a_trail_and_one_without_has_the_palette_that_it_had() -
     moving = Modification(added=(cutting_in(0.5),))
     camera = camera_for(STREET, moving)
     colours = {
-        change: {
-            colour for _, colour in opened(draw(STREET, change, camera)).convert("RGB").getcolors()
-        }
+        change: {tuple(one) for one in pixels_of(draw(STREET, change, camera)).tolist()}
         for change in (moving, Modification())
     }
     assert set(palette.TRAIL) <= colours[moving]
