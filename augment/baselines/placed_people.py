@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from augment.baselines.placed_motions import give_motion
 from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
@@ -47,7 +48,11 @@ def place_walkers(
             behind_m, along_m = along_m, 0.0
             if 0 < index <= len(request.behind):
                 behind_m = request.behind[index - 1].drawn(rng)
-        added.append(_walker(request, ground, distance_m + along_m, behind_m))
+        walker = _walker(request, ground, distance_m + along_m, behind_m)
+        wish = request.motion
+        if wish is not None:
+            walker = give_motion(wish, ground, walker, rng)
+        added.append(walker)
     return tuple(added)
 
 

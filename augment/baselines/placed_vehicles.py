@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from augment.baselines.placed_motions import find_arm, give_motion, is_on_other_arm
 from augment.baselines.placing_ground import PlacingGround, build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Box, Pose, overlap, wrap
@@ -77,7 +78,13 @@ def place_vehicles(
     Raises:
         CannotPlace: There is no such lane or side, or the offset leaves the lane.
     """
-    lane, body = request.spot.lane, request.body
+    lane, body, wish = request.spot.lane, request.body, request.motion
+    if is_on_other_arm(wish):
+        assert wish is not None
+        speed_mps = request.speed_mps or 0.0
+        pose, lane_id = find_arm(ground, wish.side, speed_mps, nearer_m=distance_m)
+        one = build_agent(_type_of(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
+        return (give_motion(wish, ground, one, rng),)
     apart_m = _size_m(body)[0] + BUMPER_GAP_M
     if request.spacing is not None:
         apart_m = request.spacing.drawn(rng)
@@ -95,7 +102,7 @@ def place_vehicles(
             _size_m(body),
             speed_mps=request.speed_mps or 0.0,
         )
-        added.append(agent)
+        added.append(agent if wish is None else give_motion(wish, ground, agent, rng))
     return tuple(added)
 
 

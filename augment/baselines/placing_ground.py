@@ -66,7 +66,7 @@ class PlacingGround:
         lanes = LanesAcross.of(ground, turn)
         if lanes is None:
             raise CannotPlace("The ego stands on no lane of the map.")
-        self._lanes, self.route, self.graph = lanes, lanes.route, ground.graph
+        self.lanes, self.route, self.graph = lanes, lanes.route, ground.graph
         self.side_sign = lanes.side_sign
         self.kerb = Side(scene.traffic_side.value)
         self._drivable, self._walkways = (
@@ -98,7 +98,7 @@ class PlacingGround:
         place = self.along(distance_m)
         if lane in (None, LaneChoice.OWN):
             return place
-        band = self._lanes.band(lane, distance_m)
+        band = self.lanes.band(lane, distance_m)
         if band is None:
             words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
             raise CannotPlace(f"The map has no {words} beside the ego's lane there.")

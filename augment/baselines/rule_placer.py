@@ -8,10 +8,12 @@ refused. So is an intent that leaves open what a placement needs.
 """
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from augment.baselines.placed_motions import give_motion, is_on_other_arm
 from augment.baselines.placed_people import place_cones, place_walkers
 from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
@@ -20,11 +22,12 @@ from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, r
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
-from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType, apply
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent import (
     Body,
     ConesRequest,
     CrashRequest,
+    DoorRequest,
     Intent,
     Length,
     Move,
@@ -33,6 +36,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+from augment.scene.intent_parts import MotionWish
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
@@ -87,13 +91,16 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
         agent = find_picked(lanes, move.who)[0]
         others = tuple(one for one in apply(scene, changes).agents if one.id != agent.id)
         fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
-        moved, sentence = fitting.fit(_as_request(move, agent))
+        moved, sentence = fitting.fit(_as_request(move, agent), agent if move.stays else None)
         same = {name: getattr(agent, name) for name in ("id", "type", "length_m", "width_m")}
         changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
         sentences.append(f"{agent.id} is moved. {sentence}")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
-    for added in resolved.requests:
-        agents, sentence = fitting.fit(added)
+    named: dict[str, _Agents] = {}
+    for asked, added in zip(intent.requests, resolved.requests, strict=True):
+        car = _car_of(asked, lanes, named) if isinstance(asked, DoorRequest) else None
+        agents, sentence = fitting.fit(added, car)
+        named[asked.name] = agents
         fitting.added += agents
         sentences.append(sentence)
     if intent.beyond:
@@ -104,16 +111,19 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
 
 def list_open(request: Request) -> list[str]:
     """Return what a request leaves open without which nothing can be placed, a sentence each."""
+    if isinstance(request, DoorRequest):
+        return []
     who, field, what = _NEEDS[type(request)]
+    comes = isinstance(request, VehicleRequest) and is_on_other_arm(request.motion)
     needs = {
-        "the distance": request.spot.distance,
+        "the distance": request.spot.distance or comes,
         what: getattr(request, field),
         "the count": request.count,
     }
     return [
         f"What is asked of the {who} leaves open {what}."
         for what, given in needs.items()
-        if given is None
+        if given is None or given is False
     ]
 
 
@@ -132,12 +142,16 @@ class _Fitting:
         self._place, self._route, self._rng = PlacingGround(self._ground, route), route, rng
         self.added: _Agents = ()
 
-    def fit(self, request: Request) -> tuple[_Agents, str]:
-        """Return the agents nearest to the asked distance that the checks pass, and a note."""
-        for open_part in list_open(request):
+    def fit(self, request: Request, of: TrafficAgent | None = None) -> tuple[_Agents, str]:
+        """Return the agents nearest to the asked distance that the checks pass, and a note.
+
+        Args:
+            request: What is asked for.
+            of: Whose door it is, or who only moves otherwise where it is.
+        """
+        for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
-        wanted = request.spot.distance
-        assert wanted is not None
+        wanted = request.spot.distance or Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.drawn(self._rng)
         sign = 1.0 if request.spot.relation is Relation.AHEAD else -1.0
         draw = int(self._rng.integers(2**32))
@@ -149,7 +163,7 @@ class _Fitting:
             if wanted.is_range and not (wanted.low_m <= distance_m <= wanted.high_m):
                 continue
             again = np.random.default_rng(draw)
-            agents = self._put(request, sign * distance_m, again, arrangement)
+            agents = self._put(request, sign * distance_m, again, arrangement, of)
             problem, doubts = self._judge(request, sign * distance_m, agents)
             first_problem = first_problem or problem
             if not problem and (best is None or doubts < best[0]):
@@ -159,12 +173,22 @@ class _Fitting:
         if best is None:
             raise CannotPlace(first_problem)
         _, agents, distance_m = best
+        if of is not None or request.spot.distance is None:
+            return agents, ""
         who = _NEEDS[type(request)][0]
         return agents, f"{who.capitalize()}: {distance_m:.1f} m {request.spot.relation}."
 
     def _put(
-        self, request: Request, distance_m: float, rng: np.random.Generator, arrangement: int
+        self,
+        request: Request,
+        distance_m: float,
+        rng: np.random.Generator,
+        arrangement: int,
+        of: TrafficAgent | None,
     ) -> _Agents:
+        wish: MotionWish | None = getattr(request, "motion", None)
+        if of is not None and wish is not None:
+            return (_rounded(give_motion(wish, self._place, of, rng)),)
         match request:
             case VehicleRequest():
                 agents = place_vehicles(request, self._place, distance_m, rng)
@@ -174,6 +198,8 @@ class _Fitting:
                 agents = place_cones(request, self._place, distance_m, rng)
             case CrashRequest():
                 agents = place_crash(request, self._place, distance_m, rng, arrangement)
+            case DoorRequest():
+                raise AssertionError("a door is of somebody")
         return tuple(map(_rounded, agents))
 
     def _judge(self, request: Request, distance_m: float, agents: _Agents) -> tuple[str, int]:
@@ -184,7 +210,8 @@ class _Fitting:
         for agent, other in itertools.product(agents, (*self._scene.everyone, *self.added)):
             if overlap(agent.box, other.box).depth_m > 0.0:
                 name = "the ego" if other is self._scene.ego else other.id or "what was added"
-                return f"{abs(distance_m):.1f} m from the ego it would stand in {name}.", 0
+                where = f"{abs(distance_m):.1f} m from the ego it" if distance_m else "It"
+                return f"{where} would stand in {name}.", 0
         everyone = _numbered((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
@@ -196,13 +223,23 @@ class _Fitting:
         return next(wrong, ""), sum(one.severity is Severity.DOUBTFUL for one in findings)
 
 
-def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
+def _as_request(move: Move, agent: TrafficAgent) -> Request:
     """Return a road user's move as the placement of a new one."""
+    if move.stays and agent.type is AgentType.PEDESTRIAN:
+        return WalkRequest(count=1, motion=move.motion)
     return replace(
         move.vehicle_request,
         body=Body.__members__.get(agent.type.name, Body.VEHICLE),
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
     )
+
+
+def _car_of(
+    request: DoorRequest, lanes: LanesAcross, named: Mapping[str, _Agents]
+) -> TrafficAgent:
+    if request.spot.landmark is not None:
+        return find_picked(lanes, request.spot.landmark)[0]
+    return named[request.spot.anchor or ""][0]
 
 
 def _numbered(agents: _Agents, scene: Scene) -> _Agents:

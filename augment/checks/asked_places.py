@@ -122,7 +122,9 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
                 yield _across([agent], left_m, wanted)
         elif isinstance(request, ConesRequest):
             yield from _cones(asked, party, request, band)
-        elif not party.missing:  # else the nearest may be missing, and the others lie anywhere
+        elif (
+            isinstance(request, CrashRequest) and not party.missing
+        ):  # else the nearest may be missing, and the others lie anywhere
             if party.is_exact:
                 first = in_order(party, request, asked.route)[0]
             others = [agent for agent in party.everyone if agent is not first]

@@ -157,6 +157,8 @@ def speed(situation: ChangedScene) -> Iterator[Finding]:
 
 def end_of_walk(agent: TrafficAgent) -> Point | None:
     """Return where a walk ends: as the agent says, else straight on; None for who stands."""
+    if agent.motion is not None and isinstance(agent.motion.path, PointPath):
+        return agent.motion.path.points_m[-1]
     if agent.walk_to_m is not None or is_stopped(agent):
         return agent.walk_to_m
     return (

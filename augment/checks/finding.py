@@ -41,6 +41,7 @@ class FindingKind(StrEnum):
     ASKED_COUNT = "asked_count"
     ASKED_TYPE = "asked_type"
     ASKED_MOTION = "asked_motion"
+    ASKED_START = "asked_start"
     UNASKED = "unasked"
 
     @property

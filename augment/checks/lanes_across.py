@@ -22,6 +22,7 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.intent import (
+    DoorRequest,
     Intent,
     LaneChoice,
     Lateral,
@@ -163,7 +164,12 @@ def resolve_spots(intent: Intent, lanes: LanesAcross) -> Intent:
     named: dict[str, Spot] = {}
     requests: list[Request] = []
     for request in intent.requests:
-        spot = _from_ego(request.spot, lanes, named)
+        spot = request.spot
+        if isinstance(request, DoorRequest) and spot.distance is None:
+            # Level with its car.
+            level = Length(low_m=0.0, high_m=0.0)
+            spot = replace(spot, distance=level, relation=Relation.AHEAD)
+        spot = _from_ego(spot, lanes, named)
         named[request.name] = spot
         requests.append(replace(request, spot=spot))
     moves = tuple(replace(move, spot=_from_ego(move.spot, lanes, named)) for move in intent.moves)
@@ -200,10 +206,13 @@ def _from_ego(spot: Spot, lanes: LanesAcross, named: dict[str, Spot]) -> Spot:
 
 def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
     """Return in words what the intent names and the scene does not have."""
-    spots = [one.spot for one in (*intent.requests, *intent.moves)]
+    asked = (*intent.requests, *intent.moves)
+    spots = [one.spot for one in asked]
     picks = [spot.landmark for spot in spots if spot.landmark is not None]
     picks += [*(move.who for move in intent.moves), *intent.removals]
     marks = [spot.mark for spot in spots if spot.mark is not None]
+    starts = [wish.start for one in asked if (wish := getattr(one, "motion", None))]
+    marks += [start.mark for start in starts if start is not None and start.mark is not None]
     absent = [str(pick) for pick in picks if not find_picked(lanes, pick)]
     return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from augment.checks.finding import Finding, FindingKind, find
+from augment.checks.ground import Ground
 from augment.checks.lanes_across import LanesAcross
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
@@ -17,6 +18,7 @@ from augment.scene.intent import (
     Body,
     ConesRequest,
     CrashRequest,
+    DoorRequest,
     Intent,
     LaneChoice,
     Length,
@@ -77,6 +79,16 @@ WORKER_M = 6.0
 """From a worker to the nearest cone; interPlan's stand 0.8 to 4.0 m off."""
 SPEED_MPS, SPEED_SHARE = 1.0, 0.2
 """Of what moves, whichever is more."""
+MARK_M = 5.0
+"""From a place of the map to where the ego is waited for."""
+MOTION = {
+    "after_s": (0.5, 0.15),
+    "within_m": (2.0, 0.15),
+    "speed_mps": (SPEED_MPS, SPEED_SHARE),
+    "braking_mps2": (0.75, 0.15),
+    "duration_s": (1.0, 0.3),
+}
+"""Of each number of a motion, and a share of it, whichever is more."""
 LONG_VEHICLE_M = 7.0
 """A vehicle of this length passes for a bus, as interPlan's file has it."""
 
@@ -93,6 +105,7 @@ class Role(StrEnum):
     WORKER = "worker"
     BARRIER = "barrier"
     SIGN = "construction sign"
+    DOOR = "door"
 
     def suits(self, agent: TrafficAgent) -> bool:
         """Return whether an agent's type is right."""
@@ -111,6 +124,7 @@ _TYPES = {
     Role.WORKER: (AgentType.PEDESTRIAN,),
     Role.BARRIER: (AgentType.BARRIER,),
     Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
+    Role.DOOR: (AgentType.GENERIC_OBJECT,),
 }
 _ROLES = {Body.VAN: Role.CAR, Body.TRUCK: Role.CAR}
 
@@ -198,7 +212,8 @@ def match_to_requests(
 
 def _roles(request: Request, added: Sequence[TrafficAgent]) -> list[Role]:
     """Whom a request needs; where its count is open, as many as there are, and at least one."""
-    role = Role.WALKER if isinstance(request, WalkRequest) else Role.CONE
+    kinds = {WalkRequest: Role.WALKER, DoorRequest: Role.DOOR}
+    role = kinds.get(type(request), Role.CONE)
     if isinstance(request, VehicleRequest | CrashRequest):
         role = _ROLES.get(request.body) or Role(request.body.value)
     count = request.count or max(sum(role.suits(agent) for agent in added), 1)
@@ -224,12 +239,14 @@ class Asked:
     """One modification, held against one intent.
 
     Attributes:
+        ground: Of the scene before it.
         parties: The requests with those who answer them.
         surplus: Added agents that no request asks for.
         to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
         unmet: Why the wish can't be met; None where it can.
     """
 
+    ground: Ground
     modification: Modification
     lanes: LanesAcross
     parties: tuple[Party, ...]
@@ -279,8 +296,14 @@ class Bounds:
 
     def __str__(self) -> str:
         if math.isinf(self.high - self.low):
-            return "at least 0" if self.low >= 0.0 else "at most 0"
+            return f"at least {self.low:g}" if self.low >= 0.0 else f"at most {self.high:g}"
         return f"{self.low:.4g}" if self.low == self.high else f"{self.low:.4g} to {self.high:.4g}"
+
+
+def motion_bounds(name: str, low: float, high: float) -> Bounds:
+    """Return what a number of a motion may be that is to be in a range."""
+    allowed, share = MOTION[name]
+    return Bounds(low, high, max(allowed, share * high))
 
 
 def hold(

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from augment.checks.asked_crash import asked_crash
+from augment.checks.asked_motions import asked_course
 from augment.checks.asked_places import asked_across, asked_distance, asked_spacing
 from augment.checks.asked_things import (
     asked_changes,
@@ -43,7 +44,7 @@ CHECKS: tuple[Check, ...] = (
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),
-    *(asked_walk, asked_motion, asked_spacing, asked_changes),
+    *(asked_walk, asked_motion, asked_spacing, asked_changes, asked_course),
 )
 _OF_PLACE = frozenset(
     {
@@ -87,13 +88,17 @@ def check_against_intent(
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
         return alone
-    asked = _asked(modification, intent, lanes, tolerances)
+    asked = _asked(ground, modification, intent, lanes, tolerances)
     held = [finding for check in ASKED_CHECKS for finding in check(asked)]
     return (*held, *_settled(alone, held, asked))
 
 
 def _asked(
-    modification: Modification, intent: Intent, lanes: LanesAcross, tolerances: Tolerances
+    ground: Ground,
+    modification: Modification,
+    intent: Intent,
+    lanes: LanesAcross,
+    tolerances: Tolerances,
 ) -> Asked:
     """The modification with who answers what; a move is a request for one vehicle elsewhere."""
     counted = resolve_spots(intent, lanes)
@@ -105,6 +110,7 @@ def _asked(
             parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     return Asked(
+        ground=ground,
         modification=modification,
         lanes=lanes,
         parties=tuple(parties),

@@ -24,6 +24,7 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
+from augment.scene.intent_parts import Amount
 from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
@@ -182,6 +183,8 @@ def intent_to_parts(value: Any) -> Any:
         if value.is_range:
             written["high_m"] = value.high_m
         return written | ({"is_approximate": True} if value.is_approximate else {})
+    if isinstance(value, Amount):
+        return {"low": value.low} | ({"high": value.high} if value.high > value.low else {})
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, tuple):
@@ -203,6 +206,7 @@ def parts_schema() -> dict[str, Any]:
         if "const" in part.get("properties", {}).get("kind", {}):
             part["required"] = ["kind"]
     schema["$defs"]["Length"]["required"] = ["low_m"]
+    schema["$defs"]["Amount"]["required"] = ["low"]
     return schema
 
 

@@ -13,10 +13,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, Self, TypeVar
 
-from numpy.random import Generator
 from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
+from augment.scene.intent_parts import Length as Length
+from augment.scene.intent_parts import MapPlace as MapPlace
+from augment.scene.intent_parts import MotionWish
+from augment.scene.intent_parts import Side as Side
+from augment.scene.planned_motion import MotionPreset
 from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
 
 
@@ -110,23 +114,6 @@ class Setting(StrEnum):
     BY_PARKED_RIGHT = "between parked vehicles on the right"
 
 
-class Side(StrEnum):
-    """A side of the ego's direction of travel."""
-
-    LEFT = "left"
-    RIGHT = "right"
-
-    @property
-    def other(self) -> Side:
-        """The opposite side."""
-        return Side.RIGHT if self is Side.LEFT else Side.LEFT
-
-    @property
-    def sign(self) -> float:
-        """Of numbers to that side: left is positive."""
-        return 1.0 if self is Side.LEFT else -1.0
-
-
 class Relation(StrEnum):
     """On which end of its anchor a distance is measured."""
 
@@ -157,14 +144,6 @@ class Sight(StrEnum):
     BUS = "bus"
     BICYCLE = "bicycle"
     PEDESTRIAN = "pedestrian"
-
-
-class MapPlace(StrEnum):
-    """A place of the map on the ego's route; a merge is a junction too."""
-
-    JUNCTION_START = "start of the junction"
-    JUNCTION_END = "end of the junction"
-    CROSSWALK = "crosswalk"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,7 +178,6 @@ class Pick:
 
 MOST_REQUESTS = 20
 
-_Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
 _MetresAhead = Annotated[Real, Field(gt=0.0, le=1000.0)]
 _Drift = Annotated[Real, Field(ge=-100.0, le=100.0)]
 _Degrees = Annotated[Real, Field(ge=-180.0, le=180.0)]
@@ -210,44 +188,6 @@ _Name = Id | Literal[""]
 _Item = TypeVar("_Item")
 _Several = Annotated[tuple[_Item, ...], Field(fail_fast=True, max_length=MOST_OBJECTS)]
 _Changes = Annotated[tuple[_Item, ...], Field(fail_fast=True, max_length=MOST_REQUESTS)]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Length:
-    """A length or a range of lengths in metres; `is_approximate` if the sentence says "about"."""
-
-    low_m: _Metres
-    high_m: _Metres
-    is_approximate: Yes = False
-
-    @model_validator(mode="before")
-    @classmethod
-    def _takes_one_number(cls, given: object) -> object:
-        """In a document `low_m` alone is one length."""
-        if isinstance(given, dict) and "low_m" in given and given.get("high_m") is None:
-            return given | {"high_m": given["low_m"]}
-        return given
-
-    @model_validator(mode="after")
-    def _is_ordered(self) -> Self:
-        if self.high_m < self.low_m:
-            raise ValueError("high_m is below low_m")
-        return self
-
-    @property
-    def is_range(self) -> bool:
-        """Whether a value has to be drawn from it."""
-        return self.high_m > self.low_m
-
-    def drawn(self, rng: Generator) -> float:
-        """Return a length of the range, evenly drawn."""
-        return float(rng.uniform(self.low_m, self.high_m))
-
-    def __str__(self) -> str:
-        about = "about " if self.is_approximate else ""
-        if self.is_range:
-            return f"{about}{self.low_m:g} to {self.high_m:g} m"
-        return f"{about}{self.low_m:g} m"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -308,6 +248,17 @@ class Spot:
         return (low_m, high_m) if self.relation is Relation.AHEAD else (-high_m, -low_m)
 
 
+def _check_motion(motion: MotionWish | None, who: str, *presets: MotionPreset) -> None:
+    if motion is not None and motion.preset not in presets:
+        allowed = ", ".join(presets)
+        raise ValueError(f"motion: {motion.preset} is not what {who} does; allowed: {allowed}")
+
+
+_ON_FOOT = (MotionPreset.LATE_PEDESTRIAN,)
+_OF_DOORS = (MotionPreset.DOOR_OPENING,)
+_OPENS = MotionWish(preset=MotionPreset.DOOR_OPENING)
+_DRIVEN = tuple(one for one in MotionPreset if one not in (*_ON_FOOT, *_OF_DOORS))
+
 _Turned = TypeVar("_Turned", "VehicleRequest", "Move")
 
 
@@ -325,6 +276,8 @@ class VehicleRequest:
         name: What an anchor calls it by; empty where none does. So for all requests.
         turn_deg: On top of `facing`, positive to the left.
         count: More than one stand in a row along the lane, each further one further on.
+        motion: What they do after t0. Who runs a red light comes from another arm of the
+            junction, and needs no spot.
     """
 
     kind: Literal["vehicles"] = "vehicles"
@@ -336,8 +289,14 @@ class VehicleRequest:
     speed_mps: _VehicleSpeed | None = None
     count: Count | None = None
     spacing: Length | None = None
+    motion: MotionWish | None = None
 
     _is_turned_from_something = model_validator(mode="after")(_check_turn)
+
+    @model_validator(mode="after")
+    def _drives(self) -> Self:
+        _check_motion(self.motion, "a vehicle", *_DRIVEN)
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,6 +309,7 @@ class WalkRequest:
         is_file: They walk one behind the other.
         behind: How far behind the first one the others walk in a file, where that is said.
         on_road: The first one stands in the ego's lane already.
+        motion: They wait beside the road and start late.
     """
 
     kind: Literal["walk"] = "walk"
@@ -362,6 +322,12 @@ class WalkRequest:
     is_file: Yes = False
     behind: _Several[Length] = ()
     on_road: Yes = False
+    motion: MotionWish | None = None
+
+    @model_validator(mode="after")
+    def _goes_on_foot(self) -> Self:
+        _check_motion(self.motion, "a pedestrian", *_ON_FOOT)
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -425,34 +391,65 @@ class CrashRequest:
     others: _Several[CrashedCar] = ()
 
 
-Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoorRequest:
+    """A door that opens, on the ego's side of a parked car.
+
+    Attributes:
+        spot: The car alone: a landmark, or the anchor of an earlier request.
+    """
+
+    kind: Literal["door"] = "door"
+    spot: Spot
+    name: _Name = ""
+    count: Literal[1] | None = 1
+    motion: MotionWish = _OPENS
+
+    @model_validator(mode="after")
+    def _is_of_a_car(self) -> Self:
+        car = Spot(anchor=self.spot.anchor, landmark=self.spot.landmark)
+        if self.spot != car or car == Spot():
+            raise ValueError("a door's spot is its car: an anchor or a landmark, and no more")
+        _check_motion(self.motion, "a door", *_OF_DOORS)
+        return self
+
+
+Request = VehicleRequest | WalkRequest | ConesRequest | CrashRequest | DoorRequest
 _AnyRequest = Annotated[Request, Field(discriminator="kind")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
-    """A road user of the scene that is to stand or drive elsewhere.
+    """A road user of the scene that is to stand or drive elsewhere, or to move otherwise.
 
     Attributes:
-        spot: Where it belongs; the sides and distances are as for what is added.
+        spot: Where it belongs; the sides and distances are as for what is added. Where only its
+            motion is another one it is open, and it stays.
         speed_mps: None where it keeps its speed.
     """
 
     who: Pick
-    spot: Spot
+    spot: Spot = Spot()
     facing: Facing | None = None
     turn_deg: _Degrees = 0.0
     speed_mps: _VehicleSpeed | None = None
+    motion: MotionWish | None = None
 
     @model_validator(mode="after")
     def _is_one_with_a_place(self) -> Self:
         if self.who.every:
             raise ValueError("one road user is moved, not every one")
+        _check_motion(self.motion, "a road user", *_DRIVEN, *_ON_FOOT)
         if self.spot.anchor is not None:
             raise ValueError("a move is counted from the ego, a landmark or a mark")
         return self
 
     _is_turned_from_something = model_validator(mode="after")(_check_turn)
+
+    @property
+    def stays(self) -> bool:
+        """Whether it stays where it is and only moves otherwise."""
+        return self.motion is not None and self.spot == Spot()
 
     @property
     def vehicle_request(self) -> VehicleRequest:
@@ -463,6 +460,7 @@ class Move:
             turn_deg=self.turn_deg,
             speed_mps=self.speed_mps,
             count=1,
+            motion=self.motion,
         )
 
 

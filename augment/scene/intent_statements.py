@@ -10,6 +10,7 @@ from augment.scene.intent import (
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    DoorRequest,
     Facing,
     Intent,
     Lateral,
@@ -21,6 +22,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+from augment.scene.intent_parts import MotionWish
 
 _ROUTES = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.U_TURN: "back"}
 _FACTS = {
@@ -37,6 +39,11 @@ _FACTS = {
     "post_side": "the worker is on the {} of them",
 }
 """Fields that a request may have, and what a value of theirs says."""
+_MOTION_FACTS = {
+    "speed_mps": "comes to {} m/s",
+    "braking_mps2": "brakes with {} m/s²",
+    "duration_s": "takes {} s",
+}
 
 
 def list_statements(intent: Intent) -> tuple[str, ...]:
@@ -47,7 +54,8 @@ def list_statements(intent: Intent) -> tuple[str, ...]:
         for fact in _list_facts(request)
     ]
     for move in intent.moves:
-        facts = ["goes elsewhere", *_list_place_facts(move.spot), *_list_pose_facts(move)]
+        where = [] if move.stays else ["goes elsewhere"]
+        facts = [*where, *_list_place_facts(move.spot), *_list_pose_facts(move)]
         statements += [f"{move.who}: {fact}" for fact in facts]
     statements += [f"{removal}: goes" for removal in intent.removals]
     if intent.route in _ROUTES:
@@ -71,11 +79,13 @@ def _name_thing(request: Request) -> str:
             thing = "cones"
         case CrashRequest():
             thing = f"crashed {request.body}"
+        case DoorRequest():
+            thing = f"door of {request.spot.anchor or request.spot.landmark}"
     return f"{thing} “{request.name}”" if request.name else thing
 
 
 def _list_facts(request: Request) -> Iterator[str]:
-    if request.count is not None:
+    if request.count is not None and not isinstance(request, DoorRequest):
         yield f"number {request.count}"
     yield from _list_place_facts(request.spot)
     yield from _list_pose_facts(request)
@@ -133,6 +143,20 @@ def _list_pose_facts(request: Request | Move) -> Iterator[str]:
     speed_mps = getattr(request, "speed_mps", None)
     if speed_mps is not None:
         yield f"moves at {speed_mps:g} m/s" if speed_mps else "stands"
+    wish: MotionWish | None = getattr(request, "motion", None)
+    if wish is not None:
+        yield from _list_motion_facts(wish)
+
+
+def _list_motion_facts(wish: MotionWish) -> Iterator[str]:
+    yield f"then: {wish.preset.label.lower()}"
+    if wish.start is not None:
+        yield f"begins {wish.start}"
+    if wish.side is not None:
+        yield f"comes from the {wish.side}"
+    for name, words in _MOTION_FACTS.items():
+        if (amount := getattr(wish, name)) is not None:
+            yield words.format(amount)
 
 
 def _name_turn(turn_deg: float, *, is_signed: bool = True) -> str:

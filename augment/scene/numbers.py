@@ -1,7 +1,7 @@
 """Numbers in documents of intents and modifications: named by their paths, set, drawn.
 
 A path is the one that faults are told by: `requests[0].spot.distance`, `add[0].speed_mps`. A range
-(`low_m`, `high_m`) is one number, and setting it makes it exact.
+(`low_m` or `low`, and high) is one number, and setting it makes it exact.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from augment.scene.schema import path
 
 MOST_VALUES = 100
 _FRAME = ("format", "version")
-_LOW, _HIGH = "low_", "high_"
+_LOW, _HIGH = "low", "high"
 _DIGITS = 6
 
 

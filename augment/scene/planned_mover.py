@@ -195,7 +195,7 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
         points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
         target, last_begins_m = _followed(graph, run)
         for s_m in _samples(begins_m, begins_m + path.change_m, most=MOST_OF_CHANGE):
-            share = _smooth_share((s_m - begins_m) / path.change_m)
+            share = smooth_share((s_m - begins_m) / path.change_m)
             start = line.position(s_m, d_m)
             end = target.position(target.project(*start).s_m)
             points.append(_between(start, end, share))
@@ -273,6 +273,11 @@ def run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
     return False
 
 
+def smooth_share(share: float) -> float:
+    """Return a share that goes from 0 to 1 without a jump in speed or acceleration across."""
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+
 # Private
 
 
@@ -312,11 +317,6 @@ def _samples(start_m: float, end_m: float, *, most: int = MOST_SAMPLES) -> list[
     """Stations after the start up to the end."""
     count = min(math.ceil((end_m - start_m) / SAMPLE_M - 1e-9), most)
     return np.linspace(start_m, end_m, count + 1)[1:].tolist() if count > 0 else []
-
-
-def _smooth_share(share: float) -> float:
-    """From 0 to 1 without a jump in speed or acceleration across."""
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
 def _between(start: Point, end: Point, share: float) -> Point:

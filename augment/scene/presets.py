@@ -12,7 +12,6 @@ import shapely
 
 from augment.errors import CannotPlace, InvalidModification
 from augment.geometry.frames import Pose, difference
-from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
     AgentType,
@@ -24,7 +23,7 @@ from augment.scene.entities import (
     TrafficLight,
     TrafficSide,
 )
-from augment.scene.lane_graph import ONCOMING_ABOVE_RAD, Beside
+from augment.scene.lane_graph import ONCOMING_ABOVE_RAD
 from augment.scene.planned_motion import (
     CHANGE_M,
     AtPlace,
@@ -37,7 +36,13 @@ from augment.scene.planned_motion import (
     PointPath,
     Trigger,
 )
-from augment.scene.planned_mover import HeldCourse, check_lane_path, lane_line, travelled_m
+from augment.scene.planned_mover import (
+    HeldCourse,
+    check_lane_path,
+    lane_line,
+    smooth_share,
+    travelled_m,
+)
 
 DOOR_LENGTH_M, DOOR_WIDTH_M, DOOR_REACH_M = 1.1, 0.15, 0.9
 """A door as a slab beside its car, and how far out it slides."""
@@ -137,6 +142,38 @@ def numbers_of(preset: MotionPreset) -> tuple[str, ...]:
     return tuple(name for name in names if getattr(USUAL[preset], name) is not None)
 
 
+def find_crossing(connector: LaneConnector, route: EgoRoute) -> Point | None:
+    """Return where a connector crosses the ego's way ahead, None where it doesn't."""
+    ahead = route.line.between(route.ego_s_m, route.line.length_m)
+    line = connector.centerline
+    met = shapely.LineString(line.points_m).intersection(shapely.LineString(ahead.points_m))
+    for x_m, y_m in shapely.get_coordinates(met).tolist():
+        heading_rad, ego_rad = (one.project(x_m, y_m).heading_rad for one in (line, ahead))
+        turn_rad = abs(difference(heading_rad, ego_rad))
+        if _CROSSES_ABOVE_RAD < turn_rad < math.pi - _CROSSES_ABOVE_RAD:
+            return _rounded((x_m, y_m))
+    return None
+
+
+def find_bend_end(route: EgoRoute) -> float | None:
+    """Return how far ahead of the ego the first bend of its way ends, None without one."""
+    stations = np.arange(0.0, route.ends_m[-1] - _BEND_OVER_M, 1.0).tolist()
+
+    def turns_rad(ahead_m: float, over_m: float) -> float:
+        return abs(difference(route.heading_at(ahead_m + over_m), route.heading_at(ahead_m)))
+
+    begins = next((s for s in stations if turns_rad(s, _BEND_OVER_M) >= _BEND_RAD), None)
+    if begins is None:
+        return None
+    after = (s for s in stations if s > begins + _BEND_OVER_M / 2.0)
+    return next((s for s in after if turns_rad(s, _BEND_OVER_M / 2.0) < _STRAIGHT_RAD), None)
+
+
+def ego_pace_mps(scene: Scene) -> float:
+    """Return how fast the ego comes, for timing; one that stands sets out some time."""
+    return max(scene.ego.speed_mps, _SLOWEST_EGO_MPS)
+
+
 # Private
 
 
@@ -224,8 +261,7 @@ def _cut_in(case: _Case) -> TrafficAgent:
         raise case.refusal(
             "it has to be in a lane beside the ego's, in the same direction."
         ) from None
-    speeds = _ramp(case.agent.speed_mps, case.reached_mps)
-    return case.moving(path, speeds)
+    return case.moving(path, _ramp(case.agent.speed_mps, case.reached_mps))
 
 
 def _hard_braking(case: _Case) -> TrafficAgent:
@@ -291,57 +327,46 @@ def _door_opening(case: _Case) -> TrafficAgent:
 
 def _u_turn(case: _Case) -> TrafficAgent:
     case.require()
-    agent, graph, turn_mps = case.agent, case.route.graph, case.number("speed_mps")
-    start, pose, straight_m = case.numbers.start, agent.pose, 0.0
+    agent, turn_mps = case.agent, case.number("speed_mps")
+    start, gone_m = case.numbers.start, 0.0
     if not case.stands:
         # Where it is when the ego comes near, nobody knows before.
-        start = case.numbers.start or AtTime()
+        start = start or AtTime()
         if not isinstance(start, AtTime):
             raise case.refusal("of somebody who drives it begins at a moment.")
-        here = HeldCourse(agent, graph).pose_at(agent.speed_mps * start.after_s)
-        if here is None:
-            raise case.refusal("the lanes end before it begins.")
-        pose = Pose(x_m=here[0], y_m=here[1], heading_rad=here[2])
-        straight_m = max(agent.speed_mps**2 - turn_mps**2, 0.0) / (2.0 * _SPEEDING_UP_MPS2)
-    begin = Pose(
-        x_m=pose.x_m + straight_m * math.cos(pose.heading_rad),
-        y_m=pose.y_m + straight_m * math.sin(pose.heading_rad),
-        heading_rad=pose.heading_rad,
-    )
-    points = [(begin.x_m, begin.y_m)] if straight_m else []
-    points += _turn_points(case, begin)
+        gone_m = agent.speed_mps * start.after_s
+        gone_m += max(agent.speed_mps**2 - turn_mps**2, 0.0) / (2.0 * _SPEEDING_UP_MPS2)
+    here = HeldCourse(agent, case.route.graph).pose_at(gone_m)
+    if here is None:
+        raise case.refusal("the lanes end before it begins.")
+    points = [here[:2]] if gone_m else []
+    points += _turn_points(case, Pose(x_m=here[0], y_m=here[1], heading_rad=here[2]))
     path = PointPath(points_m=tuple(map(_rounded, points)))
-    speeds = _ramp(agent.speed_mps, turn_mps)
-    return case.moving(path, speeds, start)
+    return case.moving(path, _ramp(agent.speed_mps, turn_mps), start)
 
 
 def _turn_points(case: _Case, begin: Pose) -> list[Point]:
     """Half a circle to the oncoming lane, back to its centre if it was too narrow, and on."""
     graph, scene = case.route.graph, case.route.scene
     side = -1.0 if scene.traffic_side is TrafficSide.LEFT else 1.0
-
-    def across_m(lane: Beside) -> float:
-        return side * lane.d_m
-
     oncoming = [
-        lane
+        (side * lane.d_m, lane.lane_id)
         for lane in graph.beside(begin.x_m, begin.y_m)
         if abs(difference(lane.tangent_rad, begin.heading_rad)) > ONCOMING_ABOVE_RAD
-        and across_m(lane) > lane.width_m / 2.0
+        and side * lane.d_m > lane.width_m / 2.0
         and lane.beyond_m == 0.0
     ]
     if not oncoming:
         raise case.refusal("there is no oncoming lane beside it.")
-    target = min(oncoming, key=across_m)
-    radius_m = max(TURN_RADIUS_M, across_m(target) / 2.0)
+    across_m, target = min(oncoming)
+    radius_m = max(TURN_RADIUS_M, across_m / 2.0)
     angles = np.linspace(0.0, math.pi, round(math.pi / _ARC_RAD) + 1)[1:]
     arc = np.column_stack((np.sin(angles), side * (1.0 - np.cos(angles)))) * radius_m
     points = [(x, y) for x, y in begin.to_parent(arc).tolist()]
-    there = graph.lane(target.lane_id).centerline.project(*points[-1])
+    there = graph.lane(target).centerline.project(*points[-1])
     for gone_m in np.arange(3.0, _ONWARDS_M, 3.0).tolist():
-        share = min(gone_m / _ROUND_M, 1.0)
-        left_m = there.d_m * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
-        place = graph.along(target.lane_id, there.s_m, gone_m, left_m)
+        left_m = there.d_m * (1.0 - smooth_share(min(gone_m / _ROUND_M, 1.0)))
+        place = graph.along(target, there.s_m, gone_m, left_m)
         if place is None:
             break
         points.append((place.pose.x_m, place.pose.y_m))
@@ -357,11 +382,10 @@ def _turn_points(case: _Case, begin: Pose) -> list[Point]:
 
 def _red_light(case: _Case) -> TrafficAgent:
     case.require(ahead=False)
-    ego_way = case.route.line.between(case.route.ego_s_m, case.route.line.length_m)
     for lane_ids in _ways(case):
         connector = case.route.graph.lane(lane_ids[-1])
         assert isinstance(connector, LaneConnector)
-        crossing = _crossing(connector.centerline, ego_way)
+        crossing = find_crossing(connector, case.route)
         if crossing is None:
             continue
         if connector.traffic_light is TrafficLight.GREEN:
@@ -374,8 +398,8 @@ def _red_light(case: _Case) -> TrafficAgent:
         times_s = np.arange(0.0, 60.0, 0.1)
         gone_m = [travelled_m(speeds, own_mps, time_s) for time_s in times_s.tolist()]
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])
-        ego_m = max(case.route.scene.ego.speed_mps, _SLOWEST_EGO_MPS) * arrives_s
-        meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=round(max(ego_m, 2.0), 1))
+        within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
+        meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
         start = case.numbers.start or (meets if case.stands else AtTime())
         return case.moving(path, speeds, start)
     raise case.refusal("no way from its lane over a junction crosses the ego's.")
@@ -396,22 +420,11 @@ def _ways(case: _Case) -> Iterator[tuple[str, ...]]:
             ways += [((*way, name), ends_m) for name in graph.successors(way[-1])]
 
 
-def _crossing(line: Polyline, ego_way: Polyline) -> Point | None:
-    """Where a connector crosses the ego's way, not along it."""
-    met = shapely.LineString(line.points_m).intersection(shapely.LineString(ego_way.points_m))
-    for x_m, y_m in shapely.get_coordinates(met).tolist():
-        heading_rad, ego_rad = (one.project(x_m, y_m).heading_rad for one in (line, ego_way))
-        turn_rad = abs(difference(heading_rad, ego_rad))
-        if _CROSSES_ABOVE_RAD < turn_rad < math.pi - _CROSSES_ABOVE_RAD:
-            return _rounded((x_m, y_m))
-    return None
-
-
 def _emergency_stop(case: _Case) -> TrafficAgent:
     case.require(drives=True)
     if not case.is_in_ego_lane():
         raise case.refusal("it has to be in the ego's lane.")
-    bend_m = _end_of_bend_m(case.route)
+    bend_m = find_bend_end(case.route)
     if bend_m is None:
         raise case.refusal("the ego's way has no bend ahead.")
     own_mps = case.agent.speed_mps
@@ -422,20 +435,6 @@ def _emergency_stop(case: _Case) -> TrafficAgent:
     start = case.numbers.start or AtTime(after_s=round(until_s, 2))
     speeds = _ramp(own_mps, 0.0, case.number("braking_mps2"))
     return case.moving(None, speeds, start)
-
-
-def _end_of_bend_m(route: EgoRoute) -> float | None:
-    """How far ahead of the ego the first bend of its way ends."""
-    stations = np.arange(0.0, route.ends_m[-1] - _BEND_OVER_M, 1.0).tolist()
-
-    def turns_rad(ahead_m: float, over_m: float) -> float:
-        return abs(difference(route.heading_at(ahead_m + over_m), route.heading_at(ahead_m)))
-
-    begins = next((s for s in stations if turns_rad(s, _BEND_OVER_M) >= _BEND_RAD), None)
-    if begins is None:
-        return None
-    after = (s for s in stations if s > begins + _BEND_OVER_M / 2.0)
-    return next((s for s in after if turns_rad(s, _BEND_OVER_M / 2.0) < _STRAIGHT_RAD), None)
 
 
 def _pull_out(case: _Case) -> TrafficAgent:

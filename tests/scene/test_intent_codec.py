@@ -12,6 +12,7 @@ from augment.scene.intent import (
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    DoorRequest,
     Facing,
     Intent,
     LaneChoice,
@@ -31,7 +32,9 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+from augment.scene.intent_parts import Amount, MotionWish, StartWish
 from augment.scene.intent_statements import list_statements
+from augment.scene.planned_motion import MotionPreset
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
 from tests.intents import metres
 
@@ -61,7 +64,13 @@ FULL = Intent(
             is_file=True,
             behind=(metres(2.0),),
             on_road=True,
+            motion=MotionWish(
+                preset=MotionPreset.LATE_PEDESTRIAN,
+                start=StartWish(mark=MapPlace.CROSSWALK, ego_distance=metres(10.0, 12.0)),
+                speed_mps=Amount(low=2.0, high=2.0),
+            ),
         ),
+        DoorRequest(spot=Spot(anchor="bus")),
         ConesRequest(
             spot=Spot(mark=MapPlace.CROSSWALK),
             shape=Shape.TAPER,
@@ -72,7 +81,17 @@ FULL = Intent(
         ),
         CrashRequest(others=(CrashedCar(gap=metres(4.0), bearing=Bearing.LEFT, turn_deg=40.0),)),
     ),
-    moves=(Move(who=Pick(kind=Sight.PARKED, ordinal=2), spot=Spot(lane=LaneChoice.OWN)),),
+    moves=(
+        Move(who=Pick(kind=Sight.PARKED, ordinal=2), spot=Spot(lane=LaneChoice.OWN)),
+        Move(
+            who=Pick(kind=Sight.MOVING),
+            motion=MotionWish(
+                preset=MotionPreset.HARD_BRAKING,
+                start=StartWish(after_s=Amount(low=1.0, high=2.5)),
+                braking_mps2=Amount(low=6.0, high=6.0),
+            ),
+        ),
+    ),
     removals=(Pick(kind=Sight.BUS, side=Side.LEFT, every=True),),
     route=TurnType.RIGHT,
     beyond=("in the rain",),
@@ -90,7 +109,7 @@ def test_an_intent_comes_back_from_its_document_and_can_be_said() -> None:
         written = json.dumps(intent_to_document(intent), allow_nan=False)
         assert intent_from_document(json.loads(written)) == intent
         assert not any("{" in statement for statement in list_statements(intent))
-    assert len(list_statements(FULL)) == 27
+    assert len(list_statements(FULL)) == 34
 
 
 def test_what_is_open_is_absent() -> None:
@@ -104,7 +123,11 @@ def test_what_is_open_is_absent() -> None:
         (document({"body": "tram"}), "requests[0].vehicles.body", "or 'construction sign'"),
         (document({"count": 0}), "requests[0].vehicles.count", "greater than or equal to 1"),
         (document({"count": "two"}), "requests[0].vehicles.count", "valid integer"),
-        (document({"kind": "elephant"}), "requests[0]", "'vehicles', 'walk', 'cones', 'crash'"),
+        (
+            document({"kind": "elephant"}),
+            "requests[0]",
+            "'vehicles', 'walk', 'cones', 'crash', 'door'",
+        ),
         (document(), "", "asks for nothing"),
         (
             document({"spot": {"distance": {"low_m": 20.0}}}),

@@ -1,0 +1,158 @@
+"""What agents are made to do after t0 against the motion that was asked for."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from augment.checks.finding import Finding, FindingKind, find
+from augment.checks.lanes_across import find_mark
+from augment.checks.parties import MARK_M, Asked, Bounds, apart_m, hold, motion_bounds
+from augment.geometry.frames import difference
+from augment.geometry.polyline import FloatArray
+from augment.scene import planned_motion as planned
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent import Spot
+from augment.scene.intent_parts import MotionWish, Side, StartWish
+from augment.scene.motion import STEP_S
+from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo, PlannedMotion
+from augment.scene.planned_mover import PlannedMover
+from augment.scene.presets import find_bend_end
+
+_CARRIED_OUT_S = 15.0
+_THERE_M = 0.3
+"""So near to where a lane change ends it is over."""
+_BRAKES = Bounds(3.0, math.inf, 0.0)
+"""Hard braking where no number is said, in m/s^2."""
+_TURNS_ROUND = Bounds(180.0, 180.0, 20.0)
+_DOOR = Bounds(0.6, 1.2, 0.3)
+"""How far a door opens, in metres."""
+
+
+def asked_course(asked: Asked) -> Iterator[Finding]:
+    """Whether who is to move begins when it should and does what it should, by its numbers."""
+    before = {agent.id: agent for agent in asked.route.scene.agents}
+    for party in asked.parties:
+        wish: MotionWish | None = getattr(party.request, "motion", None)
+        for agent in party.agents if wish is not None else ():
+            assert wish is not None
+            if agent.id in before and party.request.spot == Spot():
+                off_m, wanted = apart_m(agent, before[agent.id]), asked.tolerances.distance_m
+                words = f"{{agents[0]}} is {off_m:.2f} m from where it was and is to stay."
+                yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
+            if agent.motion is None:
+                words = f"{{agents[0]}} has no motion; asked for: {wish.preset.label.lower()}."
+                yield find(FindingKind.ASKED_MOTION, False, [agent], words)
+                continue
+            if wish.start is not None:
+                yield from _start(asked, agent, agent.motion, wish.start)
+            states = _carried_out(asked, agent, agent.motion)
+            yield from _course(asked, agent, wish, states)
+            yield from _numbers(asked, agent, wish, states)
+
+
+# Private
+
+
+def _start(
+    asked: Asked, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
+) -> Iterator[Finding]:
+    start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
+    if wish.after_s is not None and isinstance(start, AtTime):
+        wanted = motion_bounds("after_s", wish.after_s.low, wish.after_s.high)
+        yield hold(kind, [agent], "The start of {agents[0]}", start.after_s, wanted, unit="s")
+        return
+    is_at_mark = isinstance(start, AtPlace) and start.agent_id == planned.EGO_ID
+    if wish.after_s is None and (is_at_mark if wish.mark else isinstance(start, NearEgo)):
+        assert not isinstance(start, AtTime)
+        mark_m = find_mark(asked.lanes, wish.mark) if wish.mark else None
+        if mark_m is not None and isinstance(start, AtPlace):
+            off_m = asked.route.locate(start.x_m, start.y_m).ahead_m - mark_m
+            what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
+            yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
+        ends_m = (near.low_m, near.high_m) if near else (planned.REACHED_M, planned.REACHED_M)
+        what, wanted = (
+            "The ego's distance at the start of {agents[0]}",
+            motion_bounds("within_m", *ends_m),
+        )
+        yield hold(kind, [agent], what, start.within_m, wanted)
+        return
+    words = f"{{agents[0]}} is to begin {wish}; its start is of another kind."
+    yield find(kind, False, [agent], words)
+
+
+def _carried_out(asked: Asked, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
+    """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
+    begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
+    alone = replace(agent, motion=replace(motion, start=begins))
+    mover, rows = PlannedMover(alone, asked.route.graph), []
+    for time_s in np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist():
+        mover.advance(time_s)
+        rows.append(mover.state())
+    states = np.array(rows)
+    return states[~np.isnan(states[:, 0])]
+
+
+def _course(
+    asked: Asked, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+) -> Iterator[Finding]:
+    """Where it gets to."""
+    places = [asked.route.locate(x, y) for x, y in states[:, :2].tolist()]
+    first, last = places[0], places[-1]
+    match wish.preset:
+        case MotionPreset.CUT_IN | MotionPreset.PULL_OUT:
+            what = "The offset of {agents[0]} in the end to the left of the ego's lane's centre"
+            wanted = Bounds(0.0, 0.0, asked.tolerances.middle_m)
+            yield hold(FindingKind.ASKED_ACROSS, [agent], what, last.left_m, wanted)
+        case MotionPreset.U_TURN:
+            turned_deg = math.degrees(abs(difference(states[-1, 2], states[0, 2])))
+            what, kind = "The turn of {agents[0]} in the end", FindingKind.ASKED_HEADING
+            yield hold(kind, [agent], what, turned_deg, _TURNS_ROUND, unit="degrees")
+        case MotionPreset.LATE_PEDESTRIAN | MotionPreset.RED_LIGHT:
+            words = "{agents[0]} is to cross the ego's way ahead of it"
+            meets = (b.ahead_m for a, b in pairwise(places) if a.left_m * b.left_m <= 0.0)
+            crosses = max(meets, default=0.0) > 0.0 and first.left_m * last.left_m < 0.0
+            yield find(FindingKind.ASKED_CROSSING, crosses, [agent], f"{words}.")
+            if wish.side is not None and crosses:
+                fits = (first.left_m > 0.0) is (wish.side is Side.LEFT)
+                yield find(
+                    FindingKind.ASKED_SIDE, fits, [agent], f"{words}, from the {wish.side}."
+                )
+        case MotionPreset.EMERGENCY_STOP:
+            bend_m = find_bend_end(asked.route) or 0.0
+            words = (
+                f"{{agents[0]}} stops {last.ahead_m:.1f} m ahead; the bend ends at {bend_m:.1f} m."
+            )
+            yield find(FindingKind.ASKED_DISTANCE, last.ahead_m >= bend_m, [agent], words)
+        case MotionPreset.DOOR_OPENING:
+            toward_m = abs(first.left_m) - abs(last.left_m)
+            what = "How far {agents[0]} comes towards the ego's way"
+            yield hold(FindingKind.ASKED_MOTION, [agent], what, toward_m, _DOOR)
+
+
+def _numbers(
+    asked: Asked, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+) -> Iterator[Finding]:
+    assert agent.motion is not None
+    profile = [(0.0, agent.speed_mps), *agent.motion.speeds]
+    slows = wish.preset in (MotionPreset.HARD_BRAKING, MotionPreset.EMERGENCY_STOP)
+    braking = [
+        (a - b) / (end - begin) for (begin, a), (end, b) in pairwise(profile) if end > begin
+    ]
+    moves = states[:, 3] > 0.0
+    if wish.preset is MotionPreset.CUT_IN:
+        lefts_m = np.array([asked.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])
+        moves = np.abs(lefts_m - lefts_m[-1]) > _THERE_M
+    measured = {
+        "speed_mps": ("The speed in the end of {agents[0]}", profile[-1][1], "m/s"),
+        "braking_mps2": ("The braking of {agents[0]}", max(braking, default=0.0), "m/s²"),
+        "duration_s": ("The duration for {agents[0]}", STEP_S * np.count_nonzero(moves), "s"),
+    }
+    usual = {"speed_mps": Bounds(0.0, 0.0, 1.0), "braking_mps2": _BRAKES} if slows else {}
+    for name, (what, value, unit) in measured.items():
+        amount = getattr(wish, name)
+        wanted = motion_bounds(name, amount.low, amount.high) if amount else usual.get(name)
+        if wanted is not None:
+            yield hold(FindingKind.ASKED_MOTION, [agent], what, float(value), wanted, unit=unit)

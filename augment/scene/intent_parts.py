@@ -1,0 +1,175 @@
+"""Parts that an intent's requests share: sides, places, lengths, and what motion is asked for.
+
+Left and right are those of the ego's direction of travel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Self
+
+from numpy.random import Generator
+from pydantic import Field, model_validator
+
+from augment.scene.planned_motion import MotionPreset
+from augment.scene.presets import numbers_of
+from augment.scene.schema import Real, Yes
+
+_Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
+_Value = Annotated[Real, Field(ge=0.0, le=100.0)]
+
+
+class Side(StrEnum):
+    """A side of the ego's direction of travel."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+    @property
+    def other(self) -> Side:
+        """The opposite side."""
+        return Side.RIGHT if self is Side.LEFT else Side.LEFT
+
+    @property
+    def sign(self) -> float:
+        """Of numbers to that side: left is positive."""
+        return 1.0 if self is Side.LEFT else -1.0
+
+
+class MapPlace(StrEnum):
+    """A place of the map on the ego's route; a merge is a junction too."""
+
+    JUNCTION_START = "start of the junction"
+    JUNCTION_END = "end of the junction"
+    CROSSWALK = "crosswalk"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Length:
+    """A length or a range of lengths in metres; `is_approximate` if the sentence says "about"."""
+
+    low_m: _Metres
+    high_m: _Metres
+    is_approximate: Yes = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _takes_one_number(cls, given: object) -> object:
+        """In a document `low_m` alone is one length."""
+        if isinstance(given, dict) and "low_m" in given and given.get("high_m") is None:
+            return given | {"high_m": given["low_m"]}
+        return given
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        if self.high_m < self.low_m:
+            raise ValueError("high_m is below low_m")
+        return self
+
+    @property
+    def is_range(self) -> bool:
+        """Whether a value has to be drawn from it."""
+        return self.high_m > self.low_m
+
+    def drawn(self, rng: Generator) -> float:
+        """Return a length of the range, evenly drawn."""
+        return float(rng.uniform(self.low_m, self.high_m))
+
+    def __str__(self) -> str:
+        about = "about " if self.is_approximate else ""
+        if self.is_range:
+            return f"{about}{self.low_m:g} to {self.high_m:g} m"
+        return f"{about}{self.low_m:g} m"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Amount:
+    """A number or a range of numbers; its unit is in the name of the field that holds it."""
+
+    low: _Value
+    high: _Value
+
+    @model_validator(mode="before")
+    @classmethod
+    def _takes_one_number(cls, given: object) -> object:
+        """In a document `low` alone is one number."""
+        if isinstance(given, dict) and "low" in given and given.get("high") is None:
+            return given | {"high": given["low"]}
+        return given
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        if self.high < self.low:
+            raise ValueError("high is below low")
+        return self
+
+    def drawn(self, rng: Generator) -> float:
+        """Return a number of the range, evenly drawn."""
+        return float(rng.uniform(self.low, self.high))
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}" if self.high > self.low else f"{self.low:g}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartWish:
+    """When a motion begins: at a moment, or as soon as the ego is somewhere.
+
+    Attributes:
+        after_s: Since t0.
+        ego_distance: Of the ego from who moves, or from the mark where one is named.
+        mark: A place of the map that the ego comes to; without a distance it is there.
+    """
+
+    after_s: Amount | None = None
+    ego_distance: Length | None = None
+    mark: MapPlace | None = None
+
+    @model_validator(mode="after")
+    def _says_when(self) -> Self:
+        by_ego = self.ego_distance is not None or self.mark is not None
+        if by_ego is (self.after_s is not None):
+            raise ValueError("a start is after_s, or an ego_distance, a mark or both")
+        return self
+
+    def __str__(self) -> str:
+        if self.after_s is not None:
+            return f"after {self.after_s} s"
+        where = f"the {self.mark}" if self.mark else "it"
+        if self.ego_distance is None:
+            return f"once the ego is at {where}"
+        return f"once the ego is {self.ego_distance} from {where}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionWish:
+    """What somebody is to do after t0, by its name.
+
+    Attributes:
+        start: When; open where nobody says.
+        side: From which side it comes over the junction, for a red light that is run.
+        speed_mps: That it comes to.
+        braking_mps2: How hard it brakes, positive.
+        duration_s: How long a lane change takes, or the opening of a door.
+    """
+
+    preset: MotionPreset
+    start: StartWish | None = None
+    side: Side | None = None
+    speed_mps: Amount | None = None
+    braking_mps2: Amount | None = None
+    duration_s: Amount | None = None
+
+    @model_validator(mode="after")
+    def _has_the_numbers_of_its_preset(self) -> Self:
+        own = numbers_of(self.preset)
+        for name in ("speed_mps", "braking_mps2", "duration_s"):
+            amount = getattr(self, name)
+            if amount is not None and name not in own:
+                raise ValueError(f"{name} is none of the numbers of {self.preset}: {own}")
+            if amount is not None and name != "speed_mps" and amount.low == 0.0:
+                raise ValueError(f"{name} is more than 0")
+        if self.side is not None and self.preset is not MotionPreset.RED_LIGHT:
+            raise ValueError("only who runs a red light comes from a side")
+        return self
