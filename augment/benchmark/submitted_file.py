@@ -33,6 +33,10 @@ CARD_FILE = "card.json"
 BOUNDS = ZipBounds(entries=10_000, bytes=500_000_000)
 ENOUGH_S = 4.0
 """Of computing, after which the process stops: a file always has as much left of its limit."""
+ONLY_T0 = (
+    "What it says of the time after t0 is not taken: who is new or moved goes on by itself. A "
+    "motion can be entered in our own JSON."
+)
 _HEAD_BYTES = 1_000_000
 _MOST_SAID = 2_000
 """Characters of a reason, which may quote the file."""
@@ -109,8 +113,9 @@ def _read_scene(reader: Reader, path: Path) -> FileContent:
         with path.open("rb") as file:
             own_names = names_in(file.read(_HEAD_BYTES).decode(errors="replace"))
     kept = replace(found.scene, lanes=(), connectors=(), areas=())
+    notes = found.notes if found.recording is None else (*found.notes, ONLY_T0)
     return FileContent(
-        format=reader.name, scene=kept, notes=found.notes, names=found.names, own_names=own_names
+        format=reader.name, scene=kept, notes=notes, names=found.names, own_names=own_names
     )
 
 

@@ -19,6 +19,7 @@ from augment.scene.codec import scene_to_document
 from augment.scene.entities import LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
+from augment.scene.planned_motion import AtTime, PointPath
 from augment.scene.recording import Recording
 
 
@@ -199,18 +200,37 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
             )
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
-    walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
-    waiting = [walker.agent.id for walker in walkers if walker.stands]
+    own = [other for other in motion.others if other.agent.walk_to_m or other.agent.motion]
+    waiting = [one.agent.id for one in own if one.started_s is None and one.agent.walk_to_m]
     text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
     report.lose_of(waiting, text, changes_scene=True)
-    walking = [walker.agent.id for walker in walkers if not walker.stands and not can_trigger]
-    report.lose_of(walking, "sets out at a fixed time, not when the ego comes near")
+    waiting = [one.agent.id for one in own if one.started_s is None and one.agent.motion]
+    text = "has a motion but never sets out: its trigger does not fire"
+    report.lose_of(waiting, text, changes_scene=True)
+    if can_trigger:
+        return
+    text = "sets out at a fixed time, not when its trigger fires"
+    names = [one.agent.id for one in own if one.started_s is not None and _waits(one.agent)]
+    report.lose_of(names, text)
+    text = "the walk or motion is written as it goes, without end point, path and trigger"
+    report.lose_of([one.agent.id for one in own], text)
+
+
+def _waits(agent: entities.TrafficAgent) -> bool:
+    """Whether it hangs on others when its walk or motion starts."""
+    return agent.motion is None or not isinstance(agent.motion.start, AtTime)
 
 
 _ASSUMED = {
     MotionSource.HELD_SPEED: "it is let hold its speed along its lane",
     MotionSource.STANDING: "it stands, as it does at t0",
 }
+
+
+def keeps_heading(agent: entities.TrafficAgent) -> bool:
+    """Return whether an agent moves without turning, so not along its heading."""
+    path = agent.motion and agent.motion.path
+    return isinstance(path, PointPath) and path.keeps_heading
 
 
 def appears_later(movement: Movement) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from augment.benchmark.submission import check_submission
+from augment.benchmark.submitted_file import ONLY_T0
 from augment.metrics.displacement import are_alike
 from augment.scene.entities import AgentType, Modification
 from tests.benchmark.sets import on_disk, street, street_set
@@ -36,3 +37,4 @@ def test_commonroad_io_and_a_writer_of_scenarionet_can_enter(tmp_path: Path) -> 
         assert entry.modification is not None, entry
         assert are_alike(entry.modification, wanted), entry
         assert [one.id for one in entry.modification.added] == ["Agent12"]
+        assert ONLY_T0 in entry.notes

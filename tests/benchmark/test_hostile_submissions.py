@@ -82,6 +82,9 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
     (made / "million.json").write_text(many)
     (made / "nan.json").write_text(json.dumps(GOOD).replace("12.0", "NaN"))
     np.savez_compressed(made / "bomb.npz", agent=np.zeros((20_000_000, 7)))
+    path = {"kind": "points", "points_m": [[1.0, 1.0]] * 500_000}
+    led = agent.replace("}", f', "motion": {json.dumps({"path": path})}}}')
+    (made / "path.json").write_text(json.dumps(GOOD).replace(agent, led))
     crowd = [cone(f"Agent{number}", 9.0, 2.0) for number in range(100, 1200)]
     crowded = modification_to_document(Modification(added=tuple(crowd)))
     (made / "crowd.json").write_text(json.dumps(crowded))
@@ -89,7 +92,8 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
         parts = {"tracks": {key: {"type": "?"}}, "map_features": {}, "metadata": {}}
         (made / f"{name}.pkl").write_bytes(pickle.dumps(parts | {"length": 2}))
     os.symlink("/etc/passwd", made / "link.json")
-    found = check(made, ("million", "nan", "bomb", "crowd", "nul", "huge", "link"))
+    found = check(made, ("million", "nan", "bomb", "crowd", "nul", "huge", "link", "path"))
+    assert "at most 200 items" in found["path"].reason
     assert "bytes; at most" in found["million"].reason
     assert "finite number" in found["nan"].reason
     assert "memory" in found["bomb"].reason

@@ -20,6 +20,7 @@ from augment.benchmark.values import EntryStatus, SubmittedEntry
 from augment.errors import InvalidDocument
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification, apply
+from augment.scene.planned_motion import LanePath, PlannedMotion
 from tests.benchmark.sets import handed_out, on_disk, street, street_set
 from tests.benchmark.test_report import CARD_PARTS
 from tests.scenes import cone
@@ -83,6 +84,10 @@ def test_a_lane_that_is_not_there_does_not_fit(folder: Path) -> None:
     lost = replace(CONE.added[0], lane_id="Lane77")
     write(folder, "near.json", modification_to_document(Modification(added=(lost,))))
     assert "'Lane77' is not a lane" in entries(folder)["near--1"].reason
+    motion = PlannedMotion(path=LanePath(lane_ids=("Lane77",)))
+    led_astray = replace(CONE.added[0], motion=motion)
+    write(folder, "near.json", modification_to_document(Modification(added=(led_astray,))))
+    assert "Lane77 is no lane of the scene; its lanes: " in entries(folder)["near--1"].reason
 
 
 def test_files_of_no_task_are_remarks_and_a_zip_of_the_folder_is_read(folder: Path) -> None:

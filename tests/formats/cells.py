@@ -16,7 +16,16 @@ from augment.scene.entities import (
     Scene,
     TrafficSide,
 )
+from augment.scene.planned_motion import (
+    AtPlace,
+    AtTime,
+    LanePath,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+)
 from augment.scene.recording import Recording, Track
+from tests.scene.test_planned_motion import two_lanes
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
 OF_EACH_TYPE = tuple(
@@ -46,6 +55,37 @@ def cell(before: Scene | None = None, **changes: Any) -> Cell:
         "modification": Modification(added=added),
     }
     return Cell(**(given | changes))
+
+
+def moving() -> Cell:
+    """A cut-in, a late walker, a door that slides, a car that waits in vain, one that leaves."""
+    motions = {
+        vehicle("Agent2", 30.0, 3.5): (
+            *(4.0, LanePath(lane_ids=("Lane2", "Lane1")), ()),
+            NearEgo(within_m=15.0),
+        ),
+        pedestrian("Agent3", 60.0, -5.0): (
+            *(0.0, PointPath(points_m=((60.0, 1.0), (64.0, 5.0))), ((0.0, 1.0), (1.0, 3.0))),
+            AtPlace(agent_id="Agent2", x_m=44.0, y_m=3.5, within_m=1.0),
+        ),
+        replace(vehicle("Agent4", 10.0, -2.0), type=AgentType.GENERIC_OBJECT): (
+            *(0.0, PointPath(points_m=((10.0, -1.0),), keeps_heading=True), ((0.0, 1.0),)),
+            AtTime(after_s=1.05),
+        ),
+        vehicle("Agent5", 80.0, -3.0): (0.0, None, ((1.0, 5.0),), AtPlace(x_m=0.0, y_m=90.0)),
+        vehicle("Agent6", -20.0, 0.0): (30.0, LanePath(lane_ids=("Lane1",)), (), AtTime()),
+    }
+    lanes = {3.5: "Lane2", 0.0: "Lane1"}
+    added = tuple(
+        replace(
+            agent,
+            speed_mps=speed_mps,
+            lane_id=lanes.get(agent.y_m),
+            motion=PlannedMotion(path=path, speeds=speeds, start=start),  # type: ignore[arg-type]
+        )
+        for agent, (speed_mps, path, speeds, start) in motions.items()
+    )
+    return cell(two_lanes(), added=added, stem="moving", name="moving")
 
 
 def crossing() -> Scene:

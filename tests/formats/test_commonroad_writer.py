@@ -4,11 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from augment.formats.commonroad.writer import write
 from augment.geometry.polyline import Polyline
-from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
 
@@ -24,6 +25,7 @@ def test_commonroad_io_loads_every_file_and_the_schema_allows_it(
         "street": cell(),
         "crossing": cell(crossing(), added=OF_EACH_TYPE),
         "recorded": cell(before, recording=recording, keeps_traffic=True, added=()),
+        "moving": replace(moving(), stem="street--rule"),
         "log": cell(log, recording=seen, keeps_traffic=True, added=()),
     }
     files = []
@@ -35,6 +37,7 @@ def test_commonroad_io_loads_every_file_and_the_schema_allows_it(
     check_street(told["street"])
     check_crossing(told["crossing"])
     assert [one["last"] for one in told["recorded"]["dynamic"]] == [19]
+    check_moving(told["moving"])
     assert len(told["log"]["lanelets"]) >= len(log.lanes) + len(log.connectors)
 
 
@@ -58,6 +61,20 @@ def check_crossing(told: dict[str, Any]) -> None:
         assert line.project(x_m, y_m).distance_m < 0.01
     assert sorted(told["lights"]) == ["green", "red"]
     assert told["turns"] == [[[5], [4]]]
+
+
+def check_moving(told: dict[str, Any]) -> None:
+    """All of them move as `motion_of` says, step by step; the door is of unknown type."""
+    assert sorted(one["type"] for one in told["dynamic"]) == ["car"] * 3 + [
+        "pedestrian",
+        "unknown",
+    ]
+    ours = {tuple(one.states[0, :2]): one.states for one in moving().motion.others}
+    for one in told["dynamic"]:
+        states = ours[tuple(one["position"])]
+        rows = np.array(one["states"])
+        assert rows[:, 1:] == pytest.approx(states[rows[:, 0].astype(int)], abs=1e-6)
+        assert len(rows) == np.isfinite(states[:, 0]).sum() - 1
 
 
 def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:

@@ -13,7 +13,7 @@ from augment.formats.openscenario.writer import REAR_AXLE_SHARE, write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_from_document
-from augment.scene.entities import AgentType, Lane, Scene
+from augment.scene.entities import Lane, Scene
 from augment.scene.lane_graph import AnyLane
 from augment.scene.planned_motion import (
     AtPlace,
@@ -23,10 +23,11 @@ from augment.scene.planned_motion import (
     PlannedMotion,
     PointPath,
 )
-from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from augment.scene.recording import Recording
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
-from tests.scene.test_planned_motion import two_lanes, with_motion
+from tests.scene.test_planned_motion import with_motion
 from tests.scenes import curve, pedestrian, vehicle
 
 SCENES = Path(__file__).parents[2] / "fixtures" / "scenes"
@@ -169,57 +170,25 @@ def test_a_map_that_no_road_can_follow_is_refused() -> None:
     ]
 
 
-WAITS = {
-    "Agent2": (
-        vehicle("Agent2", 30.0, 3.5),
-        4.0,
-        PlannedMotion(
-            path=LanePath(lane_ids=("Lane2", "Lane1"), change_m=20.0), start=NearEgo(within_m=15.0)
-        ),
-    ),
-    "Agent3": (
-        pedestrian("Agent3", 60.0, -5.0),
-        0.0,
-        PlannedMotion(
-            path=PointPath(points_m=((60.0, 1.0), (64.0, 5.0))),
-            speeds=((0.0, 1.0), (1.0, 3.0)),
-            start=AtPlace(x_m=40.0, y_m=0.0, within_m=3.0),
-        ),
-    ),
-    "Agent4": (
-        vehicle("Agent4", 200.0, 0.0, np.pi),
-        0.0,
-        PlannedMotion(
-            speeds=((2.0, 6.0),), start=AtPlace(agent_id="Agent2", x_m=50.0, y_m=3.0, within_m=2.0)
-        ),
-    ),
-    "Agent5": (
-        vehicle("Agent5", -20.0, 0.0),
-        10.0,
-        PlannedMotion(speeds=((2.0, 0.0),), start=AtTime(after_s=1.05)),
-    ),
-    "Agent6": (
-        vehicle("Agent6", 380.0, 3.5),
-        9.0,
-        PlannedMotion(path=LanePath(lane_ids=("Lane2",)), start=AtTime(after_s=1.0)),
-    ),
-    "Agent7": (
-        vehicle("Agent7", 385.0, 0.0),
-        9.0,
-        PlannedMotion(path=LanePath(lane_ids=("Lane1",)), start=NearEgo(within_m=5.0)),
-    ),
-    "Agent8": (vehicle("Agent8", 399.5, 3.5), 9.0, PlannedMotion(start=AtTime(after_s=5.0))),
-}
-"""Agents with speed and motion; by hand the first sets out at 3.9 s (test_planned_motion.py)."""
-
-
 def scene_of_motions() -> Cell:
-    lanes = {3.5: "Lane2", 0.0: "Lane1"}
-    added = tuple(
-        with_motion(agent, motion, speed_mps=speed_mps, lane_id=lanes.get(agent.y_m))
-        for agent, speed_mps, motion in WAITS.values()
+    """The moving cast, of whom the first sets out at 3.9 s, and who leaves the map or brakes."""
+    leaves = PlannedMotion(path=LanePath(lane_ids=("Lane1",)), start=NearEgo(within_m=5.0))
+    late = PlannedMotion(start=AtTime(after_s=5.0))
+    steps = PlannedMotion(
+        path=PointPath(points_m=((64.0, 1.0),)),
+        speeds=((0.0, 2.0),),
+        start=AtPlace(x_m=40.0, y_m=0.0, within_m=3.0),
     )
-    return cell(two_lanes(), added=added)
+    brakes = PlannedMotion(speeds=((2.0, 0.0),), start=AtTime(after_s=1.05))
+    more = (
+        with_motion(vehicle("Agent7", 385.0, 0.0), leaves, speed_mps=9.0, lane_id="Lane1"),
+        with_motion(vehicle("Agent8", 399.5, 3.5), late, speed_mps=9.0, lane_id="Lane2"),
+        with_motion(pedestrian("Agent9", 64.0, -5.0), steps),
+        with_motion(vehicle("Agent10", -20.0, 3.5), brakes, speed_mps=10.0, lane_id="Lane2"),
+    )
+    given = moving()
+    change = replace(given.modification, added=(*given.modification.added, *more))
+    return replace(given, modification=change, stem="street--rule")
 
 
 @pytest.mark.parametrize("step_s", [0.1, 0.02])
@@ -238,33 +207,31 @@ def test_a_player_of_the_file_moves_everybody_as_we_do(step_s: float) -> None:
                 if there is not None:
                     assert math.dist(there, state[:2]) < 0.1, (one.agent.id, now)
     assert began["Agent2 sets out"] == pytest.approx(3.9)
-    assert began["Agent5 sets out"] == pytest.approx(1.05, abs=step_s)
-    assert {"Agent7 sets out", "Agent8 sets out"}.isdisjoint(began)
+    assert began["Agent10 sets out"] == pytest.approx(1.05, abs=step_s)
+    assert {"Agent5 sets out", "Agent7 sets out", "Agent8 sets out"}.isdisjoint(began)
 
 
 def test_what_holds_with_our_ego_alone_is_named() -> None:
     said = lines(scene_of_motions())
     text = "its distance is told between rear axles: the same moment with our ego, else up to"
-    assert f"street by rule: Agent2: {text} 2.8 m off" in said
-    assert f"street by rule: Agent3: {text} 1.5 m off" in said
-    for name, words in {
-        "Agent2": "sets out from where it is with our ego; with others it jumps",
-        "Agent7": "the motion is left out: where it begins hangs on when it starts",
-    }.items():
-        assert any(line.startswith(f"street by rule: {name}: {words}") for line in said)
-    assert not any("Agent5" in line or "too early" in line for line in said)
+    assert f"moving: Agent2: {text} 2.8 m off" in said
+    assert f"moving: Agent3: {text} 1.4 m off" in said
+    assert "moving: Agent2: sets out from where it is with our ego; with others it jumps" in said
+    assert any(line.startswith("moving: Agent7: the motion is left out: where") for line in said)
+    assert not any("Agent10" in line or "too early" in line for line in said)
 
 
-def test_a_door_is_an_obstacle_that_moves() -> None:
-    slab = replace(vehicle("Agent2", 10.0, -2.0), type=AgentType.GENERIC_OBJECT)
-    path = PointPath(points_m=((10.0, -1.0),), keeps_heading=True)
-    door = replace(slab, motion=PlannedMotion(path=path, speeds=((0.0, 1.0),)))
-    given = cell(added=(door,))
-    played = Player(files(given)[0])
-    for now in (0.0, 0.5):
-        played.go_on(now, {})
-    assert played.centre("Agent2") == pytest.approx((10.0, -1.5))
-    assert any("players may leave obstacles standing" in line for line in lines(given))
+def test_an_ego_whose_axle_was_nearer_before_starts_a_motion_too_early_and_it_is_named() -> None:
+    # Its axle is 1.461 m behind: nearer to who waits at (-30, 4) before the ego turns round.
+    rows = [(0.0, 0.0, 0.0, 0.0)] * 10 + [(-0.8 * n, 0.0, math.pi, 8.0) for n in range(21)]
+    times_s = np.asarray(np.arange(31) * 0.1, dtype=np.float64)
+    turns = Recording(times_s=times_s, ego=np.array(rows))
+    motion = PlannedMotion(path=PointPath(points_m=((-30.0, 0.0),)), start=NearEgo(within_m=28.0))
+    waits = with_motion(pedestrian("Agent2", -30.0, 4.0), replace(motion, speeds=((0.0, 2.0),)))
+    given = cell(added=(waits,), recording=turns)
+    (walk,) = given.motion.others
+    assert walk.started_s == pytest.approx(1.3)
+    assert "street by rule: Agent2: sets out 1.3 s too early" in lines(given)
 
 
 class Player:

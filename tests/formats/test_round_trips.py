@@ -1,5 +1,6 @@
 """Scenes go out and come back the same, to 1 cm and 0.001 rad, or a line says what is not."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from augment.formats.reading import Reading
 from augment.formats.roads import RADIUS_M
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
+from augment.scene.codec import modification_from_document
 from augment.scene.entities import (
     AgentType,
     Lane,
@@ -28,7 +30,7 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import AnyLane
 from tests.fixtures.shelf import entry, whole_scene
-from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
 from tests.formats.round_trips import Change, changes
 from tests.scenes import vehicle
 
@@ -42,7 +44,7 @@ SAID: dict[str, dict[str, str]] = {
         "class": "NAME: a (cone|sign) becomes a constructionZone",
         "missing": "NAME: a barrier becomes a roadBoundary",
         "later": "NAME: is left out: it appears after t0",
-        "walk": "NAME: the walk is written as motion alone",
+        "walk": "NAME: the walk or motion is written as it goes",
         "area": "NAME: left out: a .* area is no lanelet",
         "turn": "NAME: (a U-turn becomes a turn to the left|its turn type is not said)",
         "way": "of lanes the edges alone go out",
@@ -50,7 +52,7 @@ SAID: dict[str, dict[str, str]] = {
     },
     "scenarionet": {
         "class": "NAME: a (BUS|CONSTRUCTION_SIGN) becomes a (VEHICLE|TRAFFIC_OBJECT)",
-        "walk": "NAME: the walk is written as motion alone",
+        "walk": "NAME: the walk or motion is written as it goes",
         "area": "NAME: left out: there is no type for a",
         "turn": "NAME: the turn type is not said",
         "light": "NAME: that it has no light is not said",
@@ -155,6 +157,7 @@ CAST = {
     "street": cell(stem="street"),
     "crossing": cell(crossing(), added=near(), stem="crossing"),
     "knot": cell(knot(), stem="knot", added=(vehicle("Agent9", 400.0, 0.0),)),
+    "moving": moving(),
     "recorded": cell(STREET, recording=RECORDING, keeps_traffic=True, added=(), stem="recorded"),
 }
 
@@ -228,12 +231,40 @@ def test_our_own_left_hand_traffic_comes_back_from_scenarionet(tmp_path: Path) -
     assert "made for a test" in reading.scene.provenance
 
 
-def test_our_own_json_keeps_density_and_goal(tmp_path: Path) -> None:
+def test_what_of_a_motion_is_lost_is_named() -> None:
+    said = {
+        "commonroad": {
+            "Agent2, Agent3: sets out at a fixed time, not when its trigger fires",
+            "Agent5: has a motion but never sets out: its trigger does not fire",
+            "Agent4: moves, so it becomes one of unknown type",
+            "Agent4: moves without turning; its speed is written as if along its heading",
+        },
+        "openscenario": {
+            "Agent5: has a motion but never sets out: its trigger does not fire",
+            "Agent4: moves, and players may leave obstacles standing",
+        },
+        "interplan": {
+            f"Agent{number} has a motion of its own, which interPlan and nuPlan don't know"
+            for number in (2, 3, 5, 6)
+        }
+        | {"Agent4 is left out: there is no key for a GENERIC_OBJECT there"},
+    }
+    for name, lines in said.items():
+        losses = writers.WRITERS[name]([moving()]).losses
+        assert lines <= {loss.text for loss in losses}, name
+        changed = {one.text for one in losses if one.changes_scene}
+        assert all(("motion" in line or "left out" in line) == (line in changed) for line in lines)
+
+
+def test_our_own_json_keeps_density_goal_and_motions(tmp_path: Path) -> None:
     options = SceneOptions(density=TrafficDensity.LOW, goal=TurnType.LEFT, goal_m=(20.0, 5.5))
-    given = cell(replace(crossing(), options=options), added=())
+    moves = moving()
+    given = replace(moves, scene=replace(moves.scene, options=options))
     for name, text in own_json.write([given]).files.items():
         (tmp_path / name).write_bytes(text)
     for name in ("before", "scene"):
         path = tmp_path / f"{given.stem}.{name}.json"
         read = READERS["json"].read(path, item=None, frame=0, name=given.scene.name)
         assert read.scene == (given.scene if name == "before" else given.after)
+    change = json.loads((tmp_path / f"{given.stem}.modification.json").read_text())
+    assert modification_from_document(change) == given.modification

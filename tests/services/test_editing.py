@@ -19,6 +19,7 @@ from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.intent import Intent
+from augment.scene.planned_motion import LanePath, PlannedMotion
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation, check_edit
 from augment.services.running import by_hand, runner
@@ -112,6 +113,9 @@ def test_a_drawn_reference_is_kept_drawn_and_told() -> None:
 def test_a_reference_that_can_not_be_is_refused_and_the_old_one_stays() -> None:
     here = add_scenario("street")
     before = here.reference
+    motion = PlannedMotion(path=LanePath(lane_ids=("Lane77",)))
+    with pytest.raises(InvalidModification, match="Added1: Lane77 is no lane of the scene"):
+        set_reference(here, document(replace(CAR, motion=motion)))
     with pytest.raises(InvalidModification, match="Agent7"):
         set_reference(here, document(moved=(vehicle("Agent7", 1.0, 1.0),)))
     with pytest.raises(InvalidDocument, match="modification"):

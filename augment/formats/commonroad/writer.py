@@ -17,7 +17,7 @@ from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import AgentType, Lane, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph
-from augment.scene.motion import Movement
+from augment.scene.motion import MotionSource, Movement
 
 VERSION: Final = "2020a"
 GOAL_RADIUS_M: Final = 2.0
@@ -231,7 +231,9 @@ def _intersections(scene: Scene, ids: Ids) -> Iterator[ET.Element]:
 def _is_static(movement: Movement) -> bool:
     """What never moves; people, buses and bicycles that stand keep their types as dynamic ones."""
     kind = movement.agent.type
-    return kind in _STATIC or (kind is AgentType.VEHICLE and movement.stands)
+    if kind in _STATIC:
+        return movement.source is not MotionSource.PLANNED
+    return kind is AgentType.VEHICLE and movement.stands
 
 
 def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
@@ -248,7 +250,9 @@ def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]
         parts = [
             _tag(
                 "type",
-                _STATIC.get(agent.type, "parkedVehicle") if is_static else _DYNAMIC[agent.type],
+                _STATIC.get(agent.type, "parkedVehicle")
+                if is_static
+                else _DYNAMIC.get(agent.type, "unknown"),
             ),
             _tag("shape", _tag("rectangle", *sizes)),
             _state("initialState", states[0], 0, has_speed=not is_static),
@@ -295,10 +299,12 @@ def _report(cell: Cell, report: LossReport) -> None:
     )
     report.lose("names become numbers; a comment in the file has both")
     report.lose_types(_BECOMES)
+    things = [one.agent for one in others if one.agent.type in _STATIC and not _is_static(one)]
+    report.lose_of([one.id for one in things], "moves, so it becomes one of unknown type")
+    names = [one.id for one in things if writing.keeps_heading(one)]
+    report.lose_of(names, "moves without turning; its speed is written as if along its heading")
     names = [one.agent.id for one in others if writing.has_gaps(one) and not _is_static(one)]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
-    names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
-    report.lose_of(names, "the walk is written as motion alone, not as its end point")
     connectors = scene.connectors
     turned = [one.id for one in connectors if one.turn_type is TurnType.U_TURN]
     report.lose_of(turned, "a U-turn becomes a turn to the left")

@@ -230,6 +230,8 @@ def _changes(agent: TrafficAgent, found: TrafficAgent) -> Iterator[tuple[str, bo
     turned_deg = math.degrees(abs(difference(agent.heading_rad, found.heading_rad)))
     if turned_deg > _SAME_WAY_DEG:
         yield f"looks {turned_deg:.3g} degrees away from where it looks there", False
+    if agent.motion is not None:
+        yield "has a motion of its own, which interPlan and nuPlan don't know", True
     if abs(agent.speed_mps - found.speed_mps) > _SAME_PACE_MPS:
         text = f"moves at {agent.speed_mps:g} m/s, there at {found.speed_mps:g} m/s"
         yield text, agent.walk_to_m is None

@@ -126,8 +126,6 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_types(_BECOMES)
     text = "left out: there is no type for a {} area"
     report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
-    names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
-    report.lose_of(names, "the walk is written as motion alone, not as its end point")
     odd = [one.id for one in connectors if one.turn_type is not turn_type_of(one.centerline)]
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
     dark = [one.id for one in connectors if one.traffic_light is TrafficLight.NONE]
@@ -146,6 +144,9 @@ def _track(movement: Movement) -> dict[str, Any]:
     steps = len(states)
     z = np.zeros((steps, 1))
     way = np.column_stack([np.cos(states[:, 2]), np.sin(states[:, 2])])
+    if writing.keeps_heading(agent):
+        steps_m = np.gradient(states[:, :2], axis=0)
+        way = steps_m / np.maximum(np.hypot(*steps_m.T), 1e-9)[:, None]
     height_m = _HEIGHTS_M.get(agent.type, _HEIGHT_M)
     return {
         "type": _TYPES[agent.type],

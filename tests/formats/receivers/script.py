@@ -80,6 +80,7 @@ def read_commonroad(file: str) -> dict[str, Any]:
         "dynamic": [
             _obstacle(one)
             | {"last": one.prediction.final_time_step, "velocity": one.initial_state.velocity}
+            | {"states": [_row(state) for state in one.prediction.trajectory.state_list]}
             for one in scenario.dynamic_obstacles
         ],
         "starts": [
@@ -96,6 +97,10 @@ def _obstacle(one: Any) -> dict[str, Any]:
         "orientation": one.initial_state.orientation,
         "size": [one.obstacle_shape.length, one.obstacle_shape.width],
     }
+
+
+def _row(state: Any) -> list[float]:
+    return [state.time_step, *state.position.tolist(), state.orientation, state.velocity]
 
 
 if __name__ == "__main__":
