@@ -16,7 +16,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import Field, TypeAdapter
 
 from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Day, Split, Stratum
-from augment.errors import InvalidDocument
+from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.documents import read_json
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell
@@ -29,6 +29,7 @@ from augment.scene.codec import (
     scene_to_document,
 )
 from augment.scene.entities import Modification, ScenarioType
+from augment.scene.planned_mover import check_motions
 from augment.scene.schema import CLOSED, Codec, Text, Whole, Yes, path
 
 Read = TypeVar("Read")
@@ -186,6 +187,10 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         documents[kind] = _read(folder, name, _PARSERS[kind])
     if documents[SCENE].provenance != line.provenance:
         raise InvalidDocument(WHAT, [(f"{at}: provenance", "is not that of its scene")])
+    try:
+        check_motions(documents[SCENE], documents.get(REFERENCE, Modification()))
+    except InvalidModification as fault:
+        raise InvalidDocument(WHAT, [(f"{at}: reference", str(fault))]) from None
     return BenchmarkTask(
         scene=documents[SCENE],
         recording=documents.get(RECORDING),

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from augment.errors import InvalidDocument
+from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
 from augment.scene import entities
@@ -147,12 +147,12 @@ def check_finite(cell: Cell) -> None:
     """Do nothing where every number of a cell can be written.
 
     Raises:
-        CannotExpress: The scene after the change, or where somebody is at a step, is no finite
-            number; or the ego is missing at a step.
+        CannotExpress: The change does not fit; the scene after it, or where somebody is at a
+            step, is no finite number; or the ego is missing at a step.
     """
     try:
         scene_to_document(cell.after)
-    except InvalidDocument as error:
+    except (InvalidDocument, InvalidModification) as error:
         raise CannotExpress(str(error)) from error
     for movement in (cell.motion.ego, *cell.motion.others):
         is_ego = movement is cell.motion.ego

@@ -167,7 +167,7 @@ BROKEN: dict[str, tuple[Break, str]] = {
     ),
     "reference": (
         edit("references/near.json", "remove", to=["Agent9"]),
-        "benchmark.json: checksum",
+        "tasks 'near': reference: Agent9 is not in the scene",
     ),
     "link": (link, "scenes/near.json: is missing, or is a link"),
     "link to a folder": (link_folder, "scenes/near.json: is missing, or is a link"),
