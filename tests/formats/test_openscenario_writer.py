@@ -179,11 +179,17 @@ def scene_of_motions() -> Cell:
         speeds=((0.0, 2.0),),
         start=AtPlace(x_m=40.0, y_m=0.0, within_m=3.0),
     )
+    turns_out = PlannedMotion(
+        path=PointPath(points_m=((100.0, 3.5),)),
+        speeds=((2.0, 5.0),),
+        start=NearEgo(within_m=25.0),
+    )
     brakes = PlannedMotion(speeds=((2.0, 0.0),), start=AtTime(after_s=1.05))
     more = (
         with_motion(vehicle("Agent7", 385.0, 0.0), leaves, speed_mps=9.0, lane_id="Lane1"),
         with_motion(vehicle("Agent8", 399.5, 3.5), late, speed_mps=9.0, lane_id="Lane2"),
         with_motion(pedestrian("Agent9", 64.0, -5.0), steps),
+        with_motion(vehicle("Agent11", 90.0, -4.0, 2.0), turns_out),
         with_motion(vehicle("Agent10", -20.0, 3.5), brakes, speed_mps=10.0, lane_id="Lane2"),
     )
     given = moving()

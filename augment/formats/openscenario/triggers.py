@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import SETS_OUT_WITHIN_M, Movement, motion_of, walking_pace_mps
+from augment.scene.motion import SETS_OUT_WITHIN_M, motion_of, walking_pace_mps
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion, PointPath
 from augment.scene.planned_mover import PlannedMover
 
@@ -100,14 +100,12 @@ def written_distance(
     waits_for_ego = isinstance(start, NearEgo)
     watched = moves[EGO_ID if isinstance(start, NearEgo) else start.agent_id]
     back_m = ahead_m(watched.agent)
-    centres, axles = watched.states[:, :2], _behind(watched, back_m)
+    centres, axles = watched.states[:, :2], _behind(watched.states, back_m)
     if isinstance(start, NearEgo):
-        own = moves[agent.id]
-        off_m, goals, marks = (
-            back_m + ahead_m(agent),
-            own.states[:, :2],
-            _behind(own, ahead_m(agent)),
-        )
+        # Once it starts it looks along its path, so what counts is how it stood before.
+        own = held_states(cell, agent)
+        goals, marks = own[:, :2], _behind(own, ahead_m(agent))
+        off_m = back_m + ahead_m(agent)
     else:
         goals = marks = np.tile((start.x_m, start.y_m), (len(centres), 1))
         off_m = back_m
@@ -136,8 +134,7 @@ def written_distance(
 # Private
 
 
-def _behind(movement: Movement, back_m: float) -> FloatArray:
+def _behind(states: FloatArray, back_m: float) -> FloatArray:
     """Points of reference (T, 2): so far behind the centres."""
-    heading_rad = movement.states[:, 2]
-    back = back_m * np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
-    return np.asarray(movement.states[:, :2] - back)
+    back = back_m * np.column_stack([np.cos(states[:, 2]), np.sin(states[:, 2])])
+    return np.asarray(states[:, :2] - back)
