@@ -63,15 +63,15 @@ def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
     with house_style():
         figure = Figure(figsize=(6.8, 3.4), layout="constrained")
         axes = figure.add_subplot()
+        for good, bad in result.edges:
+            axes.axvspan(min(good, bad), max(good, bad), color=MARK, alpha=0.15, linewidth=0)
+        if result.hardest is not None:
+            axes.axvline(result.hardest.value, color=_KEPT, label="hardest solved")
         tested = driver_of(result.sweep)
         others = [driver for driver in result.drivers if driver != tested]
         for driver, stroke in zip(others, ("--", ":", "-."), strict=False):
             _draw_curve(axes, result, driver, SOFT, stroke)
         _draw_curve(axes, result, tested, MARK, "-")
-        for good, bad in result.edges:
-            axes.axvspan(min(good, bad), max(good, bad), color=MARK, alpha=0.15, linewidth=0)
-        if result.hardest is not None:
-            axes.axvline(result.hardest.value, color=_KEPT, label="hardest solved")
         axes.grid()
         axes.set_ylim(-4.0, 104.0)
         axes.set_xlabel(result.sweep.number)

@@ -50,13 +50,7 @@ class FamilyForm(forms.Form):
     count = forms.IntegerField(
         label="Scenarios", min_value=1, max_value=LARGEST_FAMILY, initial=10
     )
-    seed = forms.IntegerField(
-        label="Seed",
-        min_value=0,
-        max_value=2**31 - 1,
-        initial=0,
-        help_text="Same seed, same draws.",
-    )
+    seed = forms.IntegerField(label="Seed", min_value=0, max_value=2**31 - 1, initial=0)
 
 
 @page_for(*STAFF)

@@ -37,7 +37,7 @@ class SweepRequest:
     low: float = input_field(InputKind.NUMBER, "From", **_FURTHEST)
     high: float = input_field(InputKind.NUMBER, "To", **_FURTHEST)
     count: int = input_field(
-        InputKind.WHOLE, "Values", "Evenly spaced.", default=11, least=2, most=MOST_VALUES
+        InputKind.WHOLE, "Values, evenly spaced", default=11, least=2, most=MOST_VALUES
     )
     planner: str = input_field(InputKind.TEXT, "Planner under test", default=PDM_CLOSED, most=120)
     offsets: str = input_field(
