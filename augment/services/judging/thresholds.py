@@ -105,13 +105,13 @@ def driver_of(drive: Simulation | Sweep) -> str:
 @transaction.atomic
 def conclude(sweep_pk: int) -> None:
     """Keep the hardest value of a sweep whose drives all have outcomes; once."""
+    if Simulation.objects.filter(swept__sweep=sweep_pk, state__in=Simulation.UNDER_WAY).exists():
+        return
     rows = Sweep.objects.select_for_update(of=("self",), no_key=True)
     sweep = rows.filter(pk=sweep_pk, concluded_at=None).first()
     if sweep is None:
         return
     result = result_of(sweep)
-    if result.under_way:
-        return
     if result.hardest is not None:
         row = next(line.row for line in result.lines if line.tried is result.hardest)
         sweep.hardest = _keep(sweep, row)
