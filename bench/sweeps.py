@@ -46,10 +46,8 @@ def plan(count: int) -> None:
     from tests.scenes import scene, vehicle
 
     street = scene()
-    ends = {
-        "Lane1": [(-50.0, 0.0), (STREET_END_M, 0.0)],
-        "Lane2": [(STREET_END_M, 3.5), (-50.0, 3.5)],
-    }
+    end_m = STREET_END_M
+    ends = {"Lane1": [(-50.0, 0.0), (end_m, 0.0)], "Lane2": [(end_m, 3.5), (-50.0, 3.5)]}
     lanes = tuple(replace(lane, centerline=Polyline(ends[lane.id])) for lane in street.lanes)
     document = modification_to_document(Modification(added=(vehicle("Agent2", 10.0, 3.5),)))
     scenario = add_scenario("street", scene=replace(street, lanes=lanes), reference=document)
