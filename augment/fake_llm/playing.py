@@ -32,7 +32,7 @@ from augment.variants.respondents import ModelRole
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
 
 _MOST_CALLS = 8
-_FAR_M = 3.0
+_FAR_M, _BESIDE_M = 3.0, 1.0
 _TURNED_RAD = math.radians(20.0)
 _VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 _RATINGS = ("compliance", "realism", "logical_consistency")
@@ -133,7 +133,7 @@ def problems_of(task: Task) -> list[Problem]:
         right.remove(meant)
         problem = _difference(agent, meant)
         if problem is None and some_move:
-            problem = _motion_difference(agent, meant, ways[agent.id] - right_ways[meant.id])
+            problem = _motion_difference(agent, meant, ways[agent.id], right_ways[meant.id])
         if problem is not None:
             problems.append(problem)
     return problems
@@ -230,11 +230,12 @@ def _ways(scene: Scene, agents: Sequence[TrafficAgent]) -> dict[str, FloatArray]
 
 
 def _motion_difference(
-    agent: TrafficAgent, meant: TrafficAgent, apart_m: FloatArray
+    agent: TrafficAgent, meant: TrafficAgent, way_m: FloatArray, right_m: FloatArray
 ) -> Problem | None:
-    """Compare where they get to, but for where they begin; either may leave the map."""
-    gap_m = float(np.nanmax(np.hypot(*(apart_m - apart_m[0]).T)))
-    if gap_m <= _FAR_M:
+    """Compare where they get to from where they begin; either may leave the map."""
+    gone_m, right_gone_m = way_m - way_m[0], right_m - right_m[0]
+    gap_m = float(np.nanmax(np.hypot(*(gone_m - right_gone_m).T)))
+    if gap_m <= min(_FAR_M, 0.5 * float(np.nanmax(np.hypot(*right_gone_m.T)))):
         return None
     motion = json.dumps(motion_parts(meant.motion)) if meant.motion else "none"
     said = f"{agent.id} gets up to {gap_m:.0f} m away from where it is to be at that moment."
@@ -264,7 +265,7 @@ def _call(heard: Heard, wanted: Sequence[dict[str, object]]) -> Answer:
 def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, object]]:
     """Return the arguments of a call for each of the first added agents, in their order.
 
-    None where one stands on no lane that the prompt shows.
+    None where one stands beside no part of a lane that the prompt shows.
     """
     graph = LaneGraph(scene)
     shown = lane_curves(scene, short_names(scene), DEFAULT_RADIUS_M)
@@ -274,6 +275,8 @@ def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, objec
         if nearest is None or nearest[0] not in shown:
             return []
         at = shown[nearest[0]].project(agent.x_m, agent.y_m)
+        if at.beyond_m > _BESIDE_M:
+            return []
         place = {"lane": nearest[0], "start": "lane", "distance_m": round(at.s_m, 3)}
         lateral_m = round(max(-30.0, min(30.0, at.d_m)), 3)
         wanted.append(place | {"lateral_m": lateral_m, "object": agent.type.value})

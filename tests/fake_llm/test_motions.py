@@ -1,0 +1,115 @@
+"""The stand-ins asked for motions over the wire, through every kind of recipe."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from augment.baselines.rule_placer import place
+from augment.checks import Ground
+from augment.fake_llm.careless import MOTION_MISTAKES
+from augment.fake_llm.playing import problems_of
+from augment.fake_llm.server import FakeServer, running
+from augment.fake_llm.sight import Task
+from augment.llm.client import Patience
+from augment.llm.openai_wire import OpenAIWire
+from augment.prompts.vectors import changes_text
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.intent import Intent
+from augment.variants.pipeline import Outcome, run
+from augment.variants.recipes import find_recipe
+from augment.variants.respondents import ModelRole, RespondentClient
+from tests.checks.test_asked_motions import WISHES
+from tests.variants.memory import MemoryTranscript
+
+
+def known(instruction: str) -> list[tuple[Scene, Intent]]:
+    return [WISHES[instruction]] if instruction in WISHES else []
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[FakeServer]:
+    with running(known=known) as serving:
+        yield serving
+
+
+def asked(server: FakeServer, name: str, variant: str, *, native: bool = False) -> Outcome:
+    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=60.0) as client:
+        good = RespondentClient(client=client, model="fake-good", native_tools=native)
+        return run(
+            find_recipe(variant),
+            scene=WISHES[name][0],
+            instruction=name,
+            modifier=good,
+            transcript=MemoryTranscript(),
+            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
+            others={ModelRole.REVIEWER: good},
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "variant", "native"),
+    [
+        *((name, "otm", False) for name in WISHES),
+        *((name, "fc", False) for name in WISHES),
+        ("cut_in", "fc", True),
+    ],
+)
+def test_a_good_stand_in_answers_what_is_asked_of_a_motion(
+    server: FakeServer, name: str, variant: str, native: bool
+) -> None:
+    scene, intent = WISHES[name]
+    made = asked(server, name, variant, native=native)
+    right = place(scene, intent).modification
+    assert made.modification is not None
+    assert apart_m(scene, made.modification, right) < 0.5
+
+
+def apart_m(scene: Scene, one: Modification, other: Modification) -> float:
+    """How far the changed agents of two changes are from each other, at most, over 6 s."""
+    ways = [
+        [move.states[:60, :2] for move in Ground.of(scene).motion_after(change).others]
+        for change in (one, other)
+    ]
+    return max(float(abs(a - b).max()) for a, b in zip(*ways, strict=True))
+
+
+@pytest.mark.parametrize("name", WISHES)
+def test_a_good_reviewer_accepts_what_is_asked(server: FakeServer, name: str) -> None:
+    assert asked(server, name, "tqa").is_accepted
+
+
+@pytest.mark.parametrize(
+    ("name", "mistake"),
+    [
+        *(("cut_in", one) for one in MOTION_MISTAKES if one != "wrong-deceleration"),
+        ("door_opening", "late-start"),
+        ("hard_braking", "wrong-deceleration"),
+        ("pull_out", "wrong-speed"),
+        ("late_pedestrian", "wrong-way"),
+    ],
+)
+def test_a_good_reviewer_finds_a_mistake_in_a_motion(name: str, mistake: str) -> None:
+    scene, intent = WISHES[name]
+    right, route = place(scene, intent).modification, EgoRoute.of(scene)
+    (agent,) = right.changed
+    assert agent.motion is not None
+    assert route is not None
+    bent = replace(
+        agent, motion=MOTION_MISTAKES[mistake](agent, agent.motion, route, random.Random(2))
+    )
+    told = [
+        [problem["problem"].split()[0] for problem in problems_of(task(change, scene, intent))]
+        for change in (right, with_one(right, bent))
+    ]
+    assert told == [[], [agent.id]]
+
+
+def task(change: Modification, scene: Scene, intent: Intent) -> Task:
+    return Task(prompt=f"\n{changes_text(scene, change)}", scene=scene, intent=intent)
+
+
+def with_one(change: Modification, agent: TrafficAgent) -> Modification:
+    return replace(change, added=(agent,)) if change.added else replace(change, moved=(agent,))
