@@ -29,6 +29,7 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.lane_graph import AnyLane
+from augment.scene.planned_motion import PlannedMotion
 from tests.fixtures.shelf import entry, whole_scene
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
 from tests.formats.round_trips import Change, changes
@@ -254,6 +255,17 @@ def test_what_of_a_motion_is_lost_is_named() -> None:
         assert lines <= {loss.text for loss in losses}, name
         changed = {one.text for one in losses if one.changes_scene}
         assert all(("motion" in line or "left out" in line) == (line in changed) for line in lines)
+
+
+def test_a_recorded_agent_that_is_given_a_motion_is_lost_in_interplan_by_name() -> None:
+    (ahead,) = STREET.agents
+    brakes = replace(ahead, motion=PlannedMotion(speeds=((1.0, 0.0),)))
+    given = cell(STREET, recording=RECORDING, modification=Modification(moved=(brakes,)))
+    (loss,) = writers.WRITERS["interplan"]([given]).losses
+    assert (loss.text, loss.changes_scene) == (
+        "Agent2 is given a motion; interPlan can only add",
+        True,
+    )
 
 
 def test_our_own_json_keeps_density_goal_and_motions(tmp_path: Path) -> None:

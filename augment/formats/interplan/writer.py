@@ -157,7 +157,8 @@ class _Entry:
                 "agents), is gone: interPlan removes all of it from every special scenario"
             )
         for agent in change.moved:
-            self._lose(f"{agent.id} is moved; interPlan can only add")
+            deed = "is moved" if agent.motion is None else "is given a motion"
+            self._lose(f"{agent.id} {deed}; interPlan can only add")
         for name in change.removed:
             self._lose(f"{name} is removed; interPlan removes all recorded traffic")
         for agent in by_key.pop("", ()):
