@@ -189,7 +189,11 @@ class TypeRating:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisplacementSummary:
-    """How far a contestant's shown augmentations are from the references, over `n` objects."""
+    """How far a contestant's shown augmentations are from the references, over `n` objects.
+
+    Attributes:
+        average_m, final_m: Means over time of objects of changes that move; None without any.
+    """
 
     slug: str
     median_m: float | None
@@ -198,6 +202,8 @@ class DisplacementSummary:
     missing: int
     surplus: int
     augmentations: int
+    average_m: float | None = field(default=None, metadata=_SINCE_5)
+    final_m: float | None = field(default=None, metadata=_SINCE_5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from augment.benchmark.values import EntryStatus, SubmissionCard, SubmissionReport, SubmittedEntry
-from augment.metrics.displacement import Displacement, Summary, summarise
+from augment.metrics.displacement import HORIZON_S, Displacement, OverTime, Summary, summarise
 from augment.scene.schema import Codec
 
 CARD = Codec("submission card", TypeAdapter(SubmissionCard))
@@ -56,7 +56,7 @@ def describe_report(report: SubmissionReport) -> Iterator[str]:
         mean = "nothing matched" if practice.box is None else f"mean {practice.box.mean_m!r} m"
         yield (
             f"Displacement on practice: {mean}, {practice.n} matched, {practice.missing} missing, "
-            f"{practice.surplus} surplus"
+            f"{practice.surplus} surplus" + _describe_over_time(practice.over_time)
         )
     yield from report.remarks
 
@@ -72,4 +72,11 @@ def _describe_displacement(found: Displacement | None) -> str:
     if found is None:
         return ""
     mean = "" if found.mean_m is None else f"{found.mean_m!r} m, "
-    return f"{mean}{len(found.missing)} missing, {len(found.surplus)} surplus"
+    counts = f"{mean}{len(found.missing)} missing, {len(found.surplus)} surplus"
+    return counts + _describe_over_time(found.over_time)
+
+
+def _describe_over_time(found: OverTime | None) -> str:
+    if found is None:
+        return ""
+    return f"; over {HORIZON_S:g} s {found.average_m!r} m, at its end {found.final_m!r} m"

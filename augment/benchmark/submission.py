@@ -27,6 +27,7 @@ from augment.benchmark.values import (
     SubmissionReport,
     SubmittedEntry,
 )
+from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats import lctgen, sandbox
 from augment.formats.documents import parse_json
@@ -34,6 +35,7 @@ from augment.formats.reading import place_on_lanes
 from augment.metrics.displacement import displacement
 from augment.scene.codec import SCENE
 from augment.scene.entities import Modification, apply
+from augment.scene.planned_mover import check_motions
 
 MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
@@ -167,7 +169,9 @@ class _Checker:
         entry = self._read(task, sample, files)
         if task.split is not Split.PRACTICE or task.reference is None:
             return entry
-        return replace(entry, displacement=displacement(entry.modification, task.reference))
+        ground = Ground.of(task.scene, lambda: task.replayed)
+        found = displacement(entry.modification, task.reference, ground)
+        return replace(entry, displacement=found)
 
     def _read(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
         entry = SubmittedEntry(
@@ -182,6 +186,7 @@ class _Checker:
             return replace(entry, reason=content.problem)
         try:
             modification, notes = self._change(task, content)
+            check_motions(task.scene, modification)
             if problems := list(SCENE.problems(apply(task.scene, modification))):
                 raise InvalidDocument("modification", problems)
         except InvalidModification as fault:

@@ -1,6 +1,6 @@
 """What a benchmark set and a submission are, as values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from enum import StrEnum
 from typing import Annotated
@@ -57,6 +57,13 @@ class BenchmarkTask:
     keeps_traffic: bool = True
     paraphrase_of: str = ""
     reference: Modification | None = None
+
+    @property
+    def replayed(self) -> Recording | None:
+        """What was recorded, of the ego alone where the recorded traffic does not stay."""
+        if self.recording is None or self.keeps_traffic:
+            return self.recording
+        return replace(self.recording, tracks=())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

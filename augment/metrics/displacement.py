@@ -3,16 +3,21 @@
 Each added or moved object is matched to one of the reference within its class, so that the sum of
 the distances is smallest (the Hungarian algorithm). What is left over is counted, never measured.
 Removed agents have no place and take no part. Any frame, the same for both sides.
+Where a change lets somebody move, the distance of each matched pair is followed as well.
 Notation: R objects of the reference, G generated ones.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import chain
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from augment.checks import Ground
 from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, Modification, TrafficAgent
 
@@ -42,19 +47,36 @@ MISS_M = 10.0
 """What a missing or surplus object counts where one number says how far off a change is, and a
 matched one at most: about a junction's width, beyond which it stands somewhere else."""
 
+HORIZON_S = 6.0
+"""So far after t0 motions are compared, as long as a ballot shows them."""
+
+_IfMoving = Annotated[float | None, Field(exclude_if=lambda value: value is None)]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Match:
     """A generated object and the one of the reference that it stands for.
 
     Attributes:
-        distance_m: Between the centres.
+        distance_m: Between the centres at t0.
+        average_m, final_m: Over the steps of `HORIZON_S`, and at the last one at which both are
+            there; None where nothing moves in either change. Who has no motion on either side
+            keeps its distance.
+        start_s: How much later its motion begins than the reference's, None unless both do.
     """
 
     reference: str
     generated: str
     object_class: ObjectClass
     distance_m: float
+    average_m: _IfMoving = None
+    final_m: _IfMoving = None
+    start_s: _IfMoving = None
+
+    @property
+    def error_m(self) -> float:
+        """The distance, over time where something moves."""
+        return self.distance_m if self.average_m is None else self.average_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,28 +95,78 @@ class Displacement:
 
     @property
     def distances_m(self) -> tuple[float, ...]:
-        """The error of every matched object."""
+        """The error of every matched object at t0."""
         return tuple(match.distance_m for match in self.matches)
 
     @property
+    def errors_m(self) -> tuple[float, ...]:
+        """The error of every matched object, over time where something moves."""
+        return tuple(match.error_m for match in self.matches)
+
+    @property
     def mean_m(self) -> float | None:
-        """The mean error, None where nothing is matched."""
+        """The mean error at t0, None where nothing is matched."""
         return float(np.mean(self.distances_m)) if self.matches else None
 
     @property
+    def over_time(self) -> "OverTime | None":
+        """The means over time, None where nothing moves or is matched."""
+        return mean_over_time([self])
+
+    @property
     def error_m(self) -> float:
-        """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any."""
-        errors_m = [min(distance, MISS_M) for distance in self.distances_m]
+        """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any.
+
+        Of a matched one it is the error over time where something moves.
+        """
+        errors_m = [min(error, MISS_M) for error in self.errors_m]
         errors_m += [MISS_M] * (len(self.missing) + len(self.surplus))
         return float(np.mean(errors_m)) if errors_m else 0.0
 
 
-def displacement(generated: Modification | None, reference: Modification) -> Displacement:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OverTime:
+    """Matched objects of changes in which something moves.
+
+    Attributes:
+        n: How many.
+        average_m, final_m: Means over them of what `Match` has.
+        start_s: The mean absolute difference between the starts, None without two to compare.
+    """
+
+    n: int
+    average_m: float
+    final_m: float
+    start_s: float | None
+
+
+def mean_over_time(displacements: Sequence[Displacement]) -> OverTime | None:
+    """Return the means over all matched objects of changes that move, None without any."""
+    matches = chain.from_iterable(one.matches for one in displacements)
+    moving = [one for one in matches if one.average_m is not None]
+    starts_s = [abs(one.start_s) for one in moving if one.start_s is not None]
+    if not moving:
+        return None
+    return OverTime(
+        n=len(moving),
+        average_m=float(np.mean([one.average_m for one in moving])),
+        final_m=float(np.mean([one.final_m for one in moving])),
+        start_s=float(np.mean(starts_s)) if starts_s else None,
+    )
+
+
+def displacement(
+    generated: Modification | None, reference: Modification, ground: Ground | None = None
+) -> Displacement:
     """What a modification places against what the reference places.
 
     Args:
         generated: None for an answer that was unreadable or refused: all is missing.
         reference: In the same frame.
+        ground: Of the scene before the change; without it nothing is followed over time.
+
+    Raises:
+        InvalidModification: A change that is to be followed does not fit the scene.
     """
     placed = () if generated is None else generated.changed
     matches: list[Match] = []
@@ -105,6 +177,9 @@ def displacement(generated: Modification | None, reference: Modification) -> Dis
         )
         if wanted and agents:
             matches += _matched(wanted, agents, object_class)
+    moves = reference.has_motion or (generated is not None and generated.has_motion)
+    if moves and matches and generated is not None and ground is not None:
+        matches = _followed(matches, generated, reference, ground)
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
     return Displacement(
@@ -135,6 +210,29 @@ def _matched(
     ]
 
 
+def _followed(
+    matches: Sequence[Match], generated: Modification, reference: Modification, ground: Ground
+) -> list[Match]:
+    """The matches with their distances over time."""
+    motions = [ground.motion_after(change, of_all=False) for change in (reference, generated)]
+    compared = motions[0].times_s <= HORIZON_S + 1e-9
+    wanted, found = ({one.agent.id: one for one in motion.others} for motion in motions)
+    followed = []
+    for match in matches:
+        one, other = wanted[match.reference], found[match.generated]
+        if one.agent.motion is None and other.agent.motion is None:
+            average_m = final_m = match.distance_m
+        else:
+            apart_m = np.hypot(*(one.states[compared, :2] - other.states[compared, :2]).T)
+            apart_m = apart_m[~np.isnan(apart_m)]
+            average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
+        start_s = None
+        if one.started_s is not None and other.started_s is not None:
+            start_s = other.started_s - one.started_s
+        followed.append(replace(match, average_m=average_m, final_m=final_m, start_s=start_s))
+    return followed
+
+
 WHISKER = 1.5
 """Whiskers end at the last value within so many interquartile ranges of the box (Tukey)."""
 
@@ -161,7 +259,8 @@ class Summary:
         n: Matched objects, each with its own distance.
         missing: Objects of the references that nothing stands for.
         surplus: Generated objects that stand for nothing.
-        box: None where nothing is matched.
+        box: Of the distances at t0; None where nothing is matched.
+        over_time: None where nothing moves.
     """
 
     augmentations: int
@@ -169,6 +268,7 @@ class Summary:
     missing: int
     surplus: int
     box: BoxSummary | None
+    over_time: OverTime | None
 
 
 def summarise(displacements: Sequence[Displacement]) -> Summary:
@@ -180,6 +280,7 @@ def summarise(displacements: Sequence[Displacement]) -> Summary:
         missing=sum(len(displacement.missing) for displacement in displacements),
         surplus=sum(len(displacement.surplus) for displacement in displacements),
         box=box_of(distances_m) if distances_m else None,
+        over_time=mean_over_time(displacements),
     )
 
 
@@ -215,8 +316,8 @@ _ALIKE_M, _ALIKE_RAD = 0.15, math.radians(2.0)
 def are_alike(one: Modification, other: Modification) -> bool:
     """Return whether every object of either change has a counterpart that looks the same.
 
-    Place, size, end of a walk and motion in a second are held against the distance. What is
-    moved and what is removed must be the same.
+    Place, size, end of a walk and way in a second are held against the distance. What is moved,
+    what is removed and motions of one's own must be the same.
     """
     moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
     return (
@@ -241,6 +342,8 @@ def _all_matched(one: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> 
 def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     """Return whether two objects look the same, whatever their ids."""
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
+        return False
+    if one.motion != other.motion:
         return False
     gaps_m = [
         math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),

@@ -46,6 +46,7 @@ def report() -> SubmissionReport:
 def test_a_report_comes_back_from_json_to_the_last_digit() -> None:
     text = json.dumps(report_to_document(report()))
     assert report_from_document(json.loads(text)) == report()
+    assert "average_m" not in text
     lines = list(describe_report(report()))
     assert lines[0] == "near    read        near.json  2.0275875100994067 m, 0 missing, 0 surplus"
     assert lines[1] == "far--2  missing     no file"

@@ -5,13 +5,22 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 
-from arena.jobs.exports.displacement import FORMATS, DisplacementTable, displacement_table
+from arena.jobs.exports.displacement import (
+    FORMATS,
+    DisplacementTable,
+    displacement_table,
+    object_sheet,
+)
+from arena.jobs.exports.tables import JOB_TABLES, augmentation_sheet
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType
+from augment.scene.planned_motion import AtTime
 from augment.services.judging.displacement import By
 from augment.services.scenarios.pictures import store
 from tests.jobs import rows
+from tests.metrics.test_over_time import starts
+from tests.scene.test_planned_motion import two_lanes
 from tests.scenes import cone
 from tests.web.cast import png
 
@@ -105,6 +114,42 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     first, again = (write(displacement_table(job, by=By.VARIANT)) for _ in range(2))
     assert first == again
     assert b"2026" not in first[:400]
+
+
+def test_columns_over_time_appear_where_something_moves() -> None:
+    still, table = a_job(), JOB_TABLES["displacement-by-contestant"]
+    names = [*object_sheet(still).columns, *augmentation_sheet(still).columns]
+    assert not {"average_m", "displacement_average_m"} & set(names)
+    assert b"average_m" not in table.formats["csv"].write(table.make(still))
+    place = rows.add_scenario(
+        "cut",
+        scene=two_lanes(),
+        reference=modification_to_document(starts(AtTime(after_s=2.0))),
+        intent=None,
+        intent_origin="",
+    )
+    Augmentation.objects.create(
+        job=still,
+        scenario=place,
+        contestant=rows.add_kind("bea", Contestant.Kind.RULE),
+        state="done",
+        modification=modification_to_document(starts(AtTime(after_s=3.0))),
+        image=store(png()),
+    )
+    average = "2.910"  # 177.5 / 61
+    lines = list(
+        csv.DictReader(io.StringIO(table.formats["csv"].write(table.make(still)).decode()))
+    )
+    shown = {line["contestant"]: line["average_m"] for line in lines}
+    assert shown == {"ann": "", "bea": average, "sim (simulated)": ""}
+    for make, name in (
+        (object_sheet, "average_m"),
+        (augmentation_sheet, "displacement_average_m"),
+    ):
+        sheet = make(still)
+        column = list(sheet.columns).index(name)
+        cells = [row[column] for row in sheet.rows]
+        assert [cell for cell in cells if cell is not None] == [pytest.approx(2.91, abs=1e-3)]
 
 
 # The sheet of samples

@@ -1,13 +1,19 @@
 """Displacement of stored rows; the street's reference has cones at (20, 0.5) and (25, -0.5)."""
 
 import pytest
+from pytest_django import DjangoAssertNumQueries
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.scene.codec import modification_to_document
+from augment.scene.codec import modification_to_document, recording_to_document
 from augment.scene.entities import Modification
+from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, Trigger
+from augment.services.judging.analyses import augmentation_lines
 from augment.services.judging.displacement import By, Group, Unmeasured, groups, of_job
+from augment.services.judging.metric_scores import metric_scores
 from tests.jobs import rows
-from tests.scenes import cone
+from tests.metrics.test_over_time import recorded_at, starts
+from tests.scene.test_planned_motion import two_lanes, with_motion
+from tests.scenes import cone, vehicle
 
 pytestmark = pytest.mark.django_db
 
@@ -68,3 +74,46 @@ def test_what_cannot_be_measured_says_why_and_counts_nowhere() -> None:
         "odd": Unmeasured.UNREADABLE_ROW,
     }
     assert groups(found, by=By.TYPE) == []
+
+
+def moving(slug: str) -> Scenario:
+    """A car starts 15 m before a recorded ego at 4 m/s: after 3.9 s, were it 8 m/s after 2.0 s."""
+    reference = modification_to_document(starts(NearEgo(within_m=15.0)))
+    row = rows.add_scenario(
+        slug, scene=two_lanes(), reference=reference, intent=None, intent_origin=""
+    )
+    row.base_scene.recording = recording_to_document(recorded_at(4.0))
+    row.base_scene.save()
+    return row
+
+
+def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    job, one, still = a_job(), moving("one"), rows.add_scenario("still")
+    begins: dict[str, Trigger] = {"ann": AtTime(after_s=3.9), "bea": NearEgo(within_m=3.0)}
+    for slug, start in begins.items():
+        ended(job, one, rows.add_kind(slug, Contestant.Kind.RULE), change=starts(start))
+        ended(job, still, rows.add_kind(f"{slug}-2"))
+    with django_assert_num_queries(2):
+        found = of_job(job)
+    over_time = [line.displacement.over_time for line in found if line.displacement is not None]
+    assert over_time[0] is not None
+    assert over_time[1] is not None
+    assert over_time[0].average_m == pytest.approx(0.0)
+    # 5 (t - 3.9) from 3.9 s on.
+    assert over_time[1].average_m == pytest.approx(0.5 * sum(range(22)) / 61)
+    assert over_time[2:] == [None, None]
+    scores = metric_scores([row.row.pk for row in found])[0].by_code
+    assert scores[str(found[1].row.code)] == pytest.approx(-over_time[1].average_m)
+    lines = {line.row.pk: line for line in augmentation_lines(job)}
+    assert lines[found[1].row.pk].doubtful == 1  # its motion never begins
+
+
+def test_a_motion_that_its_scene_cannot_carry_is_not_measured() -> None:
+    job, one = a_job(), moving("one")
+    odd = with_motion(
+        vehicle("Agent2", 30.0, 3.5), PlannedMotion(path=LanePath(lane_ids=("Lane9",)))
+    )
+    ended(job, one, rows.add_kind("ann"), change=Modification(added=(odd,)))
+    assert [found.why_not for found in of_job(job)] == [Unmeasured.UNFIT_MOTION]

@@ -20,6 +20,7 @@ from arena.results.exports.drawing import MARK, house_style, name_lines, write_f
 from arena.results.exports.tables import shown_name
 from augment.models import Contestant, GenerationJob
 from augment.services.judging.displacement import (
+    HORIZON_S,
     PLACED_EXACTLY,
     By,
     Group,
@@ -35,6 +36,10 @@ if TYPE_CHECKING:
 PAPERS_CHOICE = (
     "As in the paper, construction zone and accident site are left out: their objects can lie in "
     "many places that all follow the instruction."
+)
+OVER_TIME_NOTE = (
+    f"Where something moves, distances are also followed for {HORIZON_S:g} s after t0: their mean "
+    "over time, the last one, and by how many seconds the motions begin apart; boxes are of t0."
 )
 SIMULATED_NOTE = "Simulated contestants are marked; they say nothing about a real one."
 
@@ -64,6 +69,11 @@ class DisplacementTable:
         return any(group.contestant.is_simulated for group in self.groups)
 
     @property
+    def moves(self) -> bool:
+        """Whether something moves in it."""
+        return any(group.summary.over_time for group in self.groups)
+
+    @property
     def types_text(self) -> str:
         """Which scenario types count, in words."""
         if self.types == tuple(ScenarioType):
@@ -79,6 +89,7 @@ class DisplacementTable:
             "their sum is smallest; each matched object counts once.",
             "Missing and surplus objects are counted and have no distance; an unreadable or "
             "refused answer misses all.",
+            *([OVER_TIME_NOTE] if self.moves else []),
             *([PAPERS_CHOICE] if self.by is By.VARIANT else []),
             *(f"Not measured: {number} ({why})." for why, number in self.left_out.items()),
             *([SIMULATED_NOTE] if self.simulated else []),
@@ -118,6 +129,8 @@ GROUPS: Columns = {
         Dtype.TEXT,
     ),
 }
+OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="summary.over_time")
+"""Of groups, where one of them has something that moves."""
 
 
 def group_sheet(table: DisplacementTable) -> Sheet:
@@ -131,6 +144,8 @@ def group_sheet(table: DisplacementTable) -> Sheet:
         "not_measured": table.left_out,
     }
     columns: Columns = {**GROUPS, "types": (lambda group: types, Dtype.TEXT)}
+    if table.moves:
+        columns = {**columns, **OVER_TIME}
     return sheet_of(
         table.groups, columns, name="displacement", key="groups", number=".3f", facts=facts
     )
@@ -157,16 +172,20 @@ OBJECTS: Columns = {
     "generated": ("generated.id", Dtype.TEXT),
     "x_m": ("generated.x_m", Dtype.NUMBER),
     "y_m": ("generated.y_m", Dtype.NUMBER),
-    **Dtype.NUMBER.columns("distance_m"),
+    **Dtype.NUMBER.columns("distance_m", of="match"),
     "sample": ("row.sample", Dtype.WHOLE),
 }
 """`object` is matched, missing or surplus; places are in the ego frame."""
+MATCHES_OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="match")
+"""Of objects, where one moves."""
 
 
 def object_sheet(job: GenerationJob) -> Sheet:
     """Return the displacement of a job with one row an object."""
-    name = "displacement-objects"
-    return sheet_of(objects_of(job), OBJECTS, name=name, key="objects", number=".4f")
+    name, objects = "displacement-objects", list(objects_of(job))
+    moves = any(one["match"] and one["match"].average_m is not None for one in objects)
+    columns = {**OBJECTS, **MATCHES_OVER_TIME} if moves else OBJECTS
+    return sheet_of(objects, columns, name=name, key="objects", number=".4f")
 
 
 # --- Box plots ---------------------------------------------------------------------------------

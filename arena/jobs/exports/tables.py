@@ -56,6 +56,12 @@ AUGMENTATIONS: Columns = {
 }
 """`contestant` is the slug, `options` a JSON object; `wrong` and `doubtful` count findings."""
 
+OVER_TIME: Columns = {
+    f"displacement_{name}": (f"displacement.over_time.{name}", Dtype.NUMBER)
+    for name in ("average_m", "final_m", "start_s")
+}
+"""Of augmentations, where something moves in one."""
+
 REPEATS: Columns = {
     **Dtype.TEXT.columns("contestant", "name"),
     **Dtype.YES_NO.columns("simulated"),
@@ -101,8 +107,10 @@ ANALYSIS_COLUMNS: dict[str, Columns] = {
 def augmentation_sheet(job: GenerationJob) -> Sheet:
     """Return a job's augmentations with one row each."""
     columns: Columns = {"job": (lambda line: job.name, Dtype.TEXT), **AUGMENTATIONS}
-    name = "augmentations"
-    return sheet_of(augmentation_lines(job), columns, name=name, key=name)
+    name, lines = "augmentations", list(augmentation_lines(job))
+    if any(line.displacement and line.displacement.over_time for line in lines):
+        columns = {**columns, **OVER_TIME}
+    return sheet_of(lines, columns, name=name, key=name)
 
 
 def repeat_sheet(job: GenerationJob) -> Sheet:

@@ -202,7 +202,11 @@ def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
     lines = _numbered(table, {line.slug: line for line in snapshot.results.displacement})
-    return {"lines": lines, "has_chart": "displacement" in scatters_of(snapshot, table)}
+    return {
+        "lines": lines,
+        "has_chart": "displacement" in scatters_of(snapshot, table),
+        "moves": any(line.average_m is not None for line in snapshot.results.displacement),
+    }
 
 
 def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:

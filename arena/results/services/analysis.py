@@ -200,6 +200,8 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
             missing=total.missing,
             surplus=total.surplus,
             augmentations=total.augmentations,
+            average_m=None if total.over_time is None else total.over_time.average_m,
+            final_m=None if total.over_time is None else total.over_time.final_m,
         )
         for slug, total in totals
     )

@@ -68,7 +68,8 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
 def repeatability(job: GenerationJob) -> list[Row]:
     """Return what varies between the samples of each contestant, of rows that have an outcome.
 
-    The displacement of a sample is the mean over its matched objects; `within_m` is the pooled
+    The displacement of a sample is the mean over its matched objects, over time where something
+    moves, as in all analyses; `within_m` is the pooled
     standard deviation, within a scenario, of its mean displacement. `missed` is the share of
     answers that were unreadable or refused.
     """
@@ -170,7 +171,7 @@ def _values_of(measured: Sequence[Measured]) -> dict[str, float]:
     samples: defaultdict[str, list[float]] = defaultdict(list)
     for one in measured:
         if one.displacement is not None and one.displacement.matches:
-            samples[one.row.scenario.slug].append(fmean(one.displacement.distances_m))
+            samples[one.row.scenario.slug].append(fmean(one.displacement.errors_m))
     return {slug: median(values) for slug, values in sorted(samples.items())}
 
 
@@ -184,8 +185,8 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> Row:
     by_scenario: dict[int, list[float]] = defaultdict(list)
     for line in lines:
         by_sample[line.row.sample].append(line)
-        if line.displacement is not None and line.displacement.mean_m is not None:
-            by_scenario[line.row.scenario_id].append(line.displacement.mean_m)
+        if line.displacement is not None and line.displacement.matches:
+            by_scenario[line.row.scenario_id].append(fmean(line.displacement.errors_m))
     samples = [by_sample[number] for number in sorted(by_sample)]
     missed = [fmean(line.row.state in MISSES for line in sample) for sample in samples]
     return {
@@ -211,9 +212,9 @@ def _spread(name: str, values: Sequence[float | None]) -> Row:
 
 
 def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:
-    measured = [line.displacement.distances_m for line in lines if line.displacement is not None]
-    distances_m = list(chain.from_iterable(measured))
-    return fmean(distances_m) if distances_m else None
+    measured = [line.displacement.errors_m for line in lines if line.displacement is not None]
+    errors_m = list(chain.from_iterable(measured))
+    return fmean(errors_m) if errors_m else None
 
 
 def _usd(lines: Sequence[AugmentationLine]) -> float | None:

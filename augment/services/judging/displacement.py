@@ -1,22 +1,26 @@
 """How far stored augmentations are from their references: one by one, in groups, by object."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
 from django.db.models import QuerySet
 
-from augment.errors import InvalidDocument
+from augment.checks import Ground
+from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
+from augment.metrics.displacement import HORIZON_S as HORIZON_S
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
 from augment.metrics.kept import KeptObject, KeptSummary, kept_objects, summarise_kept
-from augment.models import Augmentation, Contestant, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
+from augment.services.judging.findings import ground_of
 from augment.services.scenarios.scenes import type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
@@ -46,6 +50,7 @@ class Unmeasured(StrEnum):
     UNFINISHED = "waits, runs, failed or was cancelled"
     NO_REFERENCE = "its scenario has no reference that can be read"
     UNREADABLE_ROW = "its stored modification can't be read"
+    UNFIT_MOTION = "its motion can't be followed in its scene"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,17 +91,17 @@ class Group:
 
 
 def of_job(job: GenerationJob) -> list[Measured]:
-    """Measure every row of a job; one query."""
+    """Measure every row of a job; one query, and one a scenario in which something moves."""
     return _measure(_rows().filter(job=job))
 
 
 def of_rows(ids: Collection[int]) -> list[Measured]:
-    """Measure the augmentations with these primary keys; one query."""
+    """Measure the augmentations with these primary keys, as those of a job."""
     return _measure(_rows().filter(pk__in=ids))
 
 
 def of_augmentation(row: Augmentation) -> Measured:
-    """Measure one row whose scenario is loaded; no query."""
+    """Measure one row whose scenario is loaded, with its scene where something moves."""
     return _measure([row])[0]
 
 
@@ -142,8 +147,8 @@ def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
 
     Each is a dict: the `row` that it is of; `object`, whether it is matched, missing or surplus;
     its `class`; where the `reference` and the `generated` one place it, None where only the other
-    has it; and their `distance_m`. The matched ones come first, in the order in which they were
-    matched. What has no displacement (see `Unmeasured`) has no objects.
+    has it; and their `match`, None without one. The matched ones come first, in the order in
+    which they were matched. What has no displacement (see `Unmeasured`) has no objects.
     """
     for one in of_job(job):
         if one.displacement is None:
@@ -153,8 +158,8 @@ def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
             for change in (_read(one.row.scenario.reference), _answer_of(one.row))
         )
         found = one.displacement
-        for standing, reference_id, generated_id, distance_m in (
-            *(("matched", m.reference, m.generated, m.distance_m) for m in found.matches),
+        for standing, reference_id, generated_id, match in (
+            *(("matched", m.reference, m.generated, m) for m in found.matches),
             *(("missing", name, "", None) for name in found.missing),
             *(("surplus", "", name, None) for name in found.surplus),
         ):
@@ -165,7 +170,7 @@ def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
                 "class": CLASS_OF[(wanted | placed)[reference_id or generated_id].type],
                 "reference": reference,
                 "generated": generated,
-                "distance_m": distance_m,
+                "match": match,
             }
 
 
@@ -211,33 +216,50 @@ def _rows() -> QuerySet[Augmentation]:
 
 
 def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
-    references: dict[int, Modification | None] = {}
+    standards: dict[int, _Standard] = {}
 
-    def reference_to(row: Augmentation) -> Modification | None:
-        if row.scenario_id not in references:
-            references[row.scenario_id] = _read(row.scenario.reference)
-        return references[row.scenario_id]
+    def standard_of(row: Augmentation) -> _Standard:
+        return standards.setdefault(row.scenario_id, _Standard(row.scenario))
 
-    measured = []
-    for row in rows:
-        reference, answer, before = reference_to(row), _answer_of(row), row.follows
-        if row.state not in Augmentation.SHOWABLE:
-            measured.append(Measured(row=row, why_not=Unmeasured.UNFINISHED))
-        elif reference is None:
-            measured.append(Measured(row=row, why_not=Unmeasured.NO_REFERENCE))
-        elif answer is None and row.state == State.DONE:
-            measured.append(Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW))
-        else:
-            own = None if before is None else _answer_of(before)
-            earlier = None if before is None else reference_to(before)
-            kept: tuple[KeptObject, ...] = ()
-            if own is not None and earlier is not None:
-                kept = kept_objects(
-                    own, answer, reference_before=earlier, reference_after=reference
-                )
-            found = displacement(answer, reference)
-            measured.append(Measured(row=row, displacement=found, kept=kept))
-    return measured
+    return [_measure_row(row, standard_of) for row in rows]
+
+
+def _measure_row(
+    row: Augmentation, standard_of: Callable[[Augmentation], "_Standard"]
+) -> Measured:
+    reference, answer, before = standard_of(row).reference, _answer_of(row), row.follows
+    if row.state not in Augmentation.SHOWABLE:
+        return Measured(row=row, why_not=Unmeasured.UNFINISHED)
+    if reference is None:
+        return Measured(row=row, why_not=Unmeasured.NO_REFERENCE)
+    if answer is None and row.state == State.DONE:
+        return Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW)
+    moves = reference.has_motion or (answer is not None and answer.has_motion)
+    try:
+        found = displacement(answer, reference, standard_of(row).ground if moves else None)
+    except (InvalidDocument, InvalidModification):
+        return Measured(row=row, why_not=Unmeasured.UNFIT_MOTION)
+    own = None if before is None else _answer_of(before)
+    earlier = None if before is None else standard_of(before).reference
+    kept: tuple[KeptObject, ...] = ()
+    if own is not None and earlier is not None:
+        kept = kept_objects(own, answer, reference_before=earlier, reference_after=reference)
+    return Measured(row=row, displacement=found, kept=kept)
+
+
+class _Standard:
+    """What the answers to one scenario are held against; read when it is asked for."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+
+    @cached_property
+    def reference(self) -> Modification | None:
+        return _read(self._scenario.reference)
+
+    @cached_property
+    def ground(self) -> Ground:
+        return ground_of(self._scenario)
 
 
 def _answer_of(row: Augmentation) -> Modification | None:
