@@ -166,7 +166,7 @@ def motion_off_road(situation: ChangedScene) -> Iterator[Finding]:
             FindingKind.MOTION_OFF_ROAD,
             worst.severity,
             [agent],
-            f"After {{after_s:.1f}} s {name_stray(agent.type)}",
+            f"After {{after_s:.1f}} s, {name_stray(agent.type)}",
             after_s=float(situation.motion.times_s[step]),
             outside_share=worst.outside_share,
             gap_m=worst.gap_m,
