@@ -234,7 +234,7 @@ def _measure_row(
         return Measured(row=row, why_not=Unmeasured.NO_REFERENCE)
     if answer is None and row.state == State.DONE:
         return Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW)
-    moves = reference.has_motion or (answer is not None and answer.has_motion)
+    moves = answer is not None and (answer.has_motion or reference.has_motion)
     try:
         found = displacement(answer, reference, standard_of(row).ground if moves else None)
     except (InvalidDocument, InvalidModification):
