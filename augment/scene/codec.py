@@ -26,6 +26,7 @@ from augment.scene.entities import (
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
 from augment.scene.intent_parts import Amount
 from augment.scene.planned_motion import EGO_ID as EGO_ID
+from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path
@@ -240,7 +241,7 @@ class CatalogueEntry:
 
     slug: _Words
     scene: _Words
-    type: ScenarioType
+    type: ScenarioType | MotionPreset
     language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
     instruction: _Words
     paraphrases: Annotated[

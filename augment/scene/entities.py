@@ -386,3 +386,4 @@ class CatalogueSet(StrEnum):
 
     PAPER = "paper"
     HARD = "hard"
+    MOVING = "moving"

@@ -25,7 +25,7 @@ def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
         given, here = entry(slug), shown_scene(slug)
         if given.reference.is_empty:
             continue
-        sentence, intent = describe_change(given.type, given.reference, here)
+        sentence, intent = describe_change(ScenarioType(given.type), given.reference, here)
         assert sentence.endswith(".")
         assert intent is not None
         assert intent_to_document(intent)["requests"] is not None

@@ -38,7 +38,7 @@ def cell(slug: str, *added: TrafficAgent, keeps_traffic: bool = False) -> Cell:
     return Cell(
         name=slug,
         scene=scene if keeps_traffic else without_traffic(scene),
-        type=entry(slug).type,
+        type=ScenarioType(entry(slug).type),
         modification=Modification(added=added or tellable(slug)),
         keeps_traffic=keeps_traffic,
     )

@@ -20,6 +20,7 @@ from augment.scene.entities import (
     Lane,
     LaneConnector,
     Modification,
+    ScenarioType,
     Scene,
     SceneOptions,
     TrafficAgent,
@@ -77,7 +78,7 @@ def authored(slug: str) -> Cell:
         name=slug,
         stem=slug,
         scene=scene,
-        type=given.type,
+        type=ScenarioType(given.type),
         modification=Modification(added=tuple(added)),
         keeps_traffic=True,
     )

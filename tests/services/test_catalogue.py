@@ -19,7 +19,7 @@ from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep,
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
-from tests.fixtures.shelf import HARD
+from tests.fixtures.shelf import FOLDER, HARD, MOVING
 from tests.intents import parked
 from tests.scenes import scene, vehicle
 
@@ -122,6 +122,26 @@ def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(fol
     assert (german.language, german.paraphrase_of) == ("de", original)
     assert (german.reference, german.intent) == (original.reference, original.intent)
     assert german.instruction.startswith("In der Kehre")
+
+
+def test_the_moving_set_brings_those_scenes_of_the_others_that_it_is_on(folder: Path) -> None:
+    for shelf, name in (
+        (FOLDER, "scenes/mill-junction.json"),
+        (MOVING, "scenarios/hard-braking-mill-junction.json"),
+    ):
+        place = folder / shelf.relative_to(FOLDER) / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(shelf / name, place)
+    loaded = load_catalogue(folder=folder, sets=["moving"])
+    assert loaded == report(scenes=(1, 0, 0), scenarios=(1, 0, 0))
+    scenario = Scenario.objects.get()
+    assert (scenario.base_scene.slug, scenario.get_type_display()) == (
+        "mill-junction",
+        "Hard braking",
+    )
+    assert resolve_scenarios(["set:moving"]) == ["hard-braking-mill-junction"]
+    again = load_catalogue(folder=folder, sets=["moving"])
+    assert again == report(scenes=(0, 0, 1), scenarios=(0, 0, 1))
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,8 @@ from augment.services.events import log_change
 from augment.services.scenarios import scenes as scene_rows
 
 SOURCE = "authored"
+_SHARED = {CatalogueSet.MOVING: (CatalogueSet.PAPER, CatalogueSet.HARD)}
+"""Sets on scenes of others."""
 Problems = list[tuple[str, str]]
 Read = TypeVar("Read")
 
@@ -36,10 +38,13 @@ def folder_of(folder: Path, one: CatalogueSet) -> Path:
     return folder if one is CatalogueSet.PAPER else folder / one.value
 
 
-def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[codec.CatalogueEntry]]:
+def read_catalogue(
+    folder: Path, *, scenes_from: Sequence[Path] = ()
+) -> tuple[dict[str, Scene], list[codec.CatalogueEntry]]:
     """Return the scenes by name and the scenarios of a folder, each fitting its scene.
 
-    A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`.
+    A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`. Of the folders whose scenes
+    it shares only those that a scenario names are returned.
 
     Raises:
         InvalidDocument: The folder holds no catalogue, or files break their format or do not
@@ -48,6 +53,10 @@ def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[codec.Catalogue
     problems: Problems = []
     scenes = _read_files(folder / "scenes", codec.scene_from_document, "name", problems)
     entries = _read_files(folder / "scenarios", codec.entry_from_document, "slug", problems)
+    named = {entry.scene for entry in entries.values()}
+    for other in scenes_from:
+        shared = _read_files(other / "scenes", codec.scene_from_document, "name", problems)
+        scenes |= {name: scene for name, scene in shared.items() if name in named}
     if not (scenes or entries or problems):
         problems.append((str(folder), "holds no scenes/*.json and no scenarios/*.json"))
     for entry in entries.values():
@@ -127,8 +136,8 @@ def load_catalogue(
     made from. The report names them.
 
     Args:
-        folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`; None for what
-            comes with the project.
+        folder: Holds `scenes` and `scenarios`, and those of the other sets in `hard` and
+            `moving`; None for what comes with the project.
         actor: Who did it.
         sets: Which parts of it.
         with_paraphrases: Whether every paraphrase becomes a scenario of its own beside the one
@@ -147,7 +156,10 @@ def load_catalogue(
     steps: dict[str, CatalogueStep] = {}
     for which in map(CatalogueSet, sets):
         place = folder or settings.BASE_DIR / "fixtures"
-        scenes, entries = read_catalogue(folder_of(place, which))
+        sharing = _SHARED.get(which, ())
+        scenes, entries = read_catalogue(
+            folder_of(place, which), scenes_from=[folder_of(place, one) for one in sharing]
+        )
         scene_steps |= {name: _store_scene(scene, actor) for name, scene in scenes.items()}
         for entry in entries:
             if scene_steps[entry.scene] is CatalogueStep.KEPT:
@@ -209,6 +221,7 @@ def _store_scenario(
         "intent": intent,
     }
     own = {"catalogue_set": which.value, "language": entry.language, "paraphrase_of": original}
+    own["type_label"] = scene_rows.label_for(entry.type)
     if row is None:
         origin = IntentOrigin.AUTHORED
         row = scene_rows.add_scenario(

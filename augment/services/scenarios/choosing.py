@@ -15,8 +15,8 @@ ALL, SET = "all", "set:"
 def resolve_scenarios(given: Sequence[str]) -> list[str]:
     """Return the slugs, each once; words that are no slugs stand for several.
 
-    `all`: every scenario; `catalogue`: the authored ones, `set:paper` or `set:hard` (or the name
-    alone): those of one set, all three without paraphrases; `paraphrases`: those of the
+    `all`: every scenario; `catalogue`: the authored ones, `set:NAME` (or the name alone): those of
+    one set, all without paraphrases; `paraphrases`: those of the
     catalogue; with *, ? or [...]: every slug of that pattern. Only a slug or a pattern names
     retired ones.
 

@@ -24,6 +24,7 @@ from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
@@ -78,6 +79,8 @@ def label_for(name: str) -> str:
     """
     if type_of(name) is not None:
         return ""
+    if name in list(MotionPreset):
+        return MotionPreset(name).label
     if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
         known = ", ".join(one.value for one in ScenarioType)
         rule = f"one of {known}, or lower-case letters, digits and single _ or -"
