@@ -21,7 +21,14 @@ from augment.baselines.placing_ground import build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference, overlap
 from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import Body, ConesRequest, Intent, VehicleRequest, WalkRequest
+from augment.scene.intent import (
+    Body,
+    ConesRequest,
+    DoorRequest,
+    Intent,
+    VehicleRequest,
+    WalkRequest,
+)
 from augment.scene.lane_graph import LaneGraph
 
 FURTHEST_M = 72.0
@@ -110,7 +117,7 @@ def place(
     """
     for request in () if intent is None else intent.requests:
         is_other = isinstance(request, VehicleRequest) and request.body in _NO_VEHICLES
-        if is_other or isinstance(request, WalkRequest | ConesRequest):
+        if is_other or isinstance(request, WalkRequest | ConesRequest | DoorRequest):
             raise CannotPlace("The code knows vehicles alone, and something else is asked for.")
     right = rule_placer.place(scene, intent, seed=seed).modification
     moved = {agent.id for agent in right.moved}

@@ -10,6 +10,8 @@ from statistics import median
 
 import numpy as np
 
+from augment.checks.bodies import end_of_walk
+from augment.checks.derived_motions import find_wish
 from augment.checks.ground import Ground, is_stopped
 from augment.checks.lanes_across import Band, LanesAcross, find_picked
 from augment.checks.registry import check_against_intent
@@ -24,7 +26,10 @@ from augment.scene.entities import (
     Scene,
     TrafficAgent,
     TurnType,
+    apply,
 )
+from augment.scene.intent_statements import list_motion_facts
+from augment.scene.planned_motion import MotionPreset
 from augment.scene.schema import MOST_OBJECTS
 
 _STRAIGHT_DEG = 5.0
@@ -46,6 +51,8 @@ _BODIES = {
     AgentType.BARRIER: wish.Body.BARRIER,
     AgentType.CONSTRUCTION_SIGN: wish.Body.CONSTRUCTION_SIGN,
 }
+_MOVERS = (*_BODIES, AgentType.PEDESTRIAN)
+_Wishes = Mapping[str, tuple[wish.MotionWish, TrafficAgent]]
 _FRONTLESS = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 _LANES = {
     wish.LaneChoice.OWN: "in the ego's lane",
@@ -77,16 +84,27 @@ def describe_change(
         for agent in scene.agents
         if agent.id in touched
     }
-    sentence = _sentence(kind, change, lanes, scene, picks)
+    cars = [one for one in apply(scene, change).agents if is_stopped(one)]
+    wishes = {
+        agent.id: found for agent in change.changed if (found := find_wish(agent, scene, cars))
+    }
+    sentence = _sentence(kind, change, lanes, scene, picks, wishes)
     if lanes is None:
         return sentence, None
-    requests = tuple(_requests(change, lanes))
-    moves = tuple(_moves(change, lanes, picks))
+    requests = tuple(_requests(change, lanes, wishes))
+    moves = tuple(_moves(change, lanes, picks, wishes))
     removals = tuple(pick for name in change.removed if (pick := picks[name]))
     counts = [len(part) for part in (requests, moves, removals)]
     if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
-    full = wish.Intent(requests=requests, moves=moves, removals=removals, route=lanes.route.turn)
+    unnamed = [one.id for one in change.changed if one.motion and one.id not in wishes]
+    full = wish.Intent(
+        requests=requests,
+        moves=moves,
+        removals=removals,
+        route=lanes.route.turn,
+        beyond=tuple(f"the motion of {name}" for name in unnamed),
+    )
     looser = replace(
         full,
         requests=tuple(map(_looser, requests)),
@@ -152,22 +170,46 @@ def _place_of(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
 # The intent
 
 
-def _requests(change: Modification, lanes: LanesAcross) -> Iterator[wish.Request]:
+def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
     added = sorted(change.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
     people = [agent for agent in added if agent.type is AgentType.PEDESTRIAN]
     if cones:
-        yield _cones(cones, any(agent.walk_to_m is None for agent in people), lanes)
-    yield from (_vehicle(agent, lanes) for agent in added if agent.type in _BODIES)
-    yield from (_walk(agent, lanes) for agent in people if agent.walk_to_m is not None)
+        yield _cones(
+            cones, any(one.walk_to_m is None and one.id not in wishes for one in people), lanes
+        )
+    doors = [wishes[one.id] for one in added if one.id in wishes and one.type not in _MOVERS]
+    anchors = {car.id for _, car in doors} & {agent.id for agent in added}
+    for agent in added:
+        motion = wishes[agent.id][0] if agent.id in wishes else None
+        if agent.type in _BODIES:
+            request = _vehicle(agent, lanes, motion)
+            yield replace(request, name=agent.id) if agent.id in anchors else request
+    for agent in people:
+        motion = wishes[agent.id][0] if agent.id in wishes else None
+        if agent.walk_to_m is not None or motion is not None:
+            yield replace(_walk(agent, lanes), motion=motion)
+    for motion, car in doors:
+        spot = wish.Spot(anchor=car.id)
+        if car.id not in anchors:
+            spot = wish.Spot(landmark=_pick_of(car, lanes))
+        if spot != wish.Spot():
+            yield wish.DoorRequest(spot=spot, motion=motion)
 
 
 def _moves(
-    change: Modification, lanes: LanesAcross, picks: Mapping[str, wish.Pick | None]
+    change: Modification,
+    lanes: LanesAcross,
+    picks: Mapping[str, wish.Pick | None],
+    wishes: _Wishes,
 ) -> Iterator[wish.Move]:
+    before = {agent.id: agent for agent in lanes.route.scene.agents}
     for agent in change.moved:
         who = picks[agent.id]
-        if who is not None:
+        motion = wishes[agent.id][0] if agent.id in wishes else None
+        if who is not None and motion is not None and _stays(agent, before[agent.id]):
+            yield wish.Move(who=who, motion=motion)
+        elif who is not None:
             there = _vehicle(agent, lanes)
             yield wish.Move(
                 who=who,
@@ -175,7 +217,12 @@ def _moves(
                 facing=there.facing,
                 turn_deg=there.turn_deg,
                 speed_mps=agent.speed_mps,
+                motion=motion,
             )
+
+
+def _stays(agent: TrafficAgent, before: TrafficAgent) -> bool:
+    return math.hypot(agent.x_m - before.x_m, agent.y_m - before.y_m) < _BESIDE_M
 
 
 def _pick_of(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
@@ -210,8 +257,14 @@ def _boundary(left_m: float) -> wish.LateralTarget:
     return wish.LateralTarget.LEFT_BOUNDARY if left_m > 0.0 else wish.LateralTarget.RIGHT_BOUNDARY
 
 
-def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> wish.VehicleRequest:
-    place = _place_of(agent, lanes)
+def _vehicle(
+    agent: TrafficAgent, lanes: LanesAcross, motion: wish.MotionWish | None = None
+) -> wish.VehicleRequest:
+    place, body = _place_of(agent, lanes), _BODIES.get(agent.type, wish.Body.VEHICLE)
+    if motion is not None and motion.preset is MotionPreset.RED_LIGHT:
+        from_left = lanes.route.locate_agent(agent).left_m > 0.0
+        comes = replace(motion, side=wish.Side.LEFT if from_left else wish.Side.RIGHT)
+        return wish.VehicleRequest(body=body, speed_mps=agent.speed_mps, count=1, motion=comes)
     facing, turn_deg = (None, 0.0) if agent.type in _FRONTLESS else _turned(agent, place)
     lateral = None
     if abs(place.left_m) >= _BESIDE_M:
@@ -223,11 +276,12 @@ def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> wish.VehicleRequest:
         )
     return wish.VehicleRequest(
         spot=replace(_spot(place), lateral=lateral),
-        body=_BODIES.get(agent.type, wish.Body.VEHICLE),
+        body=body,
         facing=facing,
         turn_deg=turn_deg,
         speed_mps=agent.speed_mps,
         count=1,
+        motion=motion,
     )
 
 
@@ -242,7 +296,7 @@ def _turned(agent: TrafficAgent, place: _Place) -> tuple[wish.Facing, float]:
 
 def _walk(agent: TrafficAgent, lanes: LanesAcross) -> wish.WalkRequest:
     start = lanes.route.locate(agent.x_m, agent.y_m)
-    end = lanes.route.locate(*(agent.walk_to_m or (0.0, 0.0)))
+    end = lanes.route.locate(*(end_of_walk(agent) or (0.0, 0.0)))
     return wish.WalkRequest(
         spot=replace(_spot(_place_of(agent, lanes)), lane=None),
         start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
@@ -310,6 +364,7 @@ def _sentence(
     lanes: LanesAcross | None,
     scene: Scene,
     picks: Mapping[str, wish.Pick | None],
+    wishes: _Wishes,
 ) -> str:
     """The sentences from which a reader could put the same objects to the same places."""
     added = sorted(change.added, key=lambda one: (one.x_m, one.y_m))
@@ -319,10 +374,13 @@ def _sentence(
     if len(cones) == 1:
         parts = [f"a traffic cone {spots}"]
     others = [agent for agent in added if agent.type is not AgentType.TRAFFIC_CONE]
-    parts += [_thing(other, kind, lanes) for other in others]
+    parts += [_thing(other, kind, lanes) + _then(other, wishes) for other in others]
+    before = {agent.id: agent for agent in scene.agents}
     for agent in change.moved:
-        there = _where((agent.x_m, agent.y_m), lanes)
-        parts.append(f"move {_who(agent.id, picks)} to {there}")
+        where = f"move {_who(agent.id, picks)} to {_where((agent.x_m, agent.y_m), lanes)}"
+        if agent.id in wishes and _stays(agent, before[agent.id]):
+            where = f"keep {_who(agent.id, picks)} where it is"
+        parts.append(where + _then(agent, wishes))
     parts += [f"remove {_who(name, picks)}" for name in change.removed]
     goal = scene.options.goal
     way = "" if goal is None else f" The ego is to turn {goal}."
@@ -330,6 +388,12 @@ def _sentence(
         way = " The ego is to go straight on."
     lead = "Change the scene" if kind is None else _LEADS[kind]
     return f"{lead}: {'; '.join(parts)}.{way}"
+
+
+def _then(agent: TrafficAgent, wishes: _Wishes) -> str:
+    if agent.id not in wishes:
+        return ""
+    return f", {', '.join(list_motion_facts(wishes[agent.id][0]))}"
 
 
 def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:

@@ -66,6 +66,18 @@ def list_statements(intent: Intent) -> tuple[str, ...]:
     return tuple(statements)
 
 
+def list_motion_facts(wish: MotionWish) -> Iterator[str]:
+    """Yield what somebody is to do after t0."""
+    yield f"then: {wish.preset.label.lower()}"
+    if wish.start is not None:
+        yield f"begins {wish.start}"
+    if wish.side is not None:
+        yield f"comes from the {wish.side}"
+    for name, words in _MOTION_FACTS.items():
+        if (amount := getattr(wish, name)) is not None:
+            yield words.format(amount)
+
+
 # Private
 
 
@@ -145,18 +157,7 @@ def _list_pose_facts(request: Request | Move) -> Iterator[str]:
         yield f"moves at {speed_mps:g} m/s" if speed_mps else "stands"
     wish: MotionWish | None = getattr(request, "motion", None)
     if wish is not None:
-        yield from _list_motion_facts(wish)
-
-
-def _list_motion_facts(wish: MotionWish) -> Iterator[str]:
-    yield f"then: {wish.preset.label.lower()}"
-    if wish.start is not None:
-        yield f"begins {wish.start}"
-    if wish.side is not None:
-        yield f"comes from the {wish.side}"
-    for name, words in _MOTION_FACTS.items():
-        if (amount := getattr(wish, name)) is not None:
-            yield words.format(amount)
+        yield from list_motion_facts(wish)
 
 
 def _name_turn(turn_deg: float, *, is_signed: bool = True) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from augment.errors import CannotPlace, InvalidModification
+from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
@@ -38,8 +38,8 @@ from augment.scene.planned_motion import (
 )
 from augment.scene.planned_mover import (
     HeldCourse,
-    check_lane_path,
     lane_line,
+    run_beside,
     smooth_share,
     travelled_m,
 )
@@ -49,7 +49,9 @@ DOOR_LENGTH_M, DOOR_WIDTH_M, DOOR_REACH_M = 1.1, 0.15, 0.9
 TURN_RADIUS_M = 4.5
 """On which a car turns round; that of its centre."""
 
+_NUMBERS = ("braking_mps2", "speed_mps", "duration_s")
 _SPEEDING_UP_MPS2 = 3.0
+_DRIVEN = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 _STANDS_BELOW_MPS = 0.5
 _STARTS_WALKING_S = 0.5
 _KERB_M = 1.0
@@ -125,7 +127,7 @@ def with_preset(
     if route is None:
         raise CannotPlace("The ego stands on no lane of the map.")
     own = numbers_of(preset)
-    for name in ("speed_mps", "braking_mps2", "duration_s"):
+    for name in _NUMBERS:
         if getattr(numbers, name) is not None and name not in own:
             raise CannotPlace(f"{preset.label}: {name} is none of its numbers: {', '.join(own)}.")
     lane_id = agent.lane_id
@@ -137,9 +139,8 @@ def with_preset(
 
 
 def numbers_of(preset: MotionPreset) -> tuple[str, ...]:
-    """Return the fields of `PresetNumbers` that it leaves to choose besides its start."""
-    names = ("speed_mps", "braking_mps2", "duration_s")
-    return tuple(name for name in names if getattr(USUAL[preset], name) is not None)
+    """Return the fields of `PresetNumbers` that it leaves to choose, the main one first."""
+    return tuple(name for name in _NUMBERS if getattr(USUAL[preset], name) is not None)
 
 
 def find_crossing(connector: LaneConnector, route: EgoRoute) -> Point | None:
@@ -219,9 +220,8 @@ class _Case:
         return max(self.number("speed_mps"), own_mps)
 
     def require(self, *, ahead: bool = True, drives: bool | None = None) -> None:
-        if self.agent.type in _FIXED or (self.agent.type is AgentType.PEDESTRIAN) is not (
-            self.preset is MotionPreset.LATE_PEDESTRIAN
-        ):
+        walks = self.preset is MotionPreset.LATE_PEDESTRIAN
+        if self.agent.type not in ((AgentType.PEDESTRIAN,) if walks else _DRIVEN):
             kind = self.agent.type.lower().replace("_", " ")
             raise self.refusal(f"it is not what a {kind} does.")
         if ahead and self.place.ahead_m <= 0.0:
@@ -241,26 +241,17 @@ class _Case:
         return abs(self.place.left_m) <= width_m / 2.0
 
 
-_FIXED = (
-    *(AgentType.EGO_VEHICLE, AgentType.TRAFFIC_CONE, AgentType.BARRIER),
-    *(AgentType.CONSTRUCTION_SIGN, AgentType.GENERIC_OBJECT),
-)
-
-
 def _cut_in(case: _Case) -> TrafficAgent:
     case.require(drives=True)
     own = case.own_lane()
     if case.is_in_ego_lane():
         raise case.refusal("it is in the ego's lane already.")
     mean_mps = (case.agent.speed_mps + case.reached_mps) / 2.0
-    change_m = round(min(max(CHANGE_M, mean_mps * case.number("duration_s")), 200.0), 1)
-    path = LanePath(lane_ids=(case.lane_id or "none", own), change_m=change_m)
-    try:
-        check_lane_path(case.route.graph, path)
-    except InvalidModification:
-        raise case.refusal(
-            "it has to be in a lane beside the ego's, in the same direction."
-        ) from None
+    least_m = CHANGE_M if case.numbers.duration_s is None else 1.0
+    change_m = round(min(max(least_m, mean_mps * case.number("duration_s")), 200.0), 1)
+    if case.lane_id is None or not run_beside(case.route.graph, case.lane_id, own):
+        raise case.refusal("it has to be in a lane beside the ego's, in the same direction.")
+    path = LanePath(lane_ids=(case.lane_id, own), change_m=change_m)
     return case.moving(path, _ramp(case.agent.speed_mps, case.reached_mps))
 
 
@@ -390,9 +381,9 @@ def _red_light(case: _Case) -> TrafficAgent:
             continue
         if connector.traffic_light is TrafficLight.GREEN:
             raise case.refusal(f"its light at {connector.id} is green.")
-        onwards = (connector.to_lane,) if connector.to_lane in case.route.graph.lanes else ()
-        path = LanePath(lane_ids=(*lane_ids, *[name for name in onwards if name]))
-        own_mps, speeds = case.agent.speed_mps, _ramp(case.agent.speed_mps, case.reached_mps)
+        path = LanePath(lane_ids=(*lane_ids, *case.route.graph.successors(connector.id)[:1]))
+        own_mps = case.agent.speed_mps
+        speeds = _ramp(own_mps, case.reached_mps)
         line = lane_line(case.route.graph, path, (case.agent.x_m, case.agent.y_m))
         needs_m = line.project(*crossing).s_m
         times_s = np.arange(0.0, 60.0, 0.1)

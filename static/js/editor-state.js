@@ -8,6 +8,8 @@ export class Edit {
     this.past = [];
     this.future = [];
     this.selected = null;
+    this.presets = {}; // by id, as the server tells them
+    this.ways = {};
   }
 
   // Null where it can't be drawn; the server says why.
@@ -89,12 +91,13 @@ export class Edit {
     else this.change[was === "added" ? "add" : "move"].splice(this.place(id, was), 1, next);
   }
 
-  // The end of its walk, which it faces; undefined for none.
+  // The end of its walk, which it faces; undefined for none. Who walks has no motion.
   walk(id, walk_to_m) {
     const [agent] = this.find(id);
     if (!agent) return;
     const [dx, dy] = walk_to_m ? [walk_to_m[0] - agent.x_m, walk_to_m[1] - agent.y_m] : [0, 0];
-    this.set(id, dx || dy ? { walk_to_m, heading_rad: Math.atan2(dy, dx) } : { walk_to_m });
+    const motion = walk_to_m ? undefined : agent.motion;
+    this.set(id, dx || dy ? { walk_to_m, motion, heading_rad: Math.atan2(dy, dx) } : { walk_to_m, motion });
   }
 
   // Move it with the end of its walk.

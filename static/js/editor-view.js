@@ -55,6 +55,7 @@ export class Stage {
     this.layer.replaceChildren();
     const ordered = edit.everyone().sort(([a], [b]) => b.length_m * b.width_m - a.length_m * a.width_m);
     for (const [agent, was] of ordered) this.drawAgent(agent, was, agent.id === edit.selected);
+    for (const [id, way] of Object.entries(edit.ways)) if (edit.find(id)[0]?.motion) this.drawWay(way);
     const [agent, was] = edit.find(edit.selected);
     if (agent && was !== "removed") this.drawHandles(agent);
   }
@@ -85,6 +86,12 @@ export class Stage {
       this.layer.append(make("line", { class: `walk is-${was}`, x1: x_m, y1: -y_m, x2: x, y2: -y }));
     }
     this.layer.append(group);
+  }
+
+  // Where somebody with a motion is each second.
+  drawWay(way) {
+    this.layer.append(make("polyline", { class: "walk way", points: way.map(([x, y]) => `${x},${-y}`).join(" ") }));
+    for (const [x, y] of way) this.layer.append(make("circle", { class: "moment", cx: x, cy: -y, r: 0.25 }));
   }
 
   drawHandles(agent) {

@@ -80,14 +80,23 @@ function showNumbers() {
   }
   for (const input of numbers.querySelectorAll("[data-field]")) {
     input.disabled = was === "removed";
-    if (document.activeElement !== input) input.value = shown(agent, input.dataset.field);
+    const isTyped = document.activeElement === input && input.dataset.field !== "preset";
+    if (!isTyped) input.value = shown(agent, input.dataset.field);
   }
+  const known = scene.presets[shown(agent, "preset")];
+  for (const name of ["within_m", "number"]) numberOf(name).closest(".field").hidden = !known;
+  if (known) numberOf("number").labels[0].textContent = known.number;
+}
+
+function numberOf(name) {
+  return numbers.querySelector(`[data-field=${name}]`);
 }
 
 // A field of an agent as its input has it.
 function shown(agent, name) {
   const [walk_x_m, walk_y_m] = agent.walk_to_m ?? [];
-  const value = { ...agent, heading_deg: agent.heading_rad * degrees, walk_x_m, walk_y_m }[name];
+  const wish = (agent.motion && edit.presets[agent.id]) ?? { preset: agent.motion ? "own" : "" };
+  const value = { ...agent, heading_deg: agent.heading_rad * degrees, walk_x_m, walk_y_m, ...wish }[name];
   return typeof value === "number" ? String(Math.round(value * 1000) / 1000) : (value ?? "");
 }
 
@@ -111,8 +120,9 @@ function changed() {
   timer = setTimeout(() => check().catch(fail), 250);
 }
 
-// What the server makes of it; with an id, that agent on the nearest centreline.
-async function check(snapped = "", modification = edit.document) {
+// What the server makes of it; with an id, that agent on the nearest centreline; with a preset,
+// whoever it names moves so.
+async function check(snapped = "", modification = edit.document, preset = null) {
   clearTimeout(timer);
   const mine = ++asked;
   const answer = await fetch(words.check, {
@@ -121,6 +131,7 @@ async function check(snapped = "", modification = edit.document) {
     body: JSON.stringify({
       modification,
       snap: snapped,
+      preset,
       scenario: words.scenario,
       keep_traffic: keepsTraffic(),
       derives: form.elements.derives?.checked ?? false,
@@ -131,11 +142,12 @@ async function check(snapped = "", modification = edit.document) {
   if (!answer.ok) throw new Error(String(answer.status));
   const found = await answer.json();
   if (mine !== asked) return;
-  if (snapped && found.modification) {
+  if (found.modification) Object.assign(edit, { presets: found.presets ?? {}, ways: found.ways ?? {} });
+  if ((snapped || preset) && found.modification) {
     edit.begin();
     edit.change = Edit.read(found.modification);
     take();
-  }
+  } else show();
   tell(found);
 }
 
@@ -169,6 +181,14 @@ function showAsked({ sentence, statements }) {
 
 function fail() {
   tell({ problem: words.failed, lines: [] });
+}
+
+// A preset that was chosen has its usual numbers.
+function move(agent_id, isNew) {
+  const given = (name) => (isNew || numberOf(name).value === "" ? null : Number(numberOf(name).value));
+  const preset = numberOf("preset").value || null;
+  const wish = { agent_id, preset, within_m: given("within_m"), number: given("number") };
+  return check("", edit.document, wish).catch(fail);
 }
 
 function act(what) {
@@ -295,6 +315,7 @@ numbers.addEventListener("change", (event) => {
   if (!input || !agent) return;
   const name = input.dataset.field;
   if (input.value === shown(agent, name)) return undefined;
+  if (["preset", "within_m", "number"].includes(name)) return move(agent.id, name === "preset");
   const value = name === "type" ? input.value : input.value === "" ? undefined : Number(input.value);
   if (Number.isNaN(value) || (value === undefined && !name.startsWith("walk"))) return show();
   edit.begin();

@@ -85,6 +85,32 @@ def test_an_answer_never_undoes_what_was_done_after_its_question(desk: Desk) -> 
     assert desk.y_m == 1.0
 
 
+def test_a_chosen_motion_is_asked_of_the_server_and_kept_by_later_edits(desk: Desk) -> None:
+    desk.place_ahead()
+    page = desk.page
+    expect(page.locator("#n-within_m")).to_be_hidden()
+    page.select_option("#n-preset", "hard_braking")
+    wish = {"agent_id": "Added1", "preset": "hard_braking", "within_m": None, "number": None}
+    assert desk.asked(2)["preset"] == wish
+    change, motion = desk.asked(2)["modification"], {"speeds": [[1.0, 0.0]]}
+    moving = change | {"add": [agent | {"motion": motion} for agent in change["add"]]}
+    told = {"presets": {"Added1": wish | {"number": 6}}, "ways": {"Added1": [[20, 0], [28, 0]]}}
+    desk.held.posted[2].fulfill(json=told | {"modification": moving, "lines": [], "problem": ""})
+    expect(page.get_by_label("Brakes with (m/s²)")).to_have_value("6")
+    expect(page.locator(".stage .moment")).to_have_count(2)
+    page.fill("#n-within_m", "12")
+    page.locator("#n-within_m").blur()
+    assert desk.asked(3)["preset"] == wish | {"within_m": 12, "number": 6}
+    page.locator("svg.stage").press("Shift+ArrowUp")
+    page.clock.run_for(LATER_MS)
+    assert desk.asked(4)["modification"]["add"][0]["motion"] == motion
+    # Who is made to walk has no motion beside it.
+    page.fill("#n-walk_x_m", "30")
+    page.locator("#n-walk_x_m").blur()
+    page.clock.run_for(LATER_MS)
+    assert "motion" not in desk.asked(5)["modification"]["add"][0]
+
+
 @pytest.mark.parametrize(
     "change",
     [

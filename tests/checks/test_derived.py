@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from augment.baselines.rule_placer import place
 from augment.checks.derived import describe_change
 from augment.checks.ground import Ground
 from augment.checks.registry import check_against_intent
 from augment.scene.codec import intent_to_document
 from augment.scene.entities import AgentType, Modification, ScenarioType
 from augment.scene.intent_statements import list_statements
+from augment.scene.planned_motion import PlannedMotion
+from tests.checks.test_asked_motions import WISHES
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import scene, vehicle
 
@@ -76,3 +79,28 @@ def test_a_drawing_without_a_lane_for_the_ego_has_words_alone() -> None:
     sentence, intent = describe_change(ScenarioType.NUDGE, change, scene(lanes=()))
     assert "12.0 m ahead of the ego and 2.0 m to its left" in sentence
     assert intent is None
+
+
+@pytest.mark.parametrize("name", sorted(WISHES))
+def test_a_motion_that_was_placed_is_derived_as_it_was_asked_for(name: str) -> None:
+    base, asked_for = WISHES[name]
+    change = place(base, asked_for).modification
+    sentence, intent = describe_change(None, change, base)
+    assert intent is not None
+    (asked,), (told,) = ([*one.requests, *one.moves] for one in (asked_for, intent))
+    wanted, got = (getattr(one, "motion", None) for one in (asked, told))
+    assert wanted is not None
+    assert got is not None
+    assert (got.preset, got.side) == (wanted.preset, wanted.side)
+    for part in ("start", "speed_mps", "braking_mps2", "duration_s"):
+        assert getattr(wanted, part) in (None, getattr(got, part))
+    assert f"then: {got.preset.label.lower()}" in sentence
+    found = check_against_intent(Ground.of(base), change, intent)
+    assert not [one for one in found if one.is_fault and one.kind.startswith("asked")]
+
+
+def test_a_motion_that_is_no_preset_stays_outside_the_fields() -> None:
+    car = replace(DRIVING, id="Added1", motion=PlannedMotion(speeds=((3.0, 9.0),)))
+    _, intent = describe_change(None, Modification(added=(car,)), scene())
+    assert intent is not None
+    assert intent.beyond == ("the motion of Added1",)

@@ -38,6 +38,7 @@ from tests.scenes import pedestrian, scene, vehicle
 
 pytestmark = pytest.mark.django_db
 CAR = vehicle("Added1", 20.0, 0.4, 0.1)
+PARKED = vehicle("Added1", 30.0, -3.0)
 
 
 def document(*added: TrafficAgent, **parts: tuple[object, ...]) -> dict[str, object]:
@@ -90,6 +91,51 @@ def test_an_agent_is_put_on_the_centreline(
     assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
     turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
     assert turn == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_agent_is_given_a_motion_by_name_and_loses_it_again() -> None:
+    here = add_scenario("street", reference=None)
+    change: Any = document(PARKED)
+    wish = {"agent_id": "Added1", "preset": "pull_out", "within_m": 12.0, "number": 6.0}
+    found = check_edit(here, change, preset=wish)
+    assert found.presets == {"Added1": {"preset": "pull_out", "within_m": 12.0, "number": 6.0}}
+    assert found.modification is not None
+    (agent,) = found.modification["add"]
+    assert agent["motion"]["path"]["lane_ids"] == ["Lane1"]
+    # 12 m away: 30 - sqrt(144 - 9) = 18.4 m at 8 m/s, so it stands at 2 s and is off at 3 s.
+    way = found.ways["Added1"]
+    assert way[2] == [30.0, -3.0]
+    assert way[3][0] > 30.0
+    kept = check_edit(here, found.modification)
+    assert kept.modification == found.modification
+    off = check_edit(here, found.modification, preset={"agent_id": "Added1"})
+    assert off.modification == document(PARKED)
+
+
+def test_a_door_comes_as_an_object_of_its_own_and_once() -> None:
+    here = add_scenario("street", reference=None)
+    wish = {"agent_id": "Added1", "preset": "door_opening"}
+    once = check_edit(here, document(PARKED), preset=wish)
+    again = check_edit(here, once.modification, preset=wish | {"within_m": 9.0})
+    assert again.modification is not None
+    assert [one["id"] for one in again.modification["add"]] == ["Added1", "Added1-door"]
+    assert again.presets["Added1-door"]["within_m"] == 9.0
+
+
+@pytest.mark.parametrize(
+    ("wish", "problem"),
+    [
+        ({"agent_id": "Added1", "preset": "cut_in"}, "Cut-in: it has to drive."),
+        ({"agent_id": "Added1", "preset": "leap"}, "Input should be 'cut_in'"),
+        ({"agent_id": "Added7", "preset": "cut_in"}, "Unknown agent 'Added7'. Known: Added1."),
+        ({"agent_id": "Added1", "preset": "cut_in", "number": 0.0}, "greater than 0"),
+    ],
+)
+def test_a_motion_that_can_t_be_is_refused_in_words(wish: dict[str, Any], problem: str) -> None:
+    here = add_scenario("street", reference=None)
+    found = check_edit(here, document(PARKED), preset=wish)
+    assert problem in found.problem
+    assert found.modification is None
 
 
 def test_a_drawn_reference_is_kept_drawn_and_told() -> None:

@@ -172,7 +172,12 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     draft = editing.draft_of(scene, scenario, keep_traffic=sent.get("keep_traffic") is True)
     if sent.get("derives") is True:
         draft.intent = None
-    checked = check_edit(draft, sent.get("modification"), snapped=str(sent.get("snap") or ""))
+    checked = check_edit(
+        draft,
+        sent.get("modification"),
+        snapped=str(sent.get("snap") or ""),
+        preset=sent.get("preset"),
+    )
     lines = [
         {
             "severity": line.severity,
@@ -185,7 +190,7 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if sent.get("derives") is True:
         _, sentence = scenes.derive_intent(draft, str(sent.get("type") or ""), "")
     told = {"sentence": sentence, "statements": editing.statements_of(draft.intent)}
-    parts = ("modification", "problem", "is_against_intent")
+    parts = ("modification", "problem", "is_against_intent", "presets", "ways")
     return JsonResponse({"lines": lines} | told | {name: getattr(checked, name) for name in parts})
 
 

@@ -6,7 +6,7 @@ The reference and anybody's labels stay out of it.
 from collections import defaultdict
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -15,16 +15,23 @@ from augment.checks import FindingKind as FindingKind
 from augment.checks import Ground, Severity
 from augment.checks.finding import FaultClass as FaultClass
 from augment.checks.registry import check_against_intent
-from augment.errors import InvalidDocument, InvalidModification
+from augment.errors import CannotPlace, InvalidDocument, InvalidModification, UnknownName
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from augment.services.scenarios.editing import editable_scene, read_edit, snap
+from augment.services.scenarios.editing import (
+    editable_scene,
+    give_preset,
+    presets_of,
+    read_edit,
+    snap,
+)
 from augment.services.scenarios.scenes import intent_of, recording_of, scene_of
 
+_WAY_STEPS = 10
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
 
 
@@ -37,12 +44,16 @@ class Checked:
         problem: Why nothing could be checked, empty where it was.
         is_against_intent: Whether the scenario has an intent that it was held against.
         modification: Of an edit, the document as it would be kept; None where it can't be.
+        presets: Of an edit, what its motions are, by the ids of who moves.
+        ways: Of an edit, where they are each second from t0 on.
     """
 
     findings: tuple[Finding, ...] = ()
     is_against_intent: bool = False
     problem: str = ""
     modification: dict[str, Any] | None = None
+    presets: dict[str, dict[str, Any]] = field(default_factory=dict)
+    ways: dict[str, list[list[float]]] = field(default_factory=dict)
 
     @property
     def faults(self) -> list[Finding]:
@@ -105,29 +116,41 @@ def check_augmentation(row: Augmentation) -> Checked | None:
     return Checked(findings=findings, is_against_intent=row.scenario.intent is not None)
 
 
-def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Checked:
+def check_edit(
+    scenario: Scenario, document: object, *, snapped: str = "", preset: object = None
+) -> Checked:
     """Check a change that is being made by hand, before anything is kept.
 
     Args:
         scenario: Whose scene is changed.
         document: The modification.
         snapped: The id of an agent that is to be put on the nearest centreline first.
+        preset: What somebody is made to do first, as `PresetEdit` has it.
     """
     try:
         modification = read_edit(scenario, document)
         if snapped:
             modification = snap(scenario, modification, snapped)
+        if preset is not None:
+            modification = give_preset(scenario, modification, preset)
         intent = intent_of(scenario)
         ground = replace(
             _ground(editable_scene(scenario)), read_recording=partial(recording_of, scenario)
         )
         findings = check_against_intent(ground, modification, intent)
-    except (InvalidDocument, InvalidModification) as error:
+    except (InvalidDocument, InvalidModification, CannotPlace, UnknownName) as error:
         return Checked(problem=str(error))
+    motion = ground.motion_after(modification, of_all=False) if modification.has_motion else None
     return Checked(
         modification=modification_to_document(modification),
         findings=_worst_first(findings),
         is_against_intent=intent is not None,
+        presets=presets_of(scenario, modification),
+        ways={
+            one.agent.id: one.states[one.is_present, :2][::_WAY_STEPS].round(2).tolist()
+            for one in (motion.others if motion else ())
+            if one.agent.motion is not None
+        },
     )
 
 

@@ -8,25 +8,66 @@ import math
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from pydantic import Field, TypeAdapter
 
+from augment.checks.derived_motions import find_wish
 from augment.errors import Conflict, UnknownName
 from augment.geometry.frames import difference, wrap
 from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene import codec
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Scene,
+    TrafficAgent,
+    apply,
+)
 from augment.scene.intent import IntentOrigin
+from augment.scene.intent_parts import Amount
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_motion import MotionPreset, NearEgo
+from augment.scene.presets import PresetNumbers, numbers_of, with_preset
+from augment.scene.schema import CLOSED, Codec, Id, Real
 from augment.services.events import log_change
 from augment.services.scenarios import scenes
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _SNAP_WITHIN_M = 15.0
+_BOTH = ("added", "moved")
+_NUMBERS = {
+    "speed_mps": "Comes to (m/s)",
+    "braking_mps2": "Brakes with (m/s²)",
+    "duration_s": "Opens within (s)",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PresetEdit:
+    """What somebody is made to do by its name.
+
+    Attributes:
+        agent_id: Of the scene or of those added.
+        preset: None to take its motion away.
+        within_m: The ego's distance at which it begins; None for the usual start.
+        number: The preset's main one; None for the usual.
+    """
+
+    __pydantic_config__ = CLOSED
+
+    agent_id: Id
+    preset: MotionPreset | None = None
+    within_m: Annotated[Real, Field(gt=0.0, le=500.0)] | None = None
+    number: Annotated[Real, Field(gt=0.0, le=100.0)] | None = None
+
+
+_PRESET = Codec("preset", TypeAdapter(PresetEdit))
 
 
 # Changes by hand
@@ -56,6 +97,10 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
         "sizes": {
             one.value: dict(zip(("length_m", "width_m"), LENGTH_WIDTH_M[one], strict=True))
             for one in PLACED
+        },
+        "presets": {
+            one.value: {"label": one.label, "number": _NUMBERS[numbers_of(one)[0]]}
+            for one in MotionPreset
         },
     }
 
@@ -110,6 +155,51 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
         for agents in (modification.added, modification.moved)
     )
     return replace(modification, added=added, moved=moved)
+
+
+def give_preset(scenario: Scenario, change: Modification, given: object) -> Modification:
+    """Return the modification with one agent that does what is asked, or with a door that opens.
+
+    Raises:
+        InvalidDocument: What is given is no `PresetEdit`.
+        CannotPlace: The scene has not what the preset needs.
+        UnknownName: There is no such agent.
+    """
+    edit = _PRESET.from_parts(given)
+    after = apply(editable_scene(scenario), change)
+    agents = {agent.id: agent for agent in after.agents}
+    if edit.agent_id not in agents:
+        raise UnknownName("agent", edit.agent_id, list(agents))
+    mover = replace(agents[edit.agent_id], motion=None)
+    if edit.preset is not None:
+        start = None if edit.within_m is None else NearEgo(within_m=edit.within_m)
+        numbers: dict[str, Any] = {"start": start, numbers_of(edit.preset)[0]: edit.number}
+        mover = with_preset(edit.preset, after, mover, PresetNumbers(**numbers))
+        mover = replace(mover, id=mover.id or f"{edit.agent_id}-door")
+    others = {agent.id: agent for agent in change.changed if agent.id != mover.id}
+    kept = {
+        name: tuple(one for one in getattr(change, name) if one.id in others) for name in _BOTH
+    }
+    is_recorded = any(one.id == mover.id for one in editable_scene(scenario).agents)
+    name = "moved" if is_recorded else "added"
+    return replace(change, **kept | {name: (*kept[name], mover)})
+
+
+def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
+    """Return by id which preset a motion is, with its numbers as `PresetEdit` has them."""
+    scene, found = editable_scene(scenario), dict[str, dict[str, Any]]()
+    everyone = apply(scene, change).agents
+    for agent in change.changed:
+        wish = find_wish(agent, scene, everyone)
+        if wish is not None:
+            preset, near = wish[0].preset, wish[0].start and wish[0].start.ego_distance
+            number: Amount | None = getattr(wish[0], numbers_of(preset)[0])
+            found[agent.id] = {
+                "preset": preset.value,
+                "within_m": near and near.low_m,
+                "number": number and number.low,
+            }
+    return found
 
 
 def editable_scene(scenario: Scenario) -> Scene:
