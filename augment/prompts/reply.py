@@ -24,7 +24,7 @@ from augment.prompts.vectors import (
     with_short_ids,
 )
 from augment.scene.codec import intent_from_parts
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, check_fits
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import PlannedMotion, PointPath
 from augment.scene.planned_mover import check_motions
@@ -298,7 +298,6 @@ def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modificatio
         removed=tuple(block.remove),
     )
     try:
-        check_fits(shown, asked)
         check_motions(shown, asked)
     except InvalidModification as error:
         raise ReplyUnreadable([str(error)]) from None
