@@ -54,7 +54,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="arena-keys-") as folder:
         home = Home.at(Path(folder))
         home.must(*SMALL_DEMO)
-        _prepare(home, votes)
+        prepare(home, votes)
         print("| latency | presses | visible: median | p95 | max | painted: median | p95 |")
         print("|---|---|---|---|---|---|---|")
         with home.serving() as address, chromium() as browser:
@@ -63,7 +63,7 @@ def main() -> None:
                 print(_row(latency, visible, painted))
 
 
-def _prepare(home: Home, votes: int) -> None:
+def prepare(home: Home, votes: int) -> None:
     """An expert for each latency, and a study of one pair more than they vote on."""
     names = [f"expert-{latency}" for latency in LATENCIES_MS]
     made = "; ".join(
@@ -93,7 +93,7 @@ def _vote(
     page.wait_for_url(f"{address}/")
     wire = context.new_cdp_session(page)
     wire.send("Network.enable")
-    wire.send("Network.emulateNetworkConditions", _conditions(latency_ms))
+    wire.send("Network.emulateNetworkConditions", conditions(latency_ms))
     page.click("a[href*='/vote/']")
     page.wait_for_selector("body.is-live #answers:not([inert])")
     page.wait_for_timeout(2000)
@@ -106,7 +106,7 @@ def _vote(
     return found
 
 
-def _conditions(latency_ms: int) -> dict[str, Any]:
+def conditions(latency_ms: int) -> dict[str, Any]:
     return {
         "offline": False,
         "latency": latency_ms,

@@ -1,68 +1,140 @@
-"""Pairs that move are voted on by keys alone: both sides in step, within a few hundred kB."""
+"""Pairs that move are voted on by keys alone: both sides in step, within 300 kB."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, Response, expect
 from pytest_django.live_server_helper import LiveServer
 
 from tests.browser.booth import Booth, press, ready
+from tests.browser.test_voting_page import faults
 from tests.moving import a_moving_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
 MOST_BYTES = 300_000
+KEYS = {"1": "left", "2": "equal", "3": "right"}
+FILMS = "canvas.reel:not([hidden])"
 
-WATCH = """() => {
-    window.firsts = [];
-    let pressed = 0;
-    addEventListener("keydown", () => { pressed = performance.now(); }, true);
-    const look = () => {
-        for (const canvas of document.querySelectorAll("canvas.reel:not([hidden])")) {
-            if (!canvas.seen && pressed) firsts.push(performance.now() - pressed);
-            canvas.seen = true;
-        }
-        requestAnimationFrame(look);
-    };
-    look();
-}"""
-"""Notes how long after a key a film's canvas is in a frame."""
+EGO_X = """() => [...document.querySelectorAll("canvas.reel")].map((canvas) => {
+    const { width, height } = canvas;
+    const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
+    let most = 0;
+    for (let at = 0; at < data.length; at += 4) {
+        const isRed = data[at] === 218 && data[at + 1] === 30 && data[at + 2] === 40;
+        if (isRed) most = Math.max(most, (at / 4) % width);
+    }
+    return most;
+})"""
+"""How far the ego has come on either side, in dots of the canvas."""
 
-PLACES = """() => [...document.querySelectorAll("canvas.reel")].map((canvas) => canvas.hidden)"""
+WINDOW_M = """() => JSON.parse(document.getElementById("given").textContent).pairs.map(
+    ({ width, px_per_m: scale }) => width / scale)[0]"""
 
 
 @pytest.fixture
 def moving(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
-    made = Booth(
-        address=live_server.url, browser=browser, study=a_moving_study(scenarios=3, votes=9)
-    )
+    study = a_moving_study(scenarios=3, votes=9)
+    made = Booth(address=live_server.url, browser=browser, study=study)
     yield made
     made.leave()
 
 
 @pytest.mark.slow
-def test_thirty_moving_pairs_by_keys(live_server: LiveServer, browser: Browser) -> None:
-    booth = Booth(
-        address=live_server.url, browser=browser, study=a_moving_study(scenarios=10, votes=30)
-    )
-    page = booth.visit("eva", "about:blank", {})
+def test_thirty_moving_pairs_are_voted_on_by_keys(
+    live_server: LiveServer, browser: Browser
+) -> None:
+    study = a_moving_study(scenarios=10, votes=30)
+    booth = Booth(address=live_server.url, browser=browser, study=study)
+    page = booth.visit("eva", "/", {})
     sizes: dict[str, int] = {}
-    page.on("response", lambda answer: note(answer, sizes))
+
+    def note(answer: Response) -> None:
+        if "/i/" in answer.url:
+            sizes[answer.url] = int(answer.headers["content-length"])
+
+    page.on("response", note)
     page.goto(booth.path)
     ready(page)
-    page.evaluate(WATCH)
-    for number in range(29):
-        expect(page.locator("canvas.reel:not([hidden])")).to_have_count(2)
-        press(page, "123"[number % 3])
-    page.keyboard.press("1")
+    for number in range(30):
+        expect(page.locator(FILMS)).to_have_count(2)
+        if number < 29:
+            press(page, "123"[number % 3])
+    page.keyboard.press("3")
     expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
-    all_cast = booth.outcomes()
-    assert all_cast == [("left", "equal", "right")[n % 3] for n in range(29)] + ["left"]
-    print(sum(sizes.values()) / 30, "bytes a pair")
+    assert booth.outcomes() == [KEYS["123"[n % 3]] for n in range(30)]
+    # Each pair has two pictures with films, what these play over, and the scene before.
+    assert len(sizes) == 30 * 6
     assert sum(sizes.values()) / 30 <= MOST_BYTES
     booth.leave()
 
 
-def note(answer: Any, sizes: dict[str, int]) -> None:
-    if "/i/" in answer.url:
-        sizes[answer.url] = int(answer.headers.get("content-length", 0))
+def test_both_sides_move_in_step_by_keys_and_by_the_range(moving: Booth) -> None:
+    page = moving.enter()
+    clock = page.locator(".film-bar output")
+    page.keyboard.press("p")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    time = page.get_by_role("slider", name="Time")
+    time.fill("10")
+    assert clock.inner_text() == "1.0 s"
+    at_1_s = page.evaluate(EGO_X)
+    page.keyboard.press(".")
+    page.keyboard.press("k")
+    assert clock.inner_text() == "1.2 s"
+    later = page.evaluate(EGO_X)
+    # 8 m/s for 0.2 s, at so many dots a metre.
+    dots_per_m = 2400 / float(page.evaluate(WINDOW_M))
+    assert [b - a for a, b in zip(at_1_s, later, strict=True)] == pytest.approx(
+        [1.6 * dots_per_m] * 2, abs=2
+    )
+    assert at_1_s[0] == at_1_s[1]
+    page.keyboard.press(",")
+    assert clock.inner_text() == "1.1 s"
+    page.keyboard.press("f")
+    expect(page.get_by_role("button", name="0.5×")).to_be_visible()
+    time.focus()
+    page.keyboard.press("Home")  # here it moves in time; the stills stand at its start
+    expect(page.locator(FILMS)).to_have_count(0)
+    assert moving.outcomes() == []
+
+
+def test_films_begin_by_themselves_at_once_and_go_with_their_pair(moving: Booth) -> None:
+    page = moving.enter()
+    expect(page.locator(FILMS)).to_have_count(2)
+    page.evaluate(
+        "() => document.querySelectorAll('canvas.reel').forEach((one) => { one.id = 'old'; })"
+    )
+    press(page, "1")
+    expect(page.locator(FILMS)).to_have_count(2)
+    assert page.locator("#old").count() == 0
+    page.keyboard.down("o")  # the scene before the edit, which is a still
+    expect(page.locator("canvas.reel").first).to_be_hidden()
+    page.keyboard.up("o")
+    expect(page.locator(FILMS).first).to_be_visible()
+
+
+def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
+    page = moving.enter(reduced_motion="reduce")
+    expect(page.locator(".film-bar")).to_be_visible()
+    press(page, "1")
+    page.wait_for_timeout(300)
+    assert page.locator(FILMS).count() == 0
+    page.keyboard.press(".")
+    expect(page.locator(FILMS)).to_have_count(2)
+    assert page.inner_text(".film-bar output") == "0.1 s"
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) -> None:
+    page = moving.enter(viewport={"width": width, "height": 800}, bypass_csp=True)
+    expect(page.locator(".film-bar")).to_be_visible()
+    assert overflows(page) is False
+    assert faults(page) == []
+
+
+def overflows(page: Page) -> bool:
+    return bool(
+        page.evaluate(
+            "() => document.documentElement.scrollWidth > document.documentElement.clientWidth"
+        )
+    )

@@ -1,0 +1,124 @@
+"""How soon a pair's films move after the key, and how many bytes such a pair takes.
+
+    python -m bench.moving_ballot [VOTES]
+
+Serves the demo's catalogue, in which whatever was added or moved now drives or walks 40 m straight
+on from 1 s on, and votes in Chromium at 1280x720 without and with a network latency of 150 ms.
+"First frame" is from the press to the frame after the one that has both films of the next pair in
+it; bytes are those on the wire, of pictures, films and what films play over.
+"""
+
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser
+
+from bench.key_to_pair import LATENCIES_MS, PASSWORD, PAUSE_MS, conditions, prepare
+from tests.browser.chromium import chromium
+from tests.stack import SMALL_DEMO, Home
+
+VOTES = 30
+
+MOVE = """
+from dataclasses import replace
+import numpy as np
+from augment.models import Augmentation, Scenario
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.planned_motion import AtTime, PlannedMotion, PointPath
+from augment.services.scenarios.pictures import redraw
+def moving(agent):
+    ahead = agent.pose.to_parent(np.array([[40.0, 0.0]])).tolist()
+    path = PointPath(points_m=(tuple(ahead[0]),))
+    motion = PlannedMotion(path=path, speeds=((2.0, 6.0),), start=AtTime(after_s=1.0))
+    return replace(agent, motion=motion, walk_to_m=None)
+for row in Augmentation.objects.exclude(modification=None):
+    change = modification_from_document(row.modification)
+    added, moved = (tuple(map(moving, agents)) for agents in (change.added, change.moved))
+    change = replace(change, added=added, moved=moved)
+    Augmentation.objects.filter(pk=row.pk).update(modification=modification_to_document(change))
+for scenario in Scenario.objects.filter(augmentations__isnull=False).distinct():
+    redraw(scenario)
+"""
+
+# Put after the page's own listeners, so that it looks on right after them.
+STOPWATCH = """() => {
+window.moved = [];
+const shown = () => [...document.querySelectorAll("canvas.reel:not([hidden])")];
+let before = shown();
+addEventListener("keydown", (event) => {
+  const look = () => {
+    const films = shown();
+    const isNew = films.length === 2 && !films.some((film) => before.includes(film));
+    if (!isNew) return requestAnimationFrame(look);
+    before = films;
+    requestAnimationFrame(() => moved.push(performance.now() - event.timeStamp));
+  };
+  look();
+});
+}"""
+
+
+def main() -> None:
+    """Measure and print the table."""
+    votes = int(sys.argv[1]) if len(sys.argv) > 1 else VOTES
+    with tempfile.TemporaryDirectory(prefix="arena-films-") as folder:
+        home = Home.at(Path(folder))
+        home.must(*SMALL_DEMO)
+        home.must("shell", "-c", MOVE)
+        prepare(home, votes)
+        print("| latency | pairs | first frame, ms: median | p95 | max | kB a pair |")
+        print("|---|---|---|---|---|---|")
+        with home.serving() as address, chromium() as browser:
+            for latency in LATENCIES_MS:
+                moved, bytes_a_pair = _vote(browser, address, latency, votes)
+                p95 = statistics.quantiles(moved, n=20)[-1]
+                figures = [statistics.median(moved), p95, max(moved), bytes_a_pair / 1000]
+                cells = [f"{latency} ms", str(len(moved)), *(f"{one:.1f}" for one in figures)]
+                print(f"| {' | '.join(cells)} |")
+
+
+def _vote(
+    browser: Browser, address: str, latency_ms: int, votes: int
+) -> tuple[list[float], float]:
+    """How long the films of each pair took, and the bytes of a pair, which has three pictures."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.goto(f"{address}/login/")
+    page.fill("input[name=username]", f"expert-{latency_ms}")
+    page.fill("input[name=password]", PASSWORD)
+    page.click("main form button")
+    page.wait_for_url(f"{address}/")
+    wire = context.new_cdp_session(page)
+    picture_of: dict[str, str] = {}
+    sizes: dict[str, float] = {}
+
+    def asked(event: dict[str, Any]) -> None:
+        path = event["request"]["url"].partition("?")[0].removeprefix(address)
+        if path.startswith("/i/"):
+            picture_of[event["requestId"]] = path
+
+    def loaded(event: dict[str, Any]) -> None:
+        if path := picture_of.get(event["requestId"]):
+            sizes[path] = sizes.get(path, 0.0) + event["encodedDataLength"]
+
+    wire.on("Network.requestWillBeSent", asked)
+    wire.on("Network.loadingFinished", loaded)
+    wire.send("Network.enable")
+    wire.send("Network.emulateNetworkConditions", conditions(latency_ms))
+    page.click("a[href*='/vote/']")
+    page.wait_for_selector("canvas.reel:not([hidden])")
+    page.wait_for_timeout(2000)
+    page.evaluate(STOPWATCH)
+    for number in range(votes):
+        page.keyboard.press("123"[number % 3])
+        page.wait_for_timeout(PAUSE_MS)
+    moved: list[float] = page.evaluate("window.moved")
+    context.close()
+    return moved, sum(sizes.values()) / (len(sizes) / 3)
+
+
+if __name__ == "__main__":
+    main()
