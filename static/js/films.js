@@ -41,11 +41,27 @@ function mover([mark, first, last, values]) {
   return { mark, first, last, poses };
 }
 
-function draw(canvas, { width, ground, marks, movers }, step) {
+function surface(width, height, rest) {
+  return Object.assign(document.createElement("canvas"), { width, height }, rest);
+}
+
+// As many dots as the screen has where the canvas lies, zoomed or not, at most as the stills have.
+function fit(canvas, film) {
+  const wide = Math.min(2 * film.width, Math.round(canvas.getBoundingClientRect().width * devicePixelRatio));
+  if (!wide || canvas.width === wide) return;
+  Object.assign(canvas, { width: wide, height: Math.round((wide * film.height) / film.width) });
+  film.back = surface(canvas.width, canvas.height);
+  const pen = Object.assign(film.back.getContext("2d"), { imageSmoothingQuality: "high" });
+  pen.drawImage(film.ground, 0, 0, canvas.width, canvas.height);
+}
+
+function draw(canvas, film, step) {
+  fit(canvas, film);
   const pen = canvas.getContext("2d");
-  const fine = canvas.width / width;
+  const { back, marks, movers } = film;
+  const fine = canvas.width / film.width;
   pen.setTransform(1, 0, 0, 1, 0, 0);
-  pen.drawImage(ground, 0, 0, canvas.width, canvas.height);
+  pen.drawImage(back, 0, 0);
   for (const { mark, first, last, poses } of movers) {
     if (step < first || step > last) continue;
     const at = Math.min(step - first, poses.length - 1);
@@ -84,7 +100,7 @@ export class Player {
   show(films, frames, plays = !isCalm()) {
     this.clear();
     this.films = films;
-    this.canvases = films.map(({ width, height }) => Object.assign(document.createElement("canvas"), { className: "reel", width: 2 * width, height: 2 * height }));
+    this.canvases = films.map(() => surface(0, 0, { className: "reel", hidden: true }));
     this.canvases.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
     this.range.max = this.last = films[0].steps - 1;
     this.bar.hidden = false;
@@ -104,7 +120,7 @@ export class Player {
     if (this.isPlaying) return this.pause();
     [this.#from, this.begun] = [this.step, performance.now()];
     this.#tell();
-    this.#paint();
+    this.paint();
     requestAnimationFrame((now) => this.#tick(now));
   }
 
@@ -132,7 +148,7 @@ export class Player {
     this.#from = null;
     this.step = Math.min(Math.max(step, 0), this.last);
     this.#tell();
-    this.#paint();
+    this.paint();
   }
 
   #tick(now) {
@@ -141,11 +157,13 @@ export class Player {
     const at = gone % (this.last + END_STEPS + STILL_STEPS);
     const rests = at > this.last + END_STEPS;
     this.step = rests ? 0 : Math.min(at, this.last);
-    this.#paint(rests);
+    this.paint(rests);
     requestAnimationFrame((later) => this.#tick(later));
   }
 
-  #paint(rests = !this.isPlaying) {
+  // Also where the stills are zoomed meanwhile.
+  paint(rests = !this.isPlaying) {
+    if (!this.films.length) return;
     const isStill = rests && this.step === 0;
     this.canvases.forEach((canvas, place) => {
       canvas.hidden = isStill;

@@ -3,6 +3,10 @@ import { note, text } from "./vote-page.js";
 
 const bar = document.querySelector(".film-bar");
 const player = bar && new (await import("./films.js")).Player(bar);
+// What is zoomed is drawn finer, also where it stands.
+for (const scene of bar ? document.querySelectorAll(".panel > .scene") : []) {
+  new MutationObserver(() => player.paint()).observe(scene, { attributeFilter: ["style"] });
+}
 
 export const filmActions = Object.fromEntries(["play", "back", "on", "rate"].map((name) => [name, () => player[name]()]));
 

@@ -26,6 +26,8 @@ from arena.results.services.ratings import rate_now as rate
 from arena.results.services.stored_rows import as_line, columns_of, find_filled_tables
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
+from augment.services.scenarios.pictures import film_document
+from tests.moving import a_moving_study
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -83,6 +85,24 @@ def test_export_import_and_export_give_the_same_folder(study: Study, tmp_path: P
     again = Study.objects.get(name=study.name)
     assert export(again, tmp_path / "second") == first
     assert {expert.username for expert in again.experts.all()} == {"expert-0001", "expert-0002"}
+
+
+def test_films_travel_and_play_over_what_they_played_over(
+    tmp_path: Path, settings: Settings
+) -> None:
+    settings.MEDIA_ROOT = tmp_path / "media"
+    made = a_moving_study(scenarios=1, votes=3)
+    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
+    close_study(study=made)
+    first = export(made, tmp_path / "first")
+    empty()
+    shutil.rmtree(settings.MEDIA_ROOT)
+    call_command("import", "study", str(tmp_path / "first"))
+    assert export(Study.objects.get(name=made.name), tmp_path / "second") == first
+    for row in Augmentation.objects.all():
+        film = film_document(row.image)
+        assert film is not None
+        assert default_storage.exists(film["ground"])
 
 
 def test_only_pseudonyms_travel(study: Study, tmp_path: Path) -> None:
