@@ -24,6 +24,7 @@ from arena.api.views import (
     operation,
     page_of,
 )
+from arena.jobs.exports.sweeps import sweep_sheet
 from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment
@@ -282,25 +283,6 @@ class SweepBody(RequestBody):
     request = SweepRequest
 
 
-class SweptTrial(serializers.Serializer[Any]):
-    """A drive of a value that has a score."""
-
-    driver = serializers.CharField()
-    score = serializers.FloatField(help_text="By nuPlan, 0 to 1.")
-    is_lawful = serializers.BooleanField(
-        help_text="It hit nobody, stayed on the road and made progress."
-    )
-    is_tested = serializers.BooleanField()
-
-
-class SweptValueDocument(serializers.Serializer[Any]):
-    """A value of a sweep."""
-
-    value = serializers.FloatField(source="row.value")
-    reason = serializers.CharField(source="row.reason", help_text="Why it fits nowhere.")
-    trials = SweptTrial(many=True, source="tried.trials")
-
-
 class SweepDocument(WarnedDocument):
     """A sweep as far as it has been driven."""
 
@@ -320,7 +302,12 @@ class SweepDocument(WarnedDocument):
         allow_null=True,
         help_text="The scenario that was kept.",
     )
-    values = SweptValueDocument(many=True, source="lines")
+    drives = serializers.SerializerMethodField(help_text="Rows as in the sweep's files.")
+
+    def get_drives(self, result: SweepResult) -> list[dict[str, Any]]:
+        """Return a row for each drive, and for each value that fits nowhere."""
+        sheet = sweep_sheet(result)
+        return [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows]
 
 
 class SweepsView(ApiView):

@@ -52,7 +52,7 @@ def draw_ranges(document: Mapping[str, Any], rng: np.random.Generator) -> dict[s
         if not isinstance(part, dict):
             return part
         low: float = part[_low_key(part)]
-        high: float = part.get(_low_key(part).replace(_LOW, _HIGH, 1), low)
+        high: float = part.get("high" + _low_key(part).removeprefix("low"), low)
         return part if high == low else _exact(part, round(float(rng.uniform(low, high)), 2))
 
     drawn: dict[str, Any] = _map_numbers(document, draw)
@@ -100,7 +100,7 @@ def _map_numbers(
 
 
 def _low_key(part: Mapping[str, Any]) -> str:
-    return next((key for key in part if key.startswith(_LOW)), "")
+    return next((key for key in part if key.partition("_")[0] == "low"), "")
 
 
 def _exact(part: Any, value: float) -> Any:

@@ -101,6 +101,11 @@ def _check_reading(row: models.IntentReading) -> None:
         intent_from_document(row.document)
 
 
+def _check_swept(row: models.SweepValue) -> None:
+    if row.modification is not None:
+        modification_from_document(row.modification)
+
+
 def _check_drive(row: models.Simulation) -> None:
     if row.offsets not in OFFSETS_M:
         raise InvalidDocument("drive", [("offsets", f"one of {', '.join(OFFSETS_M)}")])
@@ -127,6 +132,7 @@ RULES: Mapping[type[Model], Callable[[Any], None]] = {
     models.SceneUpload: lambda row: check_stored_name("stored", row.stored),
     models.Simulation: _check_drive,
     models.Submission: _check_submission,
+    models.SweepValue: _check_swept,
     models.UploadMoment: lambda row: check_stored_name("picture", row.picture),
 }
 """What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""

@@ -67,6 +67,15 @@ def test_ranges_are_drawn_evenly_within_their_bounds_and_exact_numbers_stay() ->
     assert draw_ranges(gap(8.0), rng) == gap(8.0)
 
 
+def test_a_range_without_a_unit_in_its_names_is_drawn_too() -> None:
+    document = {
+        "motion": {"speed_mps": {"low": 2.0, "high": 4.0}, "start": {"after_s": {"low": 1.0}}}
+    }
+    drawn = list_numbers(draw_ranges(document, np.random.default_rng(1)))
+    assert 2.0 <= drawn.pop("motion.speed_mps") <= 4.0
+    assert drawn == {"motion.start.after_s": 1.0}
+
+
 def test_values_are_evenly_spaced_and_bounded() -> None:
     assert sweep_values(8.0, 20.0, 4) == (8.0, 12.0, 16.0, 20.0)
     assert sweep_values(0.0, 0.3, 4) == (0.0, 0.1, 0.2, 0.3)

@@ -77,7 +77,8 @@ def test_a_program_starts_a_sweep_and_reads_it(scenario: Scenario) -> None:
     drive_tested()
     found = researcher.get(f"/api/v1/sweeps/{answer.json()['code']}").json()
     assert (found["edges"], found["under_way"], found["hardest"]) == ([[3.0, 2.0]], 6, None)
-    assert [one["trials"][0]["is_lawful"] for one in found["values"]] == [False, True]
+    own = [one for one in found["drives"] if one["driver"] == STRAIGHT.planner]
+    assert [(one["value"], one["lawful"]) for one in own] == [(2.0, False), (3.0, True)]
 
 
 def test_a_family_is_drawn_on_the_page_and_by_the_wire(scenario: Scenario) -> None:

@@ -19,30 +19,19 @@ _KEPT = "#a35a00"
 
 def sweep_sheet(result: SweepResult) -> Sheet:
     """Return one row a drive, and one for a value that fits nowhere."""
-    open_line = dict.fromkeys(("driver", "state", "score", "lawful"))
     lines = [
-        {
-            "value": line.row.value,
-            "driver": driver_of(drive),
-            "state": drive.state,
-            "score": drive.nuplan_score,
-            "lawful": is_lawful,
-            "reason": drive.reason,
-        }
+        {"line": line, "drive": drive, "driver": drive and driver_of(drive), "lawful": is_lawful}
         for line in result.lines
-        for drive, is_lawful in line.cells
-    ]
-    lines += [
-        {**open_line, "value": line.row.value, "reason": line.row.reason}
-        for line in result.lines
-        if not line.drives
+        for drive, is_lawful in line.cells or [(None, None)]
     ]
     columns: Columns = {
-        **Dtype.NUMBER.columns("value"),
-        **Dtype.TEXT.columns("driver", "state"),
-        "nuplan_score": ("score", Dtype.NUMBER),
+        "value": ("line.row.value", Dtype.NUMBER),
+        **Dtype.TEXT.columns("driver"),
+        "state": ("drive.state", Dtype.TEXT),
+        "nuplan_score": ("drive.nuplan_score", Dtype.NUMBER),
         **Dtype.YES_NO.columns("lawful"),
-        **Dtype.TEXT.columns("reason"),
+        "reason": ("drive.reason", Dtype.TEXT),
+        "fits_nowhere": ("line.row.reason", Dtype.TEXT),
     }
     sweep = result.sweep
     facts = {

@@ -22,6 +22,7 @@ from augment.services.judging.sweeps import (
     LARGEST_FAMILY,
     SweepRequest,
     add_family,
+    delete_sweep,
     numbers_of,
     plan_sweep,
 )
@@ -132,7 +133,7 @@ def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse
 def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Delete a sweep with its drives; what it kept stays."""
     sweep = _sweep(code)
-    sweep.delete()
+    delete_sweep(sweep, actor=user_of(request))
     messages.success(request, f"The sweep of {sweep.number} is deleted.")
     return redirect("sweeps", code=sweep.scenario.code)
 

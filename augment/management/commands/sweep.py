@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.db import transaction
 
 from augment.services.inputs import read_request
@@ -23,17 +22,12 @@ class Command(TerminalCommand):
         "and with PDM-Closed and IDM. The hardest value that one of these solves and the planner "
         "does not is kept as a scenario."
     )
-    arguments = {"scenario": {"help": "its slug"}}
+    arguments = {
+        "scenario": {"help": "its slug"},
+        "--queue": {"action": "store_true", "help": "leave the drives to the workers"},
+        "--to": {"type": Path, "help": "drive nothing: write scenarios for `simulate --to` there"},
+    }
     request = SweepRequest
-
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Add those of a sweep, and what becomes of it."""
-        super().add_arguments(parser)
-        where = parser.add_mutually_exclusive_group()
-        where.add_argument("--queue", action="store_true", help="leave the drives to the workers")
-        where.add_argument(
-            "--to", type=Path, help="drive nothing: write scenarios for `simulate --to` there"
-        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the values, or plan their drives and drive or queue them."""

@@ -16,6 +16,7 @@ from augment.models import Scenario, Simulation, Sweep, SweepValue
 from augment.scene import codec
 from augment.scene.entities import Modification, Scene
 from augment.scene.numbers import MOST_VALUES, list_numbers, set_number, sweep_values
+from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.judging.simulations import Options, load_planner
 from augment.services.judging.thresholds import tell_difference
@@ -150,6 +151,15 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
         if isinstance(change, Modification)
     ]
     return own_json.write(cells).files
+
+
+@transaction.atomic
+def delete_sweep(sweep: Sweep, *, actor: User | None = None) -> None:
+    """Delete a sweep with its drives; the scenario that it kept stays."""
+    log_change(
+        sweep, "delete", actor, before={"scenario": sweep.scenario.slug, "number": sweep.number}
+    )
+    sweep.delete()
 
 
 def ways_of(tested: Options) -> list[Options]:

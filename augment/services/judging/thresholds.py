@@ -4,6 +4,7 @@ Once the last drive has an outcome the sweep is concluded: whichever worker find
 the hardest value as a scenario, and a worker's regular round does where that one died before.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from django.db import transaction
@@ -37,7 +38,7 @@ class SweepLine:
     tried: TriedValue
 
     @property
-    def cells(self) -> list[tuple[Simulation, bool | None]]:
+    def cells(self) -> Sequence[tuple[Simulation | None, bool | None]]:
         """The drives, each with whether it was lawful; None where it has no score."""
         lawful = {trial.driver: trial.is_lawful for trial in self.tried.trials}
         return [(drive, lawful.get(driver_of(drive))) for drive in self.drives]
