@@ -172,7 +172,8 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
     chords_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     count = min(max(3, math.ceil(chords_m[-1] / SAMPLE_M) + 1), MOST_SAMPLES)
     samples_m = np.linspace(0.0, chords_m[-1], count)
-    return Polyline(PchipInterpolator(chords_m, points)(samples_m))
+    with np.errstate(over="ignore"):  # a slope of next to nothing is as good as none
+        return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
 def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:

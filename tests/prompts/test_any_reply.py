@@ -42,7 +42,13 @@ def test_any_text(text: str) -> None:
     read(text)
 
 
-@given(st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON))
+MOTIONS = st.dictionaries(st.sampled_from(["start", "path", "speeds"]), JSON)
+
+
+@given(
+    st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON)
+    | st.builds(dict, motion=JSON | MOTIONS)
+)
 def test_any_fields_of_an_agent(fields: dict[str, object]) -> None:
     read(answer(block(agent(**fields))))
 

@@ -23,7 +23,7 @@ from augment.scene.planned_motion import (
     PlannedMotion,
     PointPath,
 )
-from augment.scene.planned_mover import check_motions
+from augment.scene.planned_mover import check_motions, smooth_line
 from tests.scenes import junction, pedestrian, scene, vehicle
 
 
@@ -186,6 +186,12 @@ def test_paths_without_an_end_and_rings_of_lanes_are_bounded() -> None:
     crowd = tuple(replace(goes_round, id=f"Agent{n}") for n in range(2, 103))
     with pytest.raises(InvalidModification, match="101 agents have a motion; at most 100"):
         check_motions(junction(), Modification(added=crowd))
+
+
+def test_a_slope_of_next_to_nothing_is_none() -> None:
+    line = smooth_line([(0.0, 0.0), (1.0, 1e-310), (2.0, 1.0)])
+    assert line is not None
+    assert line.position(0.5) == pytest.approx((0.5, 0.0))
 
 
 def test_a_motion_is_written_and_read_and_a_walk_beside_it_is_refused() -> None:

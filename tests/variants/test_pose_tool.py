@@ -1,6 +1,7 @@
 import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -201,6 +202,21 @@ any_json = st.recursive(
 )
 
 
+STARTS: st.SearchStrategy[Any] = st.builds(
+    dict, kind=st.just("place"), x_m=st.floats(-9, 9), y_m=st.just(0), agent_id=st.text()
+)
+ALONG: st.SearchStrategy[Any] = st.builds(
+    dict, kind=st.just("lanes"), lane_ids=st.lists(st.sampled_from(["Lane1", "x"]))
+)
+OVER: st.SearchStrategy[Any] = st.builds(
+    dict, kind=st.just("points"), points_m=st.lists(st.tuples(st.floats(-1e6, 1e6), st.just(0)))
+)
+MOVES = {
+    "path": any_json | ALONG | OVER,
+    "speeds": any_json | st.lists(st.tuples(st.floats(0, 60), st.floats(0, 100)), max_size=3),
+}
+
+
 @given(
     arguments=any_json
     | st.fixed_dictionaries(
@@ -212,6 +228,9 @@ any_json = st.recursive(
         optional={
             "lateral_m": any_json | st.floats(-5, 5),
             "object": any_json | st.sampled_from(OBJECT_TYPES),
+            "speed_mps": st.floats(0, 60),
+            "after_s": any_json | st.floats(0, 15),
+            "motion": st.fixed_dictionaries({}, optional={"start": any_json | STARTS, **MOVES}),
         },
     )
 )
