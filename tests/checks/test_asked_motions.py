@@ -14,7 +14,7 @@ from augment.scene.codec import INTENT, intent_from_document
 from augment.scene.entities import AgentType, Area, AreaKind, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion
-from tests.scene.test_presets import crossing, lanes
+from tests.scene.test_presets import bend, crossing, lanes
 from tests.scenes import pedestrian, scene, vehicle
 
 WIDE = scene(lanes=lanes(0.0, 3.5, oncoming_m=(7.0, 10.5)), areas=())
@@ -102,6 +102,10 @@ WISHES: dict[str, tuple[Scene, Intent]] = {
             {"preset": "red_light", "side": "right", "start": {"after_s": {"low": 1}}}, speed_mps=6
         ),
     ),
+    "emergency_stop": (
+        replace(bend(), agents=(replace(LEADER, x_m=9.0),)),
+        moved("moving vehicle", preset="emergency_stop", braking_mps2={"low": 7.0}),
+    ),
     "pull_out": (PARKED, moved("parked vehicle", preset="pull_out", speed_mps={"low": 6.0})),
 }
 
@@ -157,6 +161,11 @@ def other(agent: TrafficAgent, **parts: Any) -> TrafficAgent:
             "red_light",
             lambda one: other(one, path=None, speeds=((1.0, 0.0),)),
             FindingKind.ASKED_CROSSING,
+        ),
+        (
+            "emergency_stop",
+            lambda one: other(one, start=AtTime(after_s=0.5)),
+            FindingKind.ASKED_DISTANCE,
         ),
         ("door_opening", lambda one: other(one, speeds=((1.0, 0.0),)), FindingKind.ASKED_MOTION),
         ("pull_out", lambda one: other(one, path=None), FindingKind.ASKED_ACROSS),

@@ -57,6 +57,13 @@ def crossing(light: TrafficLight = TrafficLight.RED) -> Scene:
     return scene(lanes=(*lanes(0.0), *arms), connectors=(way,))
 
 
+def bend() -> Scene:
+    """The ego's lane turns left on 40 m round (10, 40) and goes straight on from (50, 40)."""
+    (lane,) = curve(40.0).lanes
+    line = Polyline(np.vstack([lane.centerline.points_m, [(50.0, 140.0)]]))
+    return scene(lanes=(replace(lane, centerline=line),), areas=())
+
+
 def car(
     x_m: float, y_m: float, *, speed_mps: float = 0.0, heading_rad: float = 0.0
 ) -> TrafficAgent:
@@ -160,11 +167,8 @@ def test_who_runs_a_red_light_meets_the_ego_in_the_crossing() -> None:
 
 
 def test_a_leader_stops_behind_the_bend() -> None:
-    bend = curve(40.0)
-    straight = Polyline(np.vstack([bend.lanes[0].centerline.points_m, [(50.0, 140.0)]]))
-    base = scene(lanes=(replace(bend.lanes[0], centerline=straight),), areas=())
-    agent = with_preset(MotionPreset.EMERGENCY_STOP, base, car(5.0, 0.0, speed_mps=8.0))
-    end = driven(base, agent).states[-1]
+    agent = with_preset(MotionPreset.EMERGENCY_STOP, bend(), car(5.0, 0.0, speed_mps=8.0))
+    end = driven(bend(), agent).states[-1]
     # The bend ends at y = 40 m; within 15 m less than 5 degrees are left 3.5 m before.
     assert end[[0, 3]].tolist() == pytest.approx([50.0, 0.0], abs=0.05)
     assert 40.0 < end[1] < 43.0
