@@ -84,10 +84,7 @@ def describe_change(
         for agent in scene.agents
         if agent.id in touched
     }
-    cars = [one for one in apply(scene, change).agents if is_stopped(one)]
-    wishes = {
-        agent.id: found for agent in change.changed if (found := find_wish(agent, scene, cars))
-    }
+    wishes = _wishes(change, scene)
     sentence = _sentence(kind, change, lanes, scene, picks, wishes)
     if lanes is None:
         return sentence, None
@@ -117,8 +114,10 @@ def describe_change(
     return sentence, full if faults[0] <= faults[1] else looser
 
 
-def type_of_change(change: Modification, scene: Scene) -> ScenarioType:
-    """Return the one of the five types that a change looks most like."""
+def type_of_change(change: Modification, scene: Scene) -> ScenarioType | MotionPreset:
+    """Return what somebody is made to do, else the one of five types that it looks most like."""
+    for motion, _ in _wishes(change, scene).values():
+        return motion.preset
     kinds = {agent.type for agent in change.added}
     if kinds & {AgentType.TRAFFIC_CONE, *_FRONTLESS}:
         return ScenarioType.CONSTRUCTION_ZONE
@@ -170,6 +169,12 @@ def _place_of(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
 # The intent
 
 
+def _wishes(change: Modification, scene: Scene) -> _Wishes:
+    cars = [one for one in apply(scene, change).agents if is_stopped(one)]
+    found = {agent.id: find_wish(agent, scene, cars) for agent in change.changed}
+    return {name: one for name, one in found.items() if one is not None}
+
+
 def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
     added = sorted(change.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
@@ -181,12 +186,11 @@ def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iter
     doors = [wishes[one.id] for one in added if one.id in wishes and one.type not in _MOVERS]
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
-        motion = wishes[agent.id][0] if agent.id in wishes else None
         if agent.type in _BODIES:
-            request = _vehicle(agent, lanes, motion)
+            request = _vehicle(agent, lanes, _motion_of(agent, wishes))
             yield replace(request, name=agent.id) if agent.id in anchors else request
     for agent in people:
-        motion = wishes[agent.id][0] if agent.id in wishes else None
+        motion = _motion_of(agent, wishes)
         if agent.walk_to_m is not None or motion is not None:
             yield replace(_walk(agent, lanes), motion=motion)
     for motion, car in doors:
@@ -206,7 +210,7 @@ def _moves(
     before = {agent.id: agent for agent in lanes.route.scene.agents}
     for agent in change.moved:
         who = picks[agent.id]
-        motion = wishes[agent.id][0] if agent.id in wishes else None
+        motion = _motion_of(agent, wishes)
         if who is not None and motion is not None and _stays(agent, before[agent.id]):
             yield wish.Move(who=who, motion=motion)
         elif who is not None:
@@ -221,8 +225,14 @@ def _moves(
             )
 
 
+def _motion_of(agent: TrafficAgent, wishes: _Wishes) -> wish.MotionWish | None:
+    return wishes[agent.id][0] if agent.id in wishes else None
+
+
 def _stays(agent: TrafficAgent, before: TrafficAgent) -> bool:
-    return math.hypot(agent.x_m - before.x_m, agent.y_m - before.y_m) < _BESIDE_M
+    """Whether it only moves otherwise; whoever is to start late stands until then."""
+    is_as_fast = agent.type is AgentType.PEDESTRIAN or agent.speed_mps == before.speed_mps
+    return is_as_fast and math.dist(agent.pose.beside(0.0), before.pose.beside(0.0)) < _BESIDE_M
 
 
 def _pick_of(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
@@ -391,9 +401,8 @@ def _sentence(
 
 
 def _then(agent: TrafficAgent, wishes: _Wishes) -> str:
-    if agent.id not in wishes:
-        return ""
-    return f", {', '.join(list_motion_facts(wishes[agent.id][0]))}"
+    motion = _motion_of(agent, wishes)
+    return f", {', '.join(list_motion_facts(motion))}" if motion else ""
 
 
 def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:
