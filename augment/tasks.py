@@ -172,6 +172,7 @@ def sender(kind: WorkKind[Any]) -> Callable[[int], int]:
     return lambda pk: enqueue(kind, [pk])
 
 
+enqueue_augmentation = sender(AUGMENTATIONS)
 enqueue_moment = sender(MOMENTS)
 enqueue_probe = sender(PROBES)
 enqueue_reading = sender(READINGS)

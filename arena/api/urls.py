@@ -42,6 +42,8 @@ urlpatterns: list[URLPattern] = [
     _at("jobs/<uuid:code>", jobs.JobView, "api-job"),
     _at("jobs/<uuid:code>/progress", jobs.JobProgressView, "job-progress"),
     _at("jobs/<uuid:code>/exports/<slug:name>.<slug:form>", jobs.JobExportView, "api-job-file"),
+    _at("augmentations/<uuid:code>", jobs.AugmentationView, "api-augmentation"),
+    _at("augmentations/<uuid:code>/follow-ups", jobs.FollowUpsView, "api-follow-ups"),
     _at("studies", studies.StudiesView, "api-studies"),
     _at("studies/<uuid:code>", studies.StudyView, "api-study"),
     _at("studies/<uuid:code>/close", studies.CloseStudyView, "api-study-close"),

@@ -19,6 +19,7 @@ from arena.api.views import (
     FileView,
     Given,
     PageQuery,
+    RowDocument,
     WarnedDocument,
     file_operation,
     keep_and_send,
@@ -27,12 +28,13 @@ from arena.api.views import (
 )
 from arena.exports.formats import download
 from arena.jobs.exports.tables import JOB_TABLES
-from augment.models import GenerationJob
+from augment.models import Augmentation, GenerationJob
 from augment.services.running.estimates import estimate
+from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up
 from augment.services.running.jobs import JobRequest, JobScope, launch
 from augment.services.running.progress import JobCounts, count_each, count_rows
 from augment.services.running.workers import workforce
-from augment.tasks import enqueue_job
+from augment.tasks import enqueue_augmentation, enqueue_job
 
 
 class JobQuery(PageQuery):
@@ -210,3 +212,65 @@ class JobExportView(FileView):
         if form not in table.formats:
             raise Http404
         return download(table.formats, form, stem, table.make(job))
+
+
+class AugmentationDocument(RowDocument[Augmentation], WarnedDocument):
+    """What one contestant made of one scenario."""
+
+    job = serializers.UUIDField(source="job.code")
+    scenario = serializers.CharField(source="scenario.slug")
+    contestant = serializers.CharField(source="contestant.slug")
+    follows = serializers.UUIDField(
+        source="follows.code", default=None, allow_null=True, help_text="The step before."
+    )
+    instruction = serializers.CharField(
+        source="scenario.wording", help_text="Of a follow-up every step's, numbered."
+    )
+    modification = serializers.DictField(allow_null=True)
+
+    class Meta:
+        model = Augmentation
+        fields = (
+            *("code", "job", "scenario", "contestant", "sample", "follows", "instruction"),
+            *("state", "reason", "notes", "modification", "created_at", "finished_at", "warnings"),
+        )
+
+
+class FollowUpBody(RequestBody):
+    """What to change in an answer; a missing cap is none."""
+
+    request = FollowUpRequest
+
+
+class AugmentationView(ApiView):
+    """One augmentation."""
+
+    readers = STAFF
+
+    @operation(AugmentationDocument, name="getAugmentation")
+    def get(self, code: uuid.UUID) -> Augmentation:
+        """An augmentation.
+
+        Its modification is there once its state is done.
+        """
+        return _augmentation(code)
+
+
+class FollowUpsView(ApiView):
+    """What a contestant is told next."""
+
+    writers = ADMINS
+
+    @operation(AugmentationDocument, takes=FollowUpBody, status=201, name="followUp")
+    def post(self, code: uuid.UUID, given: Given) -> tuple[Augmentation, list[str]]:
+        """Have a language model change its own answer further.
+
+        A job of its own does it; to go back is to follow up an earlier step.
+        """
+        ask = partial(ask_follow_up, _augmentation(code), FollowUpRequest(**given))
+        return keep_and_send(partial(ask, actor=self.user), enqueue_augmentation)
+
+
+def _augmentation(code: uuid.UUID) -> Augmentation:
+    rows = Augmentation.objects.select_related("job", "scenario__base_scene", "contestant")
+    return get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)

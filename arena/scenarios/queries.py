@@ -3,7 +3,7 @@
 import math
 import uuid
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -115,6 +115,43 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
     ]
     removed = parts.get("remove", ())
     return lines + [{"change": "removed", "agent": name, "x_m": None} for name in removed]
+
+
+def step_changes(before: dict[str, Any] | None, after: dict[str, Any] | None) -> list[str]:
+    """Return a sentence for each agent that a step of a conversation treats otherwise.
+
+    Args:
+        before: The stored modification of the step before.
+        after: That of the step.
+    """
+    old, new = (
+        {line["agent"]: line for line in modification_lines(document)}
+        for document in (before, after)
+    )
+    told = [f"{name} left alone again" for name in old if name not in new]
+    for name, line in new.items():
+        was = old.get(name)
+        if was is None or was["change"] != line["change"]:
+            kind = f": {line['kind']}" if "kind" in line else ""
+            told.append(f"{name} {line['change']}{kind}")
+        elif was != line and (differences := list(_differences(was, line))):
+            told.append(f"{name}: {', '.join(differences)}")
+    return told
+
+
+def _differences(was: dict[str, Any], line: dict[str, Any]) -> Iterator[str]:
+    apart_m = math.dist((was["x_m"], was["y_m"]), (line["x_m"], line["y_m"]))
+    turned_deg = (line["heading_deg"] - was["heading_deg"] + 180.0) % 360.0 - 180.0
+    if apart_m >= 0.005:
+        yield f"{apart_m:.2f} m away"
+    if was["kind"] != line["kind"]:
+        yield f"a {line['kind']}"
+    if abs(turned_deg) >= 0.05:
+        yield f"turned by {turned_deg:.1f}°"
+    told = {"x_m", "y_m", "kind", "type", "heading_deg", "heading_rad", "lane_id"}
+    for name in sorted((was.keys() | line.keys()) - told):
+        if was.get(name) != line.get(name):
+            yield f"another {name.removesuffix('_m').removesuffix('_mps').replace('_', ' ')}"
 
 
 # --- Benchmarks --------------------------------------------------------------------------------

@@ -61,6 +61,7 @@ urlpatterns: list[URLPattern] = [
     path("benchmarks/<uuid:code>/retired/", benchmarks.retire_benchmark, name="benchmark-retired"),
     path("pictures/<slug:kind>/<uuid:code>.png", augmentations.picture, name="picture"),
     path("augmentations/<uuid:code>/", augmentations.augmentation_page, name="augmentation"),
+    path("augmentations/<uuid:code>/follow-up/", augmentations.follow_up, name="follow-up"),
     path("augmentations/<uuid:code>/correct/", editor.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", augmentations.transcript, name="transcript"),
     path("asked/<slug:digest>.png", augmentations.asked_image, name="asked-image"),

@@ -41,6 +41,10 @@ OVER_TIME_NOTE = (
     f"Where something moves, distances are also followed for {HORIZON_S:g} s after t0: their mean "
     "over time, the last one, and by how many seconds the motions begin apart; boxes are of t0."
 )
+KEPT_NOTE = (
+    "Kept: of what follow-ups were to leave as in the answer before, how much looks the same, and "
+    "how far it was moved."
+)
 SIMULATED_NOTE = "Simulated contestants are marked; they say nothing about a real one."
 
 FAR = 4.0
@@ -74,6 +78,16 @@ class DisplacementTable:
         return any(group.summary.over_time for group in self.groups)
 
     @property
+    def has_follow_ups(self) -> bool:
+        """Whether anything was to be left alone."""
+        return any(group.kept for group in self.groups)
+
+    @property
+    def columns(self) -> int:
+        """How many columns a page shows."""
+        return 7 + 3 * self.moves + 2 * self.has_follow_ups
+
+    @property
     def types_text(self) -> str:
         """Which scenario types count, in words."""
         if self.types == tuple(ScenarioType):
@@ -90,6 +104,7 @@ class DisplacementTable:
             "Missing and surplus objects are counted and have no distance; an unreadable or "
             "refused answer misses all.",
             *([OVER_TIME_NOTE] if self.moves else []),
+            *([KEPT_NOTE] if self.has_follow_ups else []),
             *([PAPERS_CHOICE] if self.by is By.VARIANT else []),
             *(f"Not measured: {number} ({why})." for why, number in self.left_out.items()),
             *([SIMULATED_NOTE] if self.simulated else []),
@@ -115,6 +130,12 @@ def name_of(contestant: Contestant) -> str:
     return shown_name(contestant.name, contestant.is_simulated)
 
 
+KEPT: Columns = {
+    **Dtype.WHOLE.columns("to_keep", "kept", of="kept"),
+    **Dtype.NUMBER.columns("moved_mean_m", of="kept"),
+}
+"""Of follow-ups: what was to stay of the answer before, what did, and how far it was moved."""
+
 GROUPS: Columns = {
     "group": ("heading", Dtype.TEXT),
     "contestant": (lambda group: name_of(group.contestant), Dtype.TEXT),
@@ -124,6 +145,7 @@ GROUPS: Columns = {
     **Dtype.NUMBER.columns(
         "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", of="summary.box"
     ),
+    **KEPT,
     "outliers_m": (
         lambda group: join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
         Dtype.TEXT,

@@ -47,6 +47,7 @@ AUGMENTATIONS: Columns = {
     "missing": (_count("missing"), Dtype.WHOLE),
     "surplus": (_count("surplus"), Dtype.WHOLE),
     "displacement_mean_m": ("displacement.mean_m", Dtype.NUMBER),
+    **displacement.KEPT,
     **Dtype.WHOLE.columns("wrong", "doubtful"),
     **Dtype.NUMBER.columns("realism"),
     "calls": ("spending.calls", Dtype.WHOLE),

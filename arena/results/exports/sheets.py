@@ -97,7 +97,7 @@ def sample_sheet(
         parts = figure.subfigures(down, 1, squeeze=False).flat
         for line, (part, slug) in enumerate(zip(parts, scenarios, strict=True)):
             scenario = rows[slug]
-            text = f"{scenario.get_type_display()}: “{scenario.instruction.strip()}”"
+            text = f"{scenario.get_type_display()}: “{scenario.wording.strip()}”"
             caption = f"({chr(ord('a') + line % 26)}) {text}"
             tiles = [_sample_tile(shown[name], cells.get((slug, name))) for name in contestants]
             _draw_tiles(part, _wrap(caption, 50 * across), tiles, across)
@@ -168,7 +168,7 @@ def _pages(snapshot: Snapshot, scenarios: Sequence[Scenario]) -> Iterator[Figure
         figure.suptitle(head, fontsize=9, fontweight="bold")
         parts = figure.subfigures(at_once, 1, squeeze=False).flat
         for part, scenario in zip(parts, scenarios[start : start + at_once], strict=False):
-            caption = f"{scenario.slug}: {' '.join(scenario.instruction.split())}"
+            caption = f"{scenario.slug}: {' '.join(scenario.wording.split())}"
             tiles = [_judged_tile(row, shown[scenario.pk].get(row.slug)) for row in rows]
             _draw_tiles(part, _wrap(caption, 170), tiles, _ACROSS)
         yield figure

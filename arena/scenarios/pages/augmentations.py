@@ -4,17 +4,21 @@ import re
 import uuid
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
-from django.shortcuts import get_object_or_404, render
+from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.contestants.queries import asking_of
-from arena.scenarios.queries import modification_lines
-from arena.site.access import STAFF, page_for
+from arena.scenarios.queries import modification_lines, step_changes
+from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
+from arena.site.acts import looks_again, send_later, tell_errors
+from arena.site.forms import RequestForm
 from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
+from augment.services.inputs import inputs_of, read_request
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
+from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, steps_to
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.pictures import (
     SceneView,
@@ -23,16 +27,30 @@ from augment.services.scenarios.pictures import (
     scene_picture,
 )
 from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
+from augment.tasks import enqueue_augmentation
+
+State = Augmentation.State
+
+
+class FollowUpForm(RequestForm):
+    """What to change next, within which caps."""
+
+    inputs = inputs_of(FollowUpRequest)
 
 
 @page_for(*STAFF)
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
+    can_go_on = augmentation.state == State.DONE and augmentation.contestant.endpoint is not None
     tries, checked = tries_of(augmentation), check_augmentation(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
+        "look": looks_again(request, waits=augmentation.state in Augmentation.UNDER_WAY),
+        "steps": _steps(augmentation),
+        "follow_ups": augmentation.follow_ups.select_related("scenario"),
+        "form": FollowUpForm() if can_go_on else None,
         "corrections": augmentation.corrections.select_related("contestant", "made_by"),
         "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
         "nuplan_results": augmentation.nuplan_results.all(),
@@ -45,9 +63,33 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "jobs/augmentation.html", context)
 
 
+@act_for(ADMIN, back="augmentation")
+def follow_up(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
+    """Have the contestant change its own answer further."""
+    form = FollowUpForm(request.POST)
+    if not form.is_valid():
+        tell_errors(request, form)
+        return None
+    wish = read_request(FollowUpRequest, form.cleaned_data)
+    made = ask_follow_up(_augmentation(code), wish, actor=user_of(request))
+    send_later(request, enqueue_augmentation, made.pk)
+    return redirect("augmentation", code=made.code)
+
+
+def _steps(row: Augmentation) -> list[tuple[Augmentation, list[str]]]:
+    """Return the steps up to this one, each with what it changed of the step before."""
+    steps = steps_to(row)
+    before = [None, *(step.modification for step in steps)]
+    return [
+        (step, step_changes(was, step.modification) if step.modification else [])
+        for was, step in zip(before, steps, strict=False)
+    ]
+
+
 def _augmentation(code: uuid.UUID) -> Augmentation:
     rows = Augmentation.objects.select_related(
-        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"), "corrects__contestant"
+        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"),
+        *("corrects__contestant", "follows__scenario"),
     )
     return get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
 

@@ -83,8 +83,10 @@ def _stored(scenario: Scenario) -> dict[str, Any]:
 def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show a scene with what is drawn on it, and add that as a scenario; or copy another."""
     scene = get_object_or_404(BaseScene, code=code)
-    original = _copied(request, scene)
+    original, first = _named(request, scene, "copy"), _named(request, scene, "follow")
     usual = {"keep_traffic": True, "derives": True} if original is None else _stored(original)
+    if first is not None:
+        usual = _stored(first) | {"instruction": "", "derives": True}
     form = ScenarioForm(request.POST or usual)
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
@@ -99,6 +101,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 scene=scene.slug,
                 **wanted | {"reference": reference},
                 slug=form.cleaned_data["slug"] or None,
+                follows="" if first is None else first.slug,
                 actor=user_of(request),
             )
             send_later(request, enqueue_scenario, made.pk)
@@ -106,6 +109,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("scenario", code=made.code)
     context = {
         "form": form,
+        "first": first,
         "scenarios": scene.scenarios.only("base_scene", "code", "slug", "instruction"),
         "notes": notes_of(scene.notes),
         "found": {name: len(scene.document.get(name, ())) for name in PARTS}
@@ -118,8 +122,8 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return _editor(request, draft, form["modification"].value(), context)
 
 
-def _copied(request: HttpRequest, scene: BaseScene) -> Scenario | None:
-    return scene.scenarios.filter(code=read_code(request.GET.get("copy", ""))).first()
+def _named(request: HttpRequest, scene: BaseScene, name: str) -> Scenario | None:
+    return scene.scenarios.filter(code=read_code(request.GET.get(name, ""))).first()
 
 
 @form_for(*STAFF)

@@ -74,7 +74,7 @@ def load_scenarios(request: HttpRequest) -> None:
 @page_for(*STAFF)
 def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one scenario: before and after the reference, and every other result."""
-    rows = Scenario.objects.select_related("base_scene", "paraphrase_of")
+    rows = Scenario.objects.select_related("base_scene", "paraphrase_of", "follows")
     scenario = get_object_or_404(rows, code=code)
     reading, reference = waiting_reading(scenario), reference_picture(scenario)
     has_picture = is_drawn(reference)
@@ -88,6 +88,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "scenario": scenario,
         "paraphrases": scenario.paraphrases.all(),
+        "follow_ups": scenario.follow_ups.filter(retired_at=None),
         "has_picture": has_picture,
         "reference_name": reference,
         "look": look,

@@ -106,7 +106,7 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
         *("code", "study_id", "expert_id", "position", "kind", "view"),
         *("left_token", "right_token", "original_token"),
         *("left_image", "right_image", "original_image"),
-        "scenario__instruction",
+        *("scenario__instruction", "scenario__follows"),
     )
     found = rows.select_related("scenario").only(*needed).order_by("position")[:n]
     for matchup in found:

@@ -68,7 +68,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "matchup": str(matchup.code),
         "position": matchup.position,
         "question": matchup.asked,
-        "instruction": matchup.scenario.instruction,
+        "instruction": matchup.scenario.wording,
         "a": reverse("matchup-image", args=[matchup.left_token]),
         "b": reverse("matchup-image", args=[matchup.right_token]),
         "original": reverse("matchup-image", args=[original]) if original else None,

@@ -45,6 +45,7 @@ class Command(TerminalCommand):
             "help": "spawn traffic in place of the recorded one",
         },
         "--goal": {"choices": list(GOALS), "help": "where the ego's way turns"},
+        "--follows": {"help": "a scenario of the scene whose results it asks to change further"},
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -57,7 +58,7 @@ class Command(TerminalCommand):
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
         names = ("scene", "type", "instruction", "slug", "keep_traffic")
         given = {name: options[name] for name in names}
-        given |= {name: options[name] or "" for name in ("density", "goal")}
+        given |= {name: options[name] or "" for name in ("density", "goal", "follows")}
         for name, what in DOCUMENTS.items():
             if (file := options[name]) is not None:
                 given[name] = read_json(file, what=what)

@@ -1,6 +1,7 @@
 """Launch a generation job and, on demand, wait for its end."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -43,6 +44,10 @@ class Command(TerminalCommand):
         parser.add_argument(
             "--estimate", action="store_true", help="say what it would use, and launch nothing"
         )
+        self.add_waiting(parser)
+
+    def add_waiting(self, parser: CommandParser) -> None:
+        """Whether to wait, and how long."""
         parser.add_argument("--wait", action="store_true", help="stay until the job is over")
         parser.add_argument(
             "--timeout", type=float, default=3600.0, help="seconds to wait at most"
@@ -65,12 +70,17 @@ class Command(TerminalCommand):
             job = jobs.launch(request)
             transaction.on_commit(lambda: enqueue_job(job.pk))
         self.stdout.write(f"Job {job.code}, {job.name!r}: {count_rows(job).total} to run.")
-        if options["wait"]:
-            try:
-                self.wait(job, options["timeout"])
-            except KeyboardInterrupt:
-                raise CommandError("Not waited for; the job goes on.", returncode=130) from None
-            self.report(job)
+        self.wait_if_asked(job, options)
+
+    def wait_if_asked(self, job: GenerationJob, options: Mapping[str, Any]) -> None:
+        """Stay until the job is over and print its outcomes, where that is wanted."""
+        if not options["wait"]:
+            return
+        try:
+            self.wait(job, options["timeout"])
+        except KeyboardInterrupt:
+            raise CommandError("Not waited for; the job goes on.", returncode=130) from None
+        self.report(job)
 
     def _say(self, expected: JobEstimate) -> None:
         self.stdout.write(f"{expected.rows} to run, {expected.asking_rows} of them ask models.")

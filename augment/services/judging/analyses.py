@@ -17,7 +17,7 @@ from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.displacement import Measured, of_job
+from augment.services.judging.displacement import KeptSummary, Measured, of_job
 from augment.services.judging.findings import findings_by_row
 from augment.services.judging.realism import realism_of_rows
 
@@ -37,6 +37,7 @@ class AugmentationLine:
 
     Attributes:
         displacement: None where nothing can be measured.
+        kept: What a follow-up was to leave alone, None without any.
         spending: None where no model was asked.
         wrong, doubtful: Findings of the checks, None where nothing was checked.
         realism: None where it can't be judged.
@@ -44,6 +45,7 @@ class AugmentationLine:
 
     row: Augmentation
     displacement: Displacement | None
+    kept: KeptSummary | None
     spending: Spending | None
     wrong: int | None = None
     doubtful: int | None = None
@@ -163,7 +165,9 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     spent = sum_spending(Q(attempt__augmentation__job=job), by=AUGMENTATION)
     for one in of_job(job):
         spending = spent.get(one.row.pk)
-        yield AugmentationLine(row=one.row, displacement=one.displacement, spending=spending)
+        yield AugmentationLine(
+            row=one.row, displacement=one.displacement, kept=one.kept_summary, spending=spending
+        )
 
 
 def _values_of(measured: Sequence[Measured]) -> dict[str, float]:

@@ -16,7 +16,8 @@ from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacem
 from augment.metrics.displacement import HORIZON_S as HORIZON_S
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
-from augment.metrics.kept import KeptObject, KeptSummary, kept_objects, summarise_kept
+from augment.metrics.kept import KeptObject, kept_objects, summarise_kept
+from augment.metrics.kept import KeptSummary as KeptSummary
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType

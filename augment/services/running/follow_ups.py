@@ -5,7 +5,9 @@ before, which stays as it is. Going back is going on from an earlier step.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields
+from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import transaction
@@ -76,6 +78,19 @@ def ask_follow_up(
         follows=answer,
     )
     return job.augmentations.get()
+
+
+def find_augmentation(code: str) -> Augmentation:
+    """Return the augmentation with that code.
+
+    Raises:
+        Conflict: There is none.
+    """
+    with suppress(ValueError):
+        row = Augmentation.objects.filter(code=UUID(code)).first()
+        if row is not None:
+            return row
+    raise Conflict(f"No augmentation has the code {code!r}; it stands in its page's address.")
 
 
 def conversation_of(answer: Augmentation | None) -> tuple[Message, ...]:

@@ -278,7 +278,7 @@ def _ask(
     try:
         answer = ask_judge(
             JudgeQuestion(row.run.question),
-            row.left.scenario.instruction,
+            row.left.scenario.wording,
             pictures,
             client=client,
             model=row.run.model,
