@@ -128,7 +128,7 @@ def step_changes(before: dict[str, Any] | None, after: dict[str, Any] | None) ->
         {line["agent"]: line for line in modification_lines(document)}
         for document in (before, after)
     )
-    told = [f"{name} left alone again" for name in old if name not in new]
+    told = [f"{name} no longer {old[name]['change']}" for name in old if name not in new]
     for name, line in new.items():
         was = old.get(name)
         if was is None or was["change"] != line["change"]:

@@ -1,15 +1,21 @@
 """Follow-ups: whose conversation goes on with what, when, and what is measured of it."""
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
+from io import StringIO
 
 import pytest
+from django.core.management import CommandError, call_command
 
+from arena.scenarios.queries import step_changes
 from augment.baselines.rule_placer import place
 from augment.errors import Conflict, UnknownName
 from augment.fake_llm.server import running
 from augment.llm.messages import Message, Speaker, ToolCall, message_from_document
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Body, Intent, Shape
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.judging.displacement import of_job
@@ -25,11 +31,16 @@ from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios.prompts import stored_tasks
 from augment.services.scenarios.scenes import add_scenario, change_surroundings, scene_of
+from tests.api.asking import error_of
+from tests.api.tokens import program_of
+from tests.brokers import Broker
 from tests.intents import cones, parked
 from tests.jobs import rows
 from tests.jobs.scripted import Scripted, add
 from tests.llm.json_server import serving
-from tests.variants.playing import answer, block, car, rating
+from tests.scenes import vehicle
+from tests.variants.playing import agent, answer, block, car, rating
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
@@ -229,3 +240,65 @@ def test_a_message_with_calls_comes_back_as_it_was_written() -> None:
         Message(speaker=Speaker.USER, text="Go on."),
     )
     assert tuple(message_from_document(one.to_document()) for one in said) == said
+
+
+def test_the_page_the_api_and_the_command_say_what_comes_next(
+    server: Scripted, broker: Broker
+) -> None:
+    two_steps()
+    add(server, "ann")
+    server.script = [car(20.0), answer(block(agent(type="BUS", y_m=1.0), agent(id="Agent3")))]
+    first, second = launched("ann")
+    run(first, second)
+    admin = people()["admin"]
+    browser, page = signed_in(admin), f"/augmentations/{second.code}/"
+    shown = browser.get(page).content.decode()
+    assert "Undo: back to step 1" in shown
+    for line in ("Agent2: 1.72 m away, a bus", "Agent3 added: vehicle"):
+        assert f"<li>{line}</li>" in shown
+    asked = browser.post(f"{page}follow-up/", {"instruction": "Further.", "cap_calls": "2"})
+    made = Augmentation.objects.latest("pk")
+    assert asked.headers["Location"] == f"/augmentations/{made.code}/"
+    assert (made.follows, made.job.cap_calls, made.job.launched_by) == (second, 2, admin)
+    assert 'http-equiv="refresh"' in browser.get(asked.headers["Location"]).content.decode()
+
+    wire = program_of(admin)
+    address = f"/api/v1/augmentations/{second.code}"
+    said = wire.post(f"{address}/follow-ups", {"instruction": "Nearer."}, "application/json")
+    assert said.status_code == 201
+    told = said.json()
+    assert (told["state"], told["follows"], told["warnings"]) == ("queued", str(second.code), [])
+    assert told["instruction"] == f"1. {WISH}\n2. {NEXT}\n3. Nearer."
+    assert wire.get(address).json()["modification"]["add"][0]["type"] == "BUS"
+    waiting = f"/api/v1/augmentations/{told['code']}/follow-ups"
+    error_of(wire.post(waiting, {"instruction": "A bus."}, "application/json"), 409, "conflict")
+
+    out = StringIO()
+    call_command("follow_up", str(second.code), "Another one.", "--cap-tokens", "9000", stdout=out)
+    last = Augmentation.objects.latest("pk")
+    assert out.getvalue() == f"Augmentation {last.code} of {last.scenario.slug} waits.\n"
+    assert (last.follows, last.job.cap_tokens) == (second, 9000)
+    with pytest.raises(CommandError, match="No augmentation has the code 'x'"):
+        call_command("follow_up", "x", "Another one.")
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"x_m": 24.0, "y_m": 3.0}, ["Agent2: 5.00 m away"]),
+        (
+            {"heading_rad": -math.pi + 0.1, "speed_mps": 2.0},
+            ["Agent2: turned by 11.5°, another speed"],
+        ),
+        ({"type": "BUS", "lane_id": "Lane2"}, ["Agent2: a bus"]),
+        ({}, []),
+    ],
+)
+def test_a_step_tells_what_it_changed(changes: dict[str, object], told: list[str]) -> None:
+    car_of_step = modification_to_document(
+        Modification(added=(replace(vehicle("Agent2", 20.0, 0.0), heading_rad=math.pi - 0.1),))
+    )
+    before = {**car_of_step, "remove": ["Agent7"]}
+    after = {"add": [{**car_of_step["add"][0], **changes}], "remove": ["Agent7"]}
+    assert step_changes(before, after) == told
+    assert step_changes(before, {"add": before["add"]}) == ["Agent7 no longer removed"]

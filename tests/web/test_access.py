@@ -63,7 +63,7 @@ ACTIONS = _table(
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
             "study-draft-discard study-hand-over first-step benchmark-retired board-batch "
-            "submission-decline sweep-start sweep-remove"
+            "submission-decline sweep-start sweep-remove follow-up"
         ),
         (302, 302, 403): (
             "scene-send upload-show scenarios-write study-write set-intent results-open "
