@@ -9,6 +9,7 @@ from django.utils import timezone
 from augment import tasks
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
+from augment.management.waiting import wait
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
@@ -128,6 +129,6 @@ def test_waiting_ends_with_the_job() -> None:
     job = launch()
     leased(only_row(job)).settle(done(), now=timezone.now())
     said = StringIO()
-    Command(stdout=said).wait(job, timeout_s=1.0)
+    wait(Command(stdout=said), job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"
     assert count_rows(job).by_state[Augmentation.State.DONE] == 1

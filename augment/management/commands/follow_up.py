@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.db import transaction
 
-from augment.management.commands import generate
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.management.waiting import WAITING, wait_if_asked
+from augment.services.inputs import read_request
 from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, find_augmentation
+from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_augmentation
 
 
-class Command(generate.Command):
+class Command(TerminalCommand):
     """follow_up AUGMENTATION "A bit further left." [--cap-usd N] [--wait]."""
 
     help = (
@@ -19,11 +19,8 @@ class Command(generate.Command):
         "is the one in the address of its page. To go back, follow up an earlier step."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which answer, what to change, and whether to wait."""
-        parser.add_argument("augmentation", help="the code of the answer")
-        add_options(parser, inputs_of(FollowUpRequest))
-        self.add_waiting(parser)
+    arguments = {"augmentation": {"help": "the code of the answer"}, **WAITING}
+    request = FollowUpRequest
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, then wait if asked to."""
@@ -33,4 +30,4 @@ class Command(generate.Command):
             row = ask_follow_up(answer, read_request(FollowUpRequest, options))
             transaction.on_commit(lambda: enqueue_augmentation(row.pk))
         self.stdout.write(f"Augmentation {row.code} of {row.scenario.slug} waits.")
-        self.wait_if_asked(row.job, options)
+        wait_if_asked(self, row.job, options)
