@@ -94,10 +94,7 @@ class PlannedMover:
         if self.started_s is None:
             return _row(self._held.pose_at(own_mps * self._time_s), own_mps)
         since_s = self._time_s - self.started_s
-        gone_m, speed_mps = (
-            travelled_m(speeds, own_mps, since_s),
-            speed_at(speeds, own_mps, since_s),
-        )
+        gone_m, speed_mps = way_and_speed(speeds, own_mps, since_s)
         if self._line is None:
             return _row(self._held.pose_at(own_mps * self.started_s + gone_m), speed_mps)
         if gone_m >= self._line.length_m:
@@ -141,18 +138,19 @@ class PlannedMover:
             self._line = lane_line(self._graph, path, here[:2])
 
 
-def speed_at(speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float) -> float:
-    """Return the speed so long after the start."""
-    times_s, values_mps = _profile(speeds, own_mps)
-    return float(np.interp(since_s, times_s, values_mps))
-
-
-def travelled_m(speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float) -> float:
-    """Return the way so long after the start: the area under the speeds."""
-    times_s, values_mps = _profile(speeds, own_mps)
-    inner = times_s[times_s < since_s]
-    moments_s = np.append(inner, since_s)
-    return float(np.trapezoid(np.interp(moments_s, times_s, values_mps), moments_s))
+def way_and_speed(
+    speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float
+) -> tuple[float, float]:
+    """Return way and speed so long after the start: the area under the speeds, and the last."""
+    rows = speeds if speeds and speeds[0][0] == 0.0 else ((0.0, own_mps), *speeds)
+    gone_m = 0.0
+    for (from_s, from_mps), (to_s, to_mps) in pairwise(rows):
+        if since_s < to_s:
+            now_mps = from_mps + (to_mps - from_mps) * (since_s - from_s) / (to_s - from_s)
+            return gone_m + (since_s - from_s) * (from_mps + now_mps) / 2.0, now_mps
+        gone_m += (to_s - from_s) * (from_mps + to_mps) / 2.0
+    last_s, last_mps = rows[-1]
+    return gone_m + (since_s - last_s) * last_mps, last_mps
 
 
 def smooth_line(points_m: list[Point]) -> Polyline | None:
@@ -284,15 +282,6 @@ def smooth_share(share: float) -> float:
 
 def _row(pose: tuple[float, float, float] | None, speed_mps: float) -> FloatArray:
     return np.full(4, np.nan) if pose is None else np.array([*pose, speed_mps])
-
-
-def _profile(
-    speeds: tuple[tuple[float, float], ...], own_mps: float
-) -> tuple[FloatArray, FloatArray]:
-    """Times and speeds (N,) from the start on."""
-    rows = speeds if speeds and speeds[0][0] == 0.0 else ((0.0, own_mps), *speeds)
-    times_s, values_mps = np.array(rows, dtype=np.float64).T
-    return times_s, values_mps
 
 
 def _runs_of(graph: LaneGraph, lane_ids: tuple[str, ...]) -> list[list[str]]:

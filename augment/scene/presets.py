@@ -41,7 +41,7 @@ from augment.scene.planned_mover import (
     lane_line,
     run_beside,
     smooth_share,
-    travelled_m,
+    way_and_speed,
 )
 
 DOOR_LENGTH_M, DOOR_WIDTH_M, DOOR_REACH_M = 1.1, 0.15, 0.9
@@ -387,7 +387,7 @@ def _red_light(case: _Case) -> TrafficAgent:
         line = lane_line(case.route.graph, path, (case.agent.x_m, case.agent.y_m))
         needs_m = line.project(*crossing).s_m
         times_s = np.arange(0.0, 60.0, 0.1)
-        gone_m = [travelled_m(speeds, own_mps, time_s) for time_s in times_s.tolist()]
+        gone_m = [way_and_speed(speeds, own_mps, time_s)[0] for time_s in times_s.tolist()]
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])
         within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
         meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
