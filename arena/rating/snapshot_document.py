@@ -192,7 +192,8 @@ class DisplacementSummary:
     """How far a contestant's shown augmentations are from the references, over `n` objects.
 
     Attributes:
-        average_m, final_m: Means over time of objects of changes that move; None without any.
+        at_t0_m, final_m: Means of objects of changes that move, of which median and mean are
+            over time; None without any.
     """
 
     slug: str
@@ -202,7 +203,7 @@ class DisplacementSummary:
     missing: int
     surplus: int
     augmentations: int
-    average_m: float | None = field(default=None, metadata=_SINCE_5)
+    at_t0_m: float | None = field(default=None, metadata=_SINCE_5)
     final_m: float | None = field(default=None, metadata=_SINCE_5)
 
 

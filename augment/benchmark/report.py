@@ -79,4 +79,4 @@ def _describe_displacement(found: Displacement | None) -> str:
 def _describe_over_time(found: OverTime | None) -> str:
     if found is None:
         return ""
-    return f"; over {HORIZON_S:g} s {found.average_m!r} m, at its end {found.final_m!r} m"
+    return f", moving: {found.at_t0_m!r} m at t0, {found.final_m!r} m after {HORIZON_S:g} s"

@@ -105,8 +105,8 @@ class Displacement:
 
     @property
     def mean_m(self) -> float | None:
-        """The mean error at t0, None where nothing is matched."""
-        return float(np.mean(self.distances_m)) if self.matches else None
+        """The mean error, None where nothing is matched."""
+        return float(np.mean(self.errors_m)) if self.matches else None
 
     @property
     def over_time(self) -> "OverTime | None":
@@ -115,10 +115,7 @@ class Displacement:
 
     @property
     def error_m(self) -> float:
-        """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any.
-
-        Of a matched one it is the error over time where something moves.
-        """
+        """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any."""
         errors_m = [min(error, MISS_M) for error in self.errors_m]
         errors_m += [MISS_M] * (len(self.missing) + len(self.surplus))
         return float(np.mean(errors_m)) if errors_m else 0.0
@@ -130,11 +127,12 @@ class OverTime:
 
     Attributes:
         n: How many.
-        average_m, final_m: Means over them of what `Match` has.
+        at_t0_m, average_m, final_m: Means over them of what `Match` has.
         start_s: The mean absolute difference between the starts, None without two to compare.
     """
 
     n: int
+    at_t0_m: float
     average_m: float
     final_m: float
     start_s: float | None
@@ -149,6 +147,7 @@ def mean_over_time(displacements: Sequence[Displacement]) -> OverTime | None:
         return None
     return OverTime(
         n=len(moving),
+        at_t0_m=float(np.mean([one.distance_m for one in moving])),
         average_m=float(np.mean([one.average_m for one in moving])),
         final_m=float(np.mean([one.final_m for one in moving])),
         start_s=float(np.mean(starts_s)) if starts_s else None,
@@ -259,7 +258,7 @@ class Summary:
         n: Matched objects, each with its own distance.
         missing: Objects of the references that nothing stands for.
         surplus: Generated objects that stand for nothing.
-        box: Of the distances at t0; None where nothing is matched.
+        box: Of the errors, which are over time where something moves; None without a match.
         over_time: None where nothing moves.
     """
 
@@ -273,13 +272,13 @@ class Summary:
 
 def summarise(displacements: Sequence[Displacement]) -> Summary:
     """All matched objects of all augmentations; each object counts once."""
-    distances_m = [value for displacement in displacements for value in displacement.distances_m]
+    errors_m = [value for displacement in displacements for value in displacement.errors_m]
     return Summary(
         augmentations=len(displacements),
-        n=len(distances_m),
+        n=len(errors_m),
         missing=sum(len(displacement.missing) for displacement in displacements),
         surplus=sum(len(displacement.surplus) for displacement in displacements),
-        box=box_of(distances_m) if distances_m else None,
+        box=box_of(errors_m) if errors_m else None,
         over_time=mean_over_time(displacements),
     )
 

@@ -1,6 +1,7 @@
 """The report on a submission as a document, and the card as it comes in."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -11,9 +12,13 @@ from augment.benchmark.report import (
     report_to_document,
 )
 from augment.benchmark.values import EntryStatus, SubmissionReport, SubmittedEntry
+from augment.checks import Ground
 from augment.errors import InvalidDocument
 from augment.metrics.displacement import displacement
 from augment.scene.entities import Modification
+from augment.scene.planned_motion import AtTime
+from tests.metrics.test_over_time import starts
+from tests.scene.test_planned_motion import two_lanes
 from tests.scenes import vehicle
 
 CARD_PARTS = {
@@ -51,6 +56,17 @@ def test_a_report_comes_back_from_json_to_the_last_digit() -> None:
     assert lines[0] == "near    read        near.json  2.0275875100994067 m, 0 missing, 0 surplus"
     assert lines[1] == "far--2  missing     no file"
     assert "1 read, 0 refused, 0 unreadable, 1 missing" in lines
+
+
+def test_what_moves_is_told_over_time_and_comes_back() -> None:
+    one, other = starts(AtTime(after_s=3.0)), starts(AtTime(after_s=2.0))
+    found = displacement(one, other, Ground.of(two_lanes()))
+    moving = replace(report(), entries=(replace(report().entries[0], displacement=found),))
+    assert report_from_document(report_to_document(moving)) == moving
+    lines = list(describe_report(moving))
+    over_time = "0.0 m at t0, 5.0"
+    assert over_time in lines[0]
+    assert over_time in lines[-1]
 
 
 @pytest.mark.parametrize(

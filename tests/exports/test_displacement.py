@@ -116,11 +116,8 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     assert b"2026" not in first[:400]
 
 
-def test_columns_over_time_appear_where_something_moves() -> None:
-    still, table = a_job(), JOB_TABLES["displacement-by-contestant"]
-    names = [*object_sheet(still).columns, *augmentation_sheet(still).columns]
-    assert not {"average_m", "displacement_average_m"} & set(names)
-    assert b"average_m" not in table.formats["csv"].write(table.make(still))
+def add_moving(job: GenerationJob) -> Augmentation:
+    """Bea's car starts a second too late: over 6 s it is 177.5 / 61 m behind, then 5 m."""
     place = rows.add_scenario(
         "cut",
         scene=two_lanes(),
@@ -128,28 +125,32 @@ def test_columns_over_time_appear_where_something_moves() -> None:
         intent=None,
         intent_origin="",
     )
-    Augmentation.objects.create(
-        job=still,
+    return Augmentation.objects.create(
+        job=job,
         scenario=place,
         contestant=rows.add_kind("bea", Contestant.Kind.RULE),
         state="done",
         modification=modification_to_document(starts(AtTime(after_s=3.0))),
         image=store(png()),
     )
-    average = "2.910"  # 177.5 / 61
-    lines = list(
-        csv.DictReader(io.StringIO(table.formats["csv"].write(table.make(still)).decode()))
-    )
-    shown = {line["contestant"]: line["average_m"] for line in lines}
-    assert shown == {"ann": "", "bea": average, "sim (simulated)": ""}
-    for make, name in (
-        (object_sheet, "average_m"),
-        (augmentation_sheet, "displacement_average_m"),
-    ):
-        sheet = make(still)
+
+
+def test_columns_over_time_appear_where_something_moves() -> None:
+    job, table = a_job(), JOB_TABLES["displacement-by-contestant"]
+    sheets = {"final_m": object_sheet, "displacement_final_m": augmentation_sheet}
+    assert not [name for name, make in sheets.items() if name in make(job).columns]
+    assert b"final_m" not in table.formats["csv"].write(table.make(job))
+    add_moving(job)
+    written = table.formats["csv"].write(table.make(job)).decode()
+    lines = {line["slug"]: line for line in csv.DictReader(io.StringIO(written))}
+    finals = {slug: line["final_m"] for slug, line in lines.items()}
+    assert finals == {"ann": "", "bea": "5.000", "sim": ""}
+    assert (lines["bea"]["median_m"], lines["bea"]["at_t0_m"]) == ("2.910", "0.000")
+    for name, make in sheets.items():
+        sheet = make(job)
         column = list(sheet.columns).index(name)
         cells = [row[column] for row in sheet.rows]
-        assert [cell for cell in cells if cell is not None] == [pytest.approx(2.91, abs=1e-3)]
+        assert [cell for cell in cells if cell is not None] == [pytest.approx(5.0)]
 
 
 # The sheet of samples

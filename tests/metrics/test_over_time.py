@@ -1,7 +1,7 @@
 """Displacement over time, by hand: 61 steps of 0.1 s, t0 and 6 s included."""
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -67,15 +67,16 @@ def test_who_has_no_motion_keeps_its_distance_and_all_count_alike() -> None:
     still = next(match for match in found.matches if match.generated == "Agent3")
     assert (still.distance_m, still.average_m, still.final_m) == (1.0, 1.0, 1.0)
     average_m = (0.5 * 55 + 150.0) / 61
-    expected = OverTime(n=2, average_m=(average_m + 1.0) / 2.0, final_m=3.0, start_s=1.0)
+    expected = OverTime(
+        n=2, at_t0_m=0.5, average_m=(average_m + 1.0) / 2.0, final_m=3.0, start_s=1.0
+    )
     summary = summarise([found, Displacement(), displacement(Modification(), reference)])
     for over_time in (found.over_time, summary.over_time):
         assert over_time is not None
-        assert over_time.n == expected.n
-        assert (over_time.average_m, over_time.final_m, over_time.start_s) == pytest.approx(
-            (expected.average_m, expected.final_m, expected.start_s)
-        )
-    assert found.mean_m == 0.5
+        assert astuple(over_time) == pytest.approx(astuple(expected))
+    assert summary.box is not None
+    assert summary.box.median_m == pytest.approx(expected.average_m)
+    assert found.mean_m == pytest.approx(expected.average_m)
     assert found.error_m == pytest.approx(expected.average_m)
 
 

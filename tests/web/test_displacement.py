@@ -8,7 +8,7 @@ from django.urls import reverse
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
-from tests.exports.test_displacement import a_job
+from tests.exports.test_displacement import a_job, add_moving
 from tests.jobs import rows
 from tests.scenes import vehicle
 from tests.web.cast import people, signed_in
@@ -45,6 +45,24 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
     assert "ann 2.00 2.00 to 2.00 2.00 2 2 0" in shown
     assert "sim simulated – – – 0 4 0" in shown
     assert "All five scenario types." in shown
+
+
+def test_what_moves_has_columns_of_its_own() -> None:
+    job, reader = a_job(), signed_in(people()["researcher"])
+
+    def read(path: str) -> str:
+        text = re.sub(r"<[^>]+>", " ", reader.get(path).content.decode())
+        return re.sub(r"\s+", " ", text)
+
+    assert "At t0 (m)" not in read(f"/jobs/{job.code}/displacement/")
+    row = add_moving(job)
+    shown = read(f"/jobs/{job.code}/displacement/")
+    assert "Mean (m) At t0 (m) After 6 s (m) Starts apart (s) Matched" in shown
+    assert "bea 2.91 2.91 to 2.91 2.91 0.00 5.00 1.00 1 0 0" in shown
+    assert "ann 2.00 2.00 to 2.00 2.00 – – – 2 2 0" in shown
+    found = read(reverse("augmentation", args=[row.code]))
+    assert "and the 6 s after t0; at t0 0.00 m, after them 5.00 m" in found
+    assert "The motion of Agent2 begins after 3.0 s" in found
 
 
 def test_an_augmentations_page_says_what_is_wrong_with_it_and_how_far_it_is() -> None:

@@ -38,8 +38,8 @@ PAPERS_CHOICE = (
     "many places that all follow the instruction."
 )
 OVER_TIME_NOTE = (
-    f"Where something moves, distances are also followed for {HORIZON_S:g} s after t0: their mean "
-    "over time, the last one, and by how many seconds the motions begin apart; boxes are of t0."
+    f"Where something moves, a distance is the mean over the {HORIZON_S:g} s after t0; beside it "
+    "the means at t0 and at the end, and by how many seconds motions begin apart."
 )
 KEPT_NOTE = (
     "Kept: of what follow-ups were to leave as in the answer before, how much looks the same, and "
@@ -151,7 +151,7 @@ GROUPS: Columns = {
         Dtype.TEXT,
     ),
 }
-OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="summary.over_time")
+OVER_TIME = Dtype.NUMBER.columns("at_t0_m", "final_m", "start_s", of="summary.over_time")
 """Of groups, where one of them has something that moves."""
 
 

@@ -59,7 +59,7 @@ AUGMENTATIONS: Columns = {
 
 OVER_TIME: Columns = {
     f"displacement_{name}": (f"displacement.over_time.{name}", Dtype.NUMBER)
-    for name in ("average_m", "final_m", "start_s")
+    for name in ("at_t0_m", "final_m", "start_s")
 }
 """Of augmentations, where something moves in one."""
 

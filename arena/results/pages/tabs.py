@@ -205,7 +205,7 @@ def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     return {
         "lines": lines,
         "has_chart": "displacement" in scatters_of(snapshot, table),
-        "moves": any(line.average_m is not None for line in snapshot.results.displacement),
+        "moves": any(line.at_t0_m is not None for line in snapshot.results.displacement),
     }
 
 

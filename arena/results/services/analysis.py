@@ -200,7 +200,7 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
             missing=total.missing,
             surplus=total.surplus,
             augmentations=total.augmentations,
-            average_m=None if total.over_time is None else total.over_time.average_m,
+            at_t0_m=None if total.over_time is None else total.over_time.at_t0_m,
             final_m=None if total.over_time is None else total.over_time.final_m,
         )
         for slug, total in totals

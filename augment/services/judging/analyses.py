@@ -189,8 +189,8 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> Row:
     by_scenario: dict[int, list[float]] = defaultdict(list)
     for line in lines:
         by_sample[line.row.sample].append(line)
-        if line.displacement is not None and line.displacement.matches:
-            by_scenario[line.row.scenario_id].append(fmean(line.displacement.errors_m))
+        if line.displacement is not None and line.displacement.mean_m is not None:
+            by_scenario[line.row.scenario_id].append(line.displacement.mean_m)
     samples = [by_sample[number] for number in sorted(by_sample)]
     missed = [fmean(line.row.state in MISSES for line in sample) for sample in samples]
     return {
