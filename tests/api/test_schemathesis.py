@@ -23,13 +23,22 @@ from schemathesis.specs.openapi import checks
 from arena.models import Snapshot
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
-from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, Submission, UploadMoment
+from augment.models import (
+    Endpoint,
+    EndpointModel,
+    Probe,
+    SceneUpload,
+    Submission,
+    Sweep,
+    UploadMoment,
+)
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from tests.api.tokens import secret_of
 from tests.entering import entrant, read, sent
 from tests.study_rows import matchups_of, vote
+from tests.web.addresses import address
 from tests.web.cast import World, people, world
 
 pytestmark = [pytest.mark.django_db, pytest.mark.slow]
@@ -49,7 +58,7 @@ EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
 READ_BY_STAFF = {
     *("listJobs", "getJob", "getJobProgress", "exportJob", "listStudies", "getStudy"),
     *("listScenarios", "listContestants", "getUpload", "getMoment", "getProbe"),
-    *("rateStudy", "getSnapshot", "exportSnapshot", "getSubmission"),
+    *("rateStudy", "getSnapshot", "exportSnapshot", "getSubmission", "getSweep"),
 }
 
 Seen = dict[str, set[int]]
@@ -78,6 +87,7 @@ def here() -> World:
     UploadMoment.objects.create(upload=upload)
     whole = make_benchmark(BenchmarkRequest(slug="set", title="Set", scenarios=["all"]))
     read(sent(whole, entrant()))
+    address("sweep", found)  # makes one
     return found
 
 
@@ -92,6 +102,8 @@ def codes(here: World) -> dict[str, object]:
         "endpoints": Endpoint.objects.get(label="here").code,
         "models": EndpointModel.objects.get().code,
         "submissions": Submission.objects.get().code,
+        "scenarios": here.augmentation.scenario.code,
+        "sweeps": Sweep.objects.get().code,
     }
 
 

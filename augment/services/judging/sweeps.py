@@ -92,13 +92,12 @@ def plan_sweep(
     sweep = Sweep.objects.create(
         scenario=scenario, number=request.number, asked_by=actor, **asdict(request.options)
     )
-    rows = [SweepValue(sweep=sweep, value=value) for value in changes]
-    for row in rows:
-        change = changes[row.value]
-        if isinstance(change, Modification):
-            row.modification = codec.modification_to_document(change)
-        else:
-            row.reason = str(change)
+    rows = [
+        SweepValue(sweep=sweep, value=value, modification=codec.modification_to_document(change))
+        if isinstance(change, Modification)
+        else SweepValue(sweep=sweep, value=value, reason=str(change))
+        for value, change in changes.items()
+    ]
     SweepValue.objects.bulk_create(rows)
     Simulation.objects.bulk_create(
         Simulation(scenario=scenario, swept=row, subject=Simulation.Subject.SWEPT, **asdict(way))
@@ -140,7 +139,7 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
     cells = [
         Cell(
             name=f"{scenario.slug} with {request.number} = {value:g}",
-            stem=f"{scenario.slug}--{value:g}",
+            stem=f"{scenario.slug}--{value:.10g}",
             scene=scene_of(scenario),
             type=type_of(scenario.type),
             modification=change,
@@ -156,9 +155,7 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
 @transaction.atomic
 def delete_sweep(sweep: Sweep, *, actor: User | None = None) -> None:
     """Delete a sweep with its drives; the scenario that it kept stays."""
-    log_change(
-        sweep, "delete", actor, before={"scenario": sweep.scenario.slug, "number": sweep.number}
-    )
+    log_change(sweep, "delete", actor, before={"what": str(sweep)})
     sweep.delete()
 
 
