@@ -4,11 +4,18 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.prompts.reply import read_reply
-from augment.prompts.vectors import changes_text, scene_text, short_names, with_short_ids
+from augment.prompts.vectors import (
+    changes_text,
+    motion_parts,
+    scene_text,
+    short_names,
+    with_short_ids,
+)
 from augment.scene.entities import Modification, Scene
 from augment.scene.planned_motion import (
     EGO_ID,
@@ -19,6 +26,7 @@ from augment.scene.planned_motion import (
     PlannedMotion,
     PointPath,
 )
+from tests.fixtures.shelf import MOVING_SLUGS, entry, shown_scene
 from tests.scenes import junction, vehicle
 from tests.variants.playing import block
 
@@ -69,10 +77,20 @@ def vector(text: str, name: str) -> list[Any]:
     return values
 
 
-def entry(name: str, values: list[Any]) -> dict[str, object]:
+def entry_of(name: str, values: list[Any]) -> dict[str, object]:
     """The same as a model answers it."""
-    keys = ("type", "x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps", "lane")
-    return {"id": name, **dict(zip(keys, values, strict=False)), "motion": values[8]}
+    keys = (
+        "type",
+        "x_m",
+        "y_m",
+        "heading_rad",
+        "width_m",
+        "length_m",
+        "speed_mps",
+        "lane",
+        "motion",
+    )
+    return {"id": name, **dict(zip(keys, values, strict=False))}
 
 
 @given(motion=MOTIONS)
@@ -86,10 +104,26 @@ def test_every_motion_that_is_shown_is_read_back(motion: PlannedMotion) -> None:
     change = Modification(added=(added,), moved=(moved,))
     told = changes_text(street, change)
     assert "turn:left" not in told
-    written = [entry(name, vector(told, name)) for name in ("Agent3", "Agent2")]
+    written = [entry_of(name, vector(told, name)) for name in ("Agent3", "Agent2")]
     answer = block(written[0], move=[written[1]])
     read = read_reply(answer, street).modification
     assert (read.added[0].motion, read.added[0].lane_id) == (added.motion, "48")
     assert (read.moved[0].id, read.moved[0].motion) == ("48", moved.motion)
     in_scene = scene_text(replace(street, agents=(moved,)))
     assert vector(in_scene, "Agent2") == vector(told, "Agent2")
+
+
+@pytest.mark.parametrize("slug", MOVING_SLUGS)
+def test_every_reference_of_the_moving_set_can_be_answered(slug: str) -> None:
+    street, right = shown_scene(slug), entry(slug).reference
+    shown, told = with_short_ids(right, short_names(street)), changes_text(street, right)
+    added, moved = (
+        [entry_of(agent.id, vector(told, agent.id)) for agent in agents]
+        for agents in (shown.added, shown.moved)
+    )
+    read = read_reply(block(*added, move=moved), street).modification
+    assert [agent.id for agent in read.changed] == [agent.id for agent in right.changed]
+    for agent, meant in zip(read.changed, right.changed, strict=True):
+        assert (agent.motion is None) == (meant.motion is None)
+        if agent.motion is not None and meant.motion is not None:
+            assert motion_parts(agent.motion) == motion_parts(meant.motion)

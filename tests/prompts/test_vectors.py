@@ -22,8 +22,9 @@ from augment.prompts.vectors import (
     short_names,
 )
 from augment.scene.entities import Lane, LaneConnector, TurnType
+from augment.scene.planned_motion import LanePath
 from augment.variants.pose_tool import PoseTool
-from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, whole_scene
+from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, whole_scene
 from tests.scenes import junction, scene, vehicle
 
 FloatArray = NDArray[np.float64]
@@ -217,7 +218,7 @@ def test_of_connectors_that_lead_the_same_way_one_is_shown() -> None:
     assert "Connector4" in spans
 
 
-@pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS])
+@pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS, *MOVING_SLUGS])
 def test_every_place_of_a_reference_is_shown_with_its_lane(slug: str) -> None:
     base, reference = whole_scene(entry(slug).scene), entry(slug).reference
     assert reference is not None
@@ -226,6 +227,8 @@ def test_every_place_of_a_reference_is_shown_with_its_lane(slug: str) -> None:
         ends = [(agent.x_m, agent.y_m), *([agent.walk_to_m] if agent.walk_to_m else [])]
         assert extent.holds(np.array(ends)).all()
         assert agent.lane_id is None or agent.lane_id in spans
+        if agent.motion is not None and isinstance(agent.motion.path, LanePath):
+            assert spans.keys() >= set(agent.motion.path.lane_ids)
 
 
 @pytest.mark.parametrize(("y_m", "is_shown"), [(4.9, True), (5.1, False)])
