@@ -5,9 +5,9 @@ Left and right are those of the ego's direction of travel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import Annotated, Self
+from typing import Annotated, Self, TypeVar
 
 from numpy.random import Generator
 from pydantic import Field, model_validator
@@ -45,6 +45,24 @@ class MapPlace(StrEnum):
     CROSSWALK = "crosswalk"
 
 
+def _fill_high(given: object) -> object:
+    """In a document the low end alone is one number."""
+    for low, high in (("low_m", "high_m"), ("low", "high")):
+        if isinstance(given, dict) and low in given and given.get(high) is None:
+            return given | {high: given[low]}
+    return given
+
+
+_Range = TypeVar("_Range", "Length", "Amount")
+
+
+def _check_order(given: _Range) -> _Range:
+    low, high = fields(given)[:2]
+    if getattr(given, high.name) < getattr(given, low.name):
+        raise ValueError(f"{high.name} is below {low.name}")
+    return given
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Length:
     """A length or a range of lengths in metres; `is_approximate` if the sentence says "about"."""
@@ -53,19 +71,8 @@ class Length:
     high_m: _Metres
     is_approximate: Yes = False
 
-    @model_validator(mode="before")
-    @classmethod
-    def _takes_one_number(cls, given: object) -> object:
-        """In a document `low_m` alone is one length."""
-        if isinstance(given, dict) and "low_m" in given and given.get("high_m") is None:
-            return given | {"high_m": given["low_m"]}
-        return given
-
-    @model_validator(mode="after")
-    def _is_ordered(self) -> Self:
-        if self.high_m < self.low_m:
-            raise ValueError("high_m is below low_m")
-        return self
+    _takes_one_number = model_validator(mode="before")(_fill_high)
+    _is_ordered = model_validator(mode="after")(_check_order)
 
     @property
     def is_range(self) -> bool:
@@ -90,19 +97,8 @@ class Amount:
     low: _Value
     high: _Value
 
-    @model_validator(mode="before")
-    @classmethod
-    def _takes_one_number(cls, given: object) -> object:
-        """In a document `low` alone is one number."""
-        if isinstance(given, dict) and "low" in given and given.get("high") is None:
-            return given | {"high": given["low"]}
-        return given
-
-    @model_validator(mode="after")
-    def _is_ordered(self) -> Self:
-        if self.high < self.low:
-            raise ValueError("high is below low")
-        return self
+    _takes_one_number = model_validator(mode="before")(_fill_high)
+    _is_ordered = model_validator(mode="after")(_check_order)
 
     def drawn(self, rng: Generator) -> float:
         """Return a number of the range, evenly drawn."""

@@ -40,7 +40,6 @@ from augment.services.scenarios import scenes
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _SNAP_WITHIN_M = 15.0
-_BOTH = ("added", "moved")
 _NUMBERS = {
     "speed_mps": "Comes to (m/s)",
     "braking_mps2": "Brakes with (m/s²)",
@@ -176,13 +175,10 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
         numbers: dict[str, Any] = {"start": start, numbers_of(edit.preset)[0]: edit.number}
         mover = with_preset(edit.preset, after, mover, PresetNumbers(**numbers))
         mover = replace(mover, id=mover.id or f"{edit.agent_id}-door")
-    others = {agent.id: agent for agent in change.changed if agent.id != mover.id}
-    kept = {
-        name: tuple(one for one in getattr(change, name) if one.id in others) for name in _BOTH
-    }
     is_recorded = any(one.id == mover.id for one in editable_scene(scenario).agents)
     name = "moved" if is_recorded else "added"
-    return replace(change, **kept | {name: (*kept[name], mover)})
+    others = [one for one in getattr(change, name) if one.id != mover.id]
+    return replace(change, **{name: (*others, mover)})
 
 
 def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
