@@ -9,6 +9,7 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from arena.scenarios.queries import step_changes
+from augment import tasks
 from augment.baselines.rule_placer import place
 from augment.errors import Conflict, UnknownName
 from augment.fake_llm.server import running
@@ -108,6 +109,19 @@ def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
     assert two[2] == {"role": "assistant", "content": car(20.0)}
     assert f"<instruction>\n> {NEXT}\n</instruction>" in two[3]["content"]
     assert [step.pk for step in steps_to(second)] == [first.pk, second.pk]
+
+
+def test_a_worker_that_has_done_the_first_sends_the_follow_up(
+    server: Scripted, broker: Broker
+) -> None:
+    two_steps()
+    add(server, "ann")
+    first, second = launched("ann")
+    tasks.enqueue_job(first.job_id)
+    assert len(broker) == 1
+    tasks.work.run("augmentation", first.pk)
+    second.refresh_from_db()
+    assert (len(broker), second.sent_at is None) == (2, False)
 
 
 def test_it_goes_on_from_the_round_that_counted(server: Scripted) -> None:

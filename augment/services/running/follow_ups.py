@@ -4,7 +4,6 @@ A step is an augmentation of a scenario that follows another one; `follows` lead
 before, which stays as it is. Going back is going on from an earlier step.
 """
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from uuid import UUID
@@ -125,11 +124,8 @@ def conversation_of(answer: Augmentation | None) -> tuple[Message, ...]:
 
 def steps_to(row: Augmentation) -> list[Augmentation]:
     """Return the steps of a conversation up to this one, the first answer first."""
-    return list(_backwards(row))[::-1]
-
-
-def _backwards(row: Augmentation) -> Iterator[Augmentation]:
-    step: Augmentation | None = row
-    while step is not None:
-        yield step
-        step = step.follows
+    steps, before = [row], row.follows
+    while before is not None:
+        steps.insert(0, before)
+        before = before.follows
+    return steps

@@ -123,12 +123,9 @@ def with_followed(scenarios: Iterable[Scenario]) -> list[Scenario]:
     """Return the scenarios, each behind those that it follows."""
     ordered: dict[int, Scenario] = {}
     for scenario in scenarios:
-        chain: list[Scenario] = []
-        step: Scenario | None = scenario
-        while step is not None:
-            chain.insert(0, step)
-            step = step.follows
-        ordered |= {one.pk: one for one in chain}
+        if scenario.follows is not None:
+            ordered |= {one.pk: one for one in with_followed([scenario.follows])}
+        ordered[scenario.pk] = scenario
     return list(ordered.values())
 
 
