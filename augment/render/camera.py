@@ -31,6 +31,8 @@ MARGIN_M = 5.0
 MAX_WIDTH_M = 288.0
 # How far from the ego the window follows what contestants changed.
 FOLLOWED_M = 60.0
+# What is only driven through widens it up to this: a car has 34 pixels still.
+PASSED_WIDTH_M = 168.0
 LEAST_WIDTH_M = 72.0
 WIDTH_STEP_M = 6.0
 # Of the picture, width to height. A street is long: a higher window shows more of what lies
@@ -119,7 +121,7 @@ def camera_for(
     for the widest window the nearest to the ego are kept.
 
     Where anybody has a motion, it holds as well where they and the ego come within 60 m of where
-    the ego is at t0.
+    the ego is at t0, as far as it gets no wider than 168 m by that.
 
     Args:
         scene: The scene before the change; the old places of what is moved or removed belong
@@ -157,15 +159,21 @@ def _camera_for(
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
     followed = [place for change in changes for place in _places(scene, change)]
-    followed += map(np.array, passed)
     places += [one for one in followed if _distance_m(one) <= FOLLOWED_M]
+    need = _widened(need, places, MAX_WIDTH_M)
+    near = [one for one in map(np.array, passed) if _distance_m(one) <= FOLLOWED_M]
+    return _best(_widened(need, near, max(PASSED_WIDTH_M, _width_m(need))), scene)
+
+
+def _widened(need: FloatArray, places: list[FloatArray], widest_m: float) -> FloatArray:
+    """What is needed (2, 2) with those places as well, the nearest first, up to a width."""
     for place in sorted(places, key=_distance_m):
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
         more = np.array([low, high])
-        if _width_m(more) <= MAX_WIDTH_M:
+        if _width_m(more) <= widest_m:
             need = more
-    return _best(need, scene)
+    return need
 
 
 def _width_m(need: FloatArray) -> float:

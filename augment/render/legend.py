@@ -242,10 +242,10 @@ def _agent_keys(agent: TrafficAgent) -> set[str]:
     keys = {_AGENT_KEYS[agent.type]} if agent.type in _AGENT_KEYS else set()
     if is_walking(agent):
         keys.add("walk")
-    elif agent.motion is not None:
-        keys.add("trail")
     elif not stands(agent):
         keys.add("motion")
+    if agent.motion is not None:
+        keys.add("trail")
     return keys
 
 

@@ -102,12 +102,8 @@ def is_walking(agent: TrafficAgent) -> bool:
 
 
 def stands(agent: TrafficAgent) -> bool:
-    """Return whether no arrow shows a motion; a trail shows a planned one."""
-    return (
-        agent.motion is not None
-        or agent.walk_to_m is not None
-        or abs(agent.speed_mps) < _STANDING_MPS
-    )
+    """Return whether no arrow shows a motion."""
+    return agent.walk_to_m is not None or abs(agent.speed_mps) < _STANDING_MPS
 
 
 def is_upright(agent: TrafficAgent) -> bool:

@@ -11,11 +11,11 @@ from PIL import ImageColor
 from augment.geometry.frames import wrap
 from augment.render import palette
 from augment.render.bev import draw
-from augment.render.camera import camera_for
+from augment.render.camera import PASSED_WIDTH_M, camera_for
 from augment.render.film import STEPS, film_of
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.motion import motion_of
-from augment.scene.planned_motion import AtTime, NearEgo, PlannedMotion
+from augment.scene.planned_motion import AtTime, NearEgo, PlannedMotion, PointPath
 from augment.scene.trails import ego_spots, trails_of
 from tests.moving import cutting_in
 from tests.render.pictures import opened
@@ -134,3 +134,14 @@ def test_who_stands_is_one_pose_and_who_is_never_in_the_window_is_left_out() -> 
     assert isinstance(movers, list)
     # The parked car, the person, the ego and the car that cuts in.
     assert sorted(len(values) for *_, values in movers) == [3, 3, 3 * STEPS, 3 * STEPS]
+
+
+def test_a_window_widens_for_a_way_but_never_loses_who_is_changed_for_it() -> None:
+    way = PlannedMotion(path=PointPath(points_m=((30.0, -55.0),)), speeds=((0.0, 14.0),))
+    crossing = replace(vehicle("New1", 30.0, 45.0, -math.pi / 2), motion=way)
+    camera = camera_for(STREET, Modification(added=(crossing,)))
+    assert camera.shows(crossing.box.corners_m)
+    still = camera_for(STREET, Modification(added=(replace(crossing, motion=None),)))
+    # Already wider than ways may make it, and no wider for them.
+    widths_m = [one.x_max_m - one.x_min_m for one in (camera, still)]
+    assert widths_m[0] == widths_m[1] > PASSED_WIDTH_M
