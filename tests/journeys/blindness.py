@@ -26,7 +26,7 @@ CHUNKS = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"}
 TELLING_HEADERS = ("ETag", "Last-Modified", "Content-Disposition")
 MATCHUP = {
     *("matchup", "position", "instruction", "a", "b", "original"),
-    *("px_per_m", "ego_px", "width", "height", "legend", "unchanged", "question"),
+    *("px_per_m", "ego_px", "width", "height", "legend", "unchanged", "question", "is_filmed"),
 }
 """All that a matchup may say on the wire."""
 REPLY = {
