@@ -138,7 +138,9 @@ def camera_for(
         for spot in trail.spots
     ]
     spots += ego_spots(scene, recording) if moving else ()
-    places = [tuple(map(tuple, spot.box.corners_m.tolist())) for spot in spots]
+    boxes = [spot.box.corners_m for spot in spots]
+    near = [box for box in boxes if _distance_m(box) <= FOLLOWED_M]
+    places = [tuple(map(tuple, box.tolist())) for box in near]
     camera = _camera_for(scene, reference, changes, tuple(places))
     return replace(camera, is_filmed=True) if moving else camera
 
@@ -153,7 +155,7 @@ def _camera_for(
     changes: tuple[Modification, ...],
     passed: tuple[tuple[Point, ...], ...],
 ) -> Camera:
-    """The window that holds what is changed, and of the places that are passed the near ones."""
+    """The window that holds what is changed and, as far as it goes, what is passed."""
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
     behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
@@ -161,8 +163,8 @@ def _camera_for(
     followed = [place for change in changes for place in _places(scene, change)]
     places += [one for one in followed if _distance_m(one) <= FOLLOWED_M]
     need = _widened(need, places, MAX_WIDTH_M)
-    near = [one for one in map(np.array, passed) if _distance_m(one) <= FOLLOWED_M]
-    return _best(_widened(need, near, max(PASSED_WIDTH_M, _width_m(need))), scene)
+    widest_m = max(PASSED_WIDTH_M, _width_m(need))
+    return _best(_widened(need, [np.array(place) for place in passed], widest_m), scene)
 
 
 def _widened(need: FloatArray, places: list[FloatArray], widest_m: float) -> FloatArray:
