@@ -1,6 +1,5 @@
 """Displacement over time, by hand: 61 steps of 0.1 s, t0 and 6 s included."""
 
-import math
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -9,15 +8,7 @@ import pytest
 from augment.checks import Ground
 from augment.metrics.displacement import Displacement, OverTime, are_alike, displacement, summarise
 from augment.scene.entities import AgentType, Modification, TrafficAgent
-from augment.scene.planned_motion import (
-    AtPlace,
-    AtTime,
-    LanePath,
-    NearEgo,
-    PlannedMotion,
-    PointPath,
-    Trigger,
-)
+from augment.scene.planned_motion import AtPlace, AtTime, LanePath, NearEgo, PlannedMotion, Trigger
 from augment.scene.recording import Recording, Track
 from tests.scene.test_planned_motion import two_lanes, with_motion
 from tests.scenes import cone, scene, vehicle
@@ -103,27 +94,6 @@ def test_who_leaves_the_map_is_compared_as_long_as_both_are_there() -> None:
     (match,) = displacement(Modification(added=(here,)), leaves, Ground.of(scene())).matches
     assert match.final_m == pytest.approx(9.5 * 2.1)
     assert match.average_m == pytest.approx(0.95 * sum(range(22)) / 22)
-
-
-def test_paths_part_across() -> None:
-    """One slides 3 m to the left, one 4 m ahead, at 1 m/s: after t s t * sqrt(2) m apart."""
-    left, ahead = (
-        Modification(
-            added=(
-                with_motion(
-                    vehicle("Agent2", 30.0, 0.0),
-                    PlannedMotion(path=PointPath(points_m=(point,)), speeds=((0.0, 1.0),)),
-                ),
-            )
-        )
-        for point in ((30.0, 3.0), (34.0, 0.0))
-    )
-    (match,) = followed(left, ahead).matches
-    assert match.final_m == pytest.approx(5.0)
-    times_s = 0.1 * np.arange(61)
-    apart_m = np.hypot(np.minimum(times_s, 3.0), np.minimum(times_s, 4.0))
-    assert match.average_m == pytest.approx(apart_m.mean())
-    assert apart_m[30] == pytest.approx(3.0 * math.sqrt(2.0))
 
 
 def recorded_at(ego_mps: float) -> Recording:

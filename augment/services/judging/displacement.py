@@ -21,8 +21,7 @@ from augment.metrics.kept import KeptSummary as KeptSummary
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
-from augment.services.judging.findings import ground_of
-from augment.services.scenarios.scenes import type_rank
+from augment.services.scenarios.scenes import ground_of, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State

@@ -6,8 +6,7 @@ The reference and anybody's labels stay out of it.
 from collections import defaultdict
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, field
 from typing import Any
 
 from augment.checks import Finding as Finding
@@ -20,16 +19,15 @@ from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.services.scenarios.editing import (
-    editable_scene,
+    editable_ground,
     give_preset,
     presets_of,
     read_edit,
     snap,
 )
-from augment.services.scenarios.scenes import intent_of, recording_of, scene_of
+from augment.services.scenarios.scenes import ground_of, intent_of
 
 _WAY_STEPS = 10
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
@@ -78,15 +76,6 @@ def findings_of(row: Augmentation) -> tuple[Finding, ...]:
     return _check(row, ground_of(row.scenario), intent_of(row.scenario))
 
 
-def ground_of(scenario: Scenario) -> Ground:
-    """Return the ground of a scenario, whose recording is read where something moves.
-
-    Raises:
-        InvalidDocument: The stored scene can't be read.
-    """
-    return Ground.of(scene_of(scenario), partial(recording_of, scenario))
-
-
 def findings_by_row(rows: Iterable[Augmentation]) -> dict[int, tuple[Finding, ...]]:
     """Return the findings about all rows that can be checked, by key; a scene is read once."""
     by_scenario: defaultdict[Scenario, list[Augmentation]] = defaultdict(list)
@@ -133,10 +122,7 @@ def check_edit(
             modification = snap(scenario, modification, snapped)
         if preset is not None:
             modification = give_preset(scenario, modification, preset)
-        intent = intent_of(scenario)
-        ground = replace(
-            _ground(editable_scene(scenario)), read_recording=partial(recording_of, scenario)
-        )
+        ground, intent = editable_ground(scenario), intent_of(scenario)
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification, CannotPlace, UnknownName) as error:
         return Checked(problem=str(error))
@@ -161,11 +147,6 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-@lru_cache(maxsize=4)
-def _ground(scene: Scene) -> Ground:
-    return Ground.of(scene)
 
 
 def _check(row: Augmentation, ground: Ground, intent: Intent | None) -> tuple[Finding, ...]:

@@ -14,20 +14,14 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from pydantic import Field, TypeAdapter
 
+from augment.checks import Ground
 from augment.checks.derived_motions import find_wish
 from augment.errors import Conflict, UnknownName
 from augment.geometry.frames import difference, wrap
 from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene import codec
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    Modification,
-    Scene,
-    TrafficAgent,
-    apply,
-)
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent, apply
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_parts import Amount
 from augment.scene.intent_statements import list_statements
@@ -105,7 +99,7 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
 
 
 def _agents_of(draft: Scenario) -> list[dict[str, Any]]:
-    agents = editable_scene(draft).agents
+    agents = editable_ground(draft).scene.agents
     listed: list[dict[str, Any]] = codec.MODIFICATION.dump(Modification(moved=agents))["move"]
     return listed
 
@@ -117,14 +111,14 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
         InvalidDocument: It breaks its format.
         InvalidModification: It does not fit the scene.
     """
-    scene, graph = _scene_and_lanes(scenario)
+    ground = editable_ground(scenario)
     given = codec.modification_from_document(document)
     placed = replace(
         given,
-        added=tuple(_on_its_lane(agent, graph) for agent in given.added),
-        moved=tuple(_on_its_lane(agent, graph) for agent in given.moved),
+        added=tuple(_on_its_lane(agent, ground.graph) for agent in given.added),
+        moved=tuple(_on_its_lane(agent, ground.graph) for agent in given.moved),
     )
-    scenes.check_reference(scene, placed)
+    scenes.check_reference(ground.scene, placed)
     return placed
 
 
@@ -148,7 +142,7 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     A pedestrian who walks somewhere faces that way from there, along or across the lane.
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
-    _, graph = _scene_and_lanes(scenario)
+    graph = editable_ground(scenario).graph
     added, moved = (
         tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
         for agents in (modification.added, modification.moved)
@@ -165,7 +159,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
         UnknownName: There is no such agent.
     """
     edit = _PRESET.from_parts(given)
-    after = apply(editable_scene(scenario), change)
+    after = apply(editable_ground(scenario).scene, change)
     agents = {agent.id: agent for agent in after.agents}
     if edit.agent_id not in agents:
         raise UnknownName("agent", edit.agent_id, list(agents))
@@ -175,7 +169,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
         numbers: dict[str, Any] = {"start": start, numbers_of(edit.preset)[0]: edit.number}
         mover = with_preset(edit.preset, after, mover, PresetNumbers(**numbers))
         mover = replace(mover, id=mover.id or f"{edit.agent_id}-door")
-    is_recorded = any(one.id == mover.id for one in editable_scene(scenario).agents)
+    is_recorded = any(one.id == mover.id for one in editable_ground(scenario).scene.agents)
     name = "moved" if is_recorded else "added"
     others = [one for one in getattr(change, name) if one.id != mover.id]
     return replace(change, **{name: (*others, mover)})
@@ -183,7 +177,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
 
 def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
     """Return by id which preset a motion is, with its numbers as `PresetEdit` has them."""
-    scene, found = editable_scene(scenario), dict[str, dict[str, Any]]()
+    scene, found = editable_ground(scenario).scene, dict[str, dict[str, Any]]()
     everyone = apply(scene, change).agents
     for agent in change.changed:
         wish = find_wish(agent, scene, everyone)
@@ -198,13 +192,13 @@ def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, 
     return found
 
 
-def editable_scene(scenario: Scenario) -> Scene:
-    """Return the scene that is changed, read once for as long as several edits follow each other.
+def editable_ground(scenario: Scenario) -> Ground:
+    """Return the ground that is changed, read once for as long as several edits follow each other.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return _scene_and_lanes(scenario)[0]
+    return _read_ground(_Keyed(scenes.scene_key(scenario), scenario))
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,14 +209,9 @@ class _Keyed:
     scenario: Scenario = field(compare=False)
 
 
-def _scene_and_lanes(scenario: Scenario) -> tuple[Scene, LaneGraph]:
-    return _read_scene(_Keyed(scenes.scene_key(scenario), scenario))
-
-
 @lru_cache(maxsize=8)
-def _read_scene(keyed: _Keyed) -> tuple[Scene, LaneGraph]:
-    scene = scenes.scene_of(keyed.scenario)
-    return scene, LaneGraph(scene)
+def _read_ground(keyed: _Keyed) -> Ground:
+    return scenes.ground_of(keyed.scenario)
 
 
 def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:

@@ -5,6 +5,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -12,6 +13,7 @@ from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.baselines.rule_placer import list_open
+from augment.checks import Ground
 from augment.checks.derived import describe_change, type_of_change
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import goal_place
@@ -402,6 +404,15 @@ def recording_of(scenario: Scenario) -> Recording | None:
         return None
     recording = codec.recording_from_document(document)
     return recording if scenario.keep_traffic else replace(recording, tracks=())
+
+
+def ground_of(scenario: Scenario) -> Ground:
+    """Return the ground of a scenario, whose recording is read where something moves.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return Ground.of(scene_of(scenario), partial(recording_of, scenario))
 
 
 def scene_key(scenario: Scenario) -> str:
