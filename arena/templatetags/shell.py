@@ -16,7 +16,10 @@ register = template.Library()
 
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
     "home": (_("Home"), frozenset({""})),
-    "scenarios": (_("Scenarios"), frozenset({"scenarios", "scenes", "uploads", "benchmarks"})),
+    "scenarios": (
+        _("Scenarios"),
+        frozenset({"scenarios", "scenes", "uploads", "benchmarks", "sweeps"}),
+    ),
     "benchmarks": (_("Benchmarks"), frozenset({"benchmarks"})),
     "contestants": (
         _("Contestants"),

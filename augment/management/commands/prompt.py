@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from augment.errors import UnknownName
-from augment.models import Scenario
 from augment.services.scenarios.prompts import preview_prompt, prompt_version
+from augment.services.scenarios.scenes import scenario_named
 from augment.services.terminal import TerminalCommand
 from augment.variants.respondents import ModelRole
 
@@ -29,12 +28,8 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print the messages, then what is known about them."""
-        slug, rows = options["scenario"], Scenario.objects.select_related("base_scene")
-        scenario = rows.filter(slug=slug).first()
-        if scenario is None:
-            raise UnknownName("scenario", slug, list(rows.values_list("slug", flat=True)))
         shown = preview_prompt(
-            scenario,
+            scenario_named(options["scenario"]),
             variant=options["variant"],
             role=options["role"],
             native_tools=options["native_tools"],

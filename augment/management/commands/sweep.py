@@ -67,6 +67,7 @@ class Command(TerminalCommand):
             self.stdout.write(f"{line.row.value:g}: {'; '.join(told) or line.row.reason}")
         self.stdout.write(result.verdict)
         kept = result.sweep.hardest
-        self.stdout.write(
-            f"Kept as {kept.slug}." if kept else "No value is failed by it and solved by another."
-        )
+        told_last = "No value is failed by it and solved by another."
+        if result.under_way:
+            told_last = f"Workers have {result.under_way} of the drives; the sweep's page goes on."
+        self.stdout.write(f"Kept as {kept.slug}." if kept else told_last)
