@@ -229,6 +229,7 @@ class CatalogueEntry:
 
     Attributes:
         scene: The name of its base scene.
+        follows: The slug of the scenario whose results it asks to change further, mostly empty.
         language: Of the instruction; English goes without saying.
         instruction: What is to be changed, in the user's words.
         paraphrases: The same wish in other words, each to be answered by the same reference.
@@ -241,6 +242,7 @@ class CatalogueEntry:
 
     slug: _Words
     scene: _Words
+    follows: Annotated[str, Field(exclude_if=lambda slug: not slug)] = ""
     type: ScenarioType | MotionPreset
     language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
     instruction: _Words

@@ -387,3 +387,4 @@ class CatalogueSet(StrEnum):
     PAPER = "paper"
     HARD = "hard"
     MOVING = "moving"
+    FOLLOW_UPS = "follow-ups"

@@ -24,7 +24,10 @@ from augment.services.events import log_change
 from augment.services.scenarios import scenes as scene_rows
 
 SOURCE = "authored"
-_SHARED = {CatalogueSet.MOVING: (CatalogueSet.PAPER, CatalogueSet.HARD)}
+_SHARED = {
+    CatalogueSet.MOVING: (CatalogueSet.PAPER, CatalogueSet.HARD),
+    CatalogueSet.FOLLOW_UPS: (CatalogueSet.PAPER,),
+}
 """Sets on scenes of others."""
 Problems = list[tuple[str, str]]
 Read = TypeVar("Read")
@@ -225,7 +228,12 @@ def _store_scenario(
     if row is None:
         origin = IntentOrigin.AUTHORED
         row = scene_rows.add_scenario(
-            scene=entry.scene, slug=entry.slug, **said, intent_origin=origin, actor=actor
+            scene=entry.scene,
+            slug=entry.slug,
+            **said,
+            intent_origin=origin,
+            follows=entry.follows,
+            actor=actor,
         )
         Scenario.objects.filter(pk=row.pk).update(**own)
         return CatalogueStep.ADDED
@@ -236,6 +244,7 @@ def _store_scenario(
         )
     wanted = own | said
     wanted["base_scene"] = BaseScene.objects.get(slug=entry.scene)
+    wanted["follows"] = Scenario.objects.filter(slug=entry.follows).first()
     wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
