@@ -62,6 +62,9 @@ def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
             _draw_curve(axes, result, driver, SOFT, stroke)
         _draw_curve(axes, result, tested, MARK, "-")
         axes.grid()
+        low, high = result.lines[0].row.value, result.lines[-1].row.value
+        margin = 0.03 * (high - low) or 1.0
+        axes.set_xlim(low - margin, high + margin)
         axes.set_ylim(-4.0, 104.0)
         axes.set_xlabel(result.sweep.number)
         axes.set_ylabel("Score by nuPlan (%)")
