@@ -40,7 +40,7 @@ def test_a_study_without_them_has_no_trace_of_them() -> None:
     eva = signed_in(User.objects.get(username="eva"))
     for address in (page(study), f"{page(study)}help/"):
         shown = eva.get(address).content.decode()
-        for trace in ("replay", "film", "Drives", "planner", "<kbd>D</kbd>"):
+        for trace in ("replay", "film.css", "Drives", "planner", "<kbd>D</kbd>"):
             assert trace not in shown, (address, trace)
 
 
