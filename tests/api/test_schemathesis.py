@@ -58,7 +58,8 @@ EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
 READ_BY_STAFF = {
     *("listJobs", "getJob", "getJobProgress", "exportJob", "listStudies", "getStudy"),
     *("listScenarios", "listContestants", "getUpload", "getMoment", "getProbe"),
-    *("rateStudy", "getSnapshot", "exportSnapshot", "getSubmission", "getSweep"),
+    *("rateStudy", "getSnapshot", "exportSnapshot", "getSubmission"),
+    *("getSweep", "getAugmentation"),
 }
 
 Seen = dict[str, set[int]]
@@ -103,6 +104,7 @@ def codes(here: World) -> dict[str, object]:
         "models": EndpointModel.objects.get().code,
         "submissions": Submission.objects.get().code,
         "scenarios": here.augmentation.scenario.code,
+        "augmentations": here.augmentation.code,
         "sweeps": Sweep.objects.get().code,
     }
 
