@@ -30,6 +30,7 @@ from augment.models import (
 from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.progress import count_rows
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
@@ -50,7 +51,8 @@ class DemoFailed(ArenaError):
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     demo.load_scenarios()
-    scenarios, scenes = len(demo.scenarios_of(None)), BaseScene.objects.count()
+    load_catalogue(sets=["moving"])
+    scenarios, scenes = Scenario.objects.count(), BaseScene.objects.count()
     say(f"Catalogue: {scenarios} scenarios on {scenes} scenes")
     if not Benchmark.objects.exists():
         make_benchmark(

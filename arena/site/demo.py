@@ -54,10 +54,10 @@ def load_scenarios(actor: User | None = None) -> None:
     load_catalogue(actor=actor)
 
 
-def scenarios_of(per_type: int | None) -> list[str]:
-    """Slugs of the catalogue: the first so many of each type, all where None is given."""
+def scenarios_of(per_type: int | None, which: str = "paper") -> list[str]:
+    """Slugs of a set of the catalogue: the first so many of each type, all where None is given."""
     kinds: dict[str, list[str]] = {}
-    authored = Scenario.objects.filter(catalogue_set="paper", paraphrase_of=None)
+    authored = Scenario.objects.filter(catalogue_set=which, paraphrase_of=None)
     for slug, kind in authored.values_list("slug", "type"):
         kinds.setdefault(kind, []).append(slug)
     return [slug for slugs in kinds.values() for slug in slugs[:per_type]]

@@ -27,6 +27,9 @@ def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) 
     assert demo_home.rows("SELECT count(*) FROM arena_vote") == [(200,)]
     assert sum(int(row["wins"]) + int(row["losses"]) for row in rows) <= 2 * 200
     assert sum(int(row["votes"]) for row in rows) >= 2 * 200  # settled pairs count as ties
+    kinds = "SELECT count(DISTINCT s.type) FROM augment_augmentation a JOIN augment_scenario s"
+    kinds += " ON s.id = a.scenario_id WHERE a.state = 'done' AND s.catalogue_set = 'moving'"
+    assert demo_home.rows(kinds) == [(8,)]
     document = json.loads((demo_home.folder / "var" / "demo" / "leaderboard.json").read_text())
     assert len(document["standings"]) == len(rows)
     assert r"\toprule" in (demo_home.folder / "var" / "demo" / "leaderboard.tex").read_text()

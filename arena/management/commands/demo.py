@@ -52,7 +52,7 @@ class Command(TerminalCommand):
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
-        scenarios = scenarios_of(per_type)
+        scenarios = [*scenarios_of(per_type), *scenarios_of(1, "moving")]
         supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
         with supervisor.signals():
             try:
