@@ -78,7 +78,6 @@ def formats() -> set[str]:
 OFFERED: dict[str, Callable[[], set[str]]] = {
     "Pages": pages,
     "Commands": commands,
-    "API": operations,
     "Settings": settings_read,
     "File formats": formats,
 }
@@ -88,6 +87,19 @@ OFFERED: dict[str, Callable[[], set[str]]] = {
 def test_what_is_offered_is_listed_and_nothing_else(section: str) -> None:
     assert len(listed(section)) >= 10
     assert listed(section) == OFFERED[section]()
+
+
+def test_the_page_on_the_api_lists_every_operation() -> None:
+    page = (ROOT / "docs" / "api.md").read_text()
+    rows = re.findall(r"^\| (`/.*?) \| ?(.*?) \| ?(.*?) ?\|$", page, re.M)
+    explained = {
+        f"{method} {address}"
+        for addresses, *cells in rows
+        for method, cell in zip(("GET", "POST"), cells, strict=True)
+        for address in re.findall(r"`/([^`]+)`", addresses)
+        if cell
+    }
+    assert explained == operations()
 
 
 def test_the_page_on_deploying_explains_every_setting() -> None:
