@@ -49,6 +49,10 @@ def asked_course(asked: Asked) -> Iterator[Finding]:
             if wish.start is not None:
                 yield from _start(asked, agent, agent.motion, wish.start)
             states = _carried_out(asked, agent, agent.motion)
+            if not len(states):
+                words = "{agents[0]} has left the map before its motion begins."
+                yield find(FindingKind.ASKED_MOTION, False, [agent], words)
+                continue
             yield from _course(asked, agent, wish, states)
             yield from _numbers(asked, agent, wish, states)
 

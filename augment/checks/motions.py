@@ -117,13 +117,13 @@ def motion_limits(situation: ChangedScene) -> Iterator[Finding]:
         limits, first = LIMITS.get(mover.agent.type), _first_step(situation, mover)
         if limits is None or first is None:
             continue
-        window = round(WINDOW_S / step_s)
+        window = min(round(WINDOW_S / step_s), len(mover.states) - 1)
         gained = (mover.states[window:, 3] - mover.states[:-window, 3]) / (window * step_s)
         sideways, curvature = _bends(mover.states[first:])
         kind = name_type(mover.agent.type)
         for words, most, limit in (
-            ("speeds up by", np.nanmax(gained), limits.speeding_up),
-            ("brakes by", -np.nanmin(gained), limits.braking),
+            ("speeds up by", np.nanmax(gained, initial=0.0), limits.speeding_up),
+            ("brakes by", -np.nanmin(gained, initial=0.0), limits.braking),
             ("is pulled sideways by", sideways, limits.sideways),
         ):
             if most > limit * 1.001:

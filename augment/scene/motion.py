@@ -104,7 +104,7 @@ def motion_of(
         replaced: Ids whose tracks count no longer: moved, removed.
         with_later: Whether who appears after t0 is part of it.
     """
-    if recording is not None and len(recording.times_s) < 2:
+    if recording is not None and round(float(recording.times_s[-1]) / STEP_S) < 1:
         recording = None  # of one moment nothing follows
     last_s = LENGTH_S if recording is None else float(recording.times_s[-1])
     times_s = np.asarray(np.arange(round(last_s / STEP_S) + 1) * STEP_S, dtype=np.float64)

@@ -18,6 +18,8 @@ from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, LanePath, Near
 from augment.scene.schema import MOST_OBJECTS
 
 SAMPLE_M = 0.5
+LEAST_M = 1e-6
+"""Points nearer to each other than this are one."""
 MOST_SAMPLES = 20_000
 """Of one line: paths of strangers may be as long as they like, lines of 10 km are exact."""
 MOST_OF_CHANGE = 100
@@ -90,21 +92,22 @@ class PlannedMover:
 
     def state(self) -> FloatArray:
         """Return x, y, heading and speed (4,) now; NaN past the map."""
-        own_mps, speeds = self.agent.speed_mps, self._motion.speeds
+        own_mps, speeds, path = self.agent.speed_mps, self._motion.speeds, self._motion.path
         if self.started_s is None:
             return _row(self._held.pose_at(own_mps * self._time_s), own_mps)
         since_s = self._time_s - self.started_s
         gone_m, speed_mps = way_and_speed(speeds, own_mps, since_s)
-        if self._line is None:
+        if path is None:
             return _row(self._held.pose_at(own_mps * self.started_s + gone_m), speed_mps)
+        if self._line is None:  # its path ends where it is
+            stays = isinstance(path, PointPath) or gone_m == 0.0
+            return _row(self._held.pose_at(own_mps * self.started_s) if stays else None, 0.0)
         if gone_m >= self._line.length_m:
-            if isinstance(self._motion.path, LanePath):
+            if isinstance(path, LanePath):
                 return np.full(4, np.nan)
             gone_m, speed_mps = self._line.length_m, 0.0
         pose = self._line.pose_at(gone_m)
-        keeps_heading = (
-            isinstance(self._motion.path, PointPath) and self._motion.path.keeps_heading
-        )
+        keeps_heading = isinstance(path, PointPath) and path.keeps_heading
         heading_rad = self.agent.heading_rad if keeps_heading else pose.heading_rad
         return _row((pose.x_m, pose.y_m, heading_rad), speed_mps)
 
@@ -162,7 +165,7 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
 
     points = np.array(points_m)
     steps_m = np.hypot(*np.diff(points, axis=0).T)
-    points = points[np.concatenate([[True], steps_m > 1e-6])]
+    points = points[np.concatenate([[True], steps_m > LEAST_M])]
     if len(points) < 2:
         return None
     if len(points) == 2:
@@ -174,8 +177,8 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
         return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
-def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
-    """Return the line that a path over lanes takes from a place on its first lane.
+def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline | None:
+    """Return the line that a path over lanes takes from a place, None where the lanes end there.
 
     It keeps its offset from the centreline until it changes lanes; a change ends in the centre.
     Who sets out beside the first lane, or at its edge, changes onto it first.
@@ -201,7 +204,8 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline:
         line, d_m = target, 0.0
         at_m = target.project(*points[-1]).s_m
     points += [line.position(s_m, d_m) for s_m in _samples(at_m, line.length_m)]
-    return Polyline(points)
+    leads_on = any(math.dist(here, point) > LEAST_M for point in points)
+    return Polyline(points) if leads_on else None
 
 
 def check_motions(scene: Scene, modification: Modification) -> None:

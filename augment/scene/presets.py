@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from pydantic import TypeAdapter
 
-from augment.errors import CannotPlace
+from augment.errors import CannotPlace, InvalidDocument
 from augment.geometry.frames import Pose, difference
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
@@ -43,12 +44,14 @@ from augment.scene.planned_mover import (
     smooth_share,
     way_and_speed,
 )
+from augment.scene.schema import Codec
 
 DOOR_LENGTH_M, DOOR_WIDTH_M, DOOR_REACH_M = 1.1, 0.15, 0.9
 """A door as a slab beside its car, and how far out it slides."""
 TURN_RADIUS_M = 4.5
 """On which a car turns round; that of its centre."""
 
+_MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _NUMBERS = ("braking_mps2", "speed_mps", "duration_s")
 _SPEEDING_UP_MPS2 = 3.0
 _DRIVEN = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
@@ -121,7 +124,8 @@ def with_preset(
         numbers: What is to be as somebody says.
 
     Raises:
-        CannotPlace: The scene has not what it needs, or a number is none of the preset's.
+        CannotPlace: The scene has not what it needs, or a number is none of the preset's or
+            makes a motion that is beyond what can be written.
     """
     route = EgoRoute.of(scene)
     if route is None:
@@ -135,7 +139,12 @@ def with_preset(
         lane_id = route.graph.under(agent.x_m, agent.y_m, agent.heading_rad)
         agent = replace(agent, lane_id=lane_id)  # who drives holds it until the start
     place = route.locate_agent(agent)
-    return _MAKERS[preset](_Case(preset, route, agent, lane_id, place, numbers))
+    mover = _MAKERS[preset](_Case(preset, route, agent, lane_id, place, numbers))
+    try:
+        _MOTION.from_parts(_MOTION.dump(mover.motion))
+    except InvalidDocument as fault:
+        raise CannotPlace(f"{preset.label}: {fault}") from None
+    return mover
 
 
 def numbers_of(preset: MotionPreset) -> tuple[str, ...]:
@@ -385,7 +394,9 @@ def _red_light(case: _Case) -> TrafficAgent:
         own_mps = case.agent.speed_mps
         speeds = _ramp(own_mps, case.reached_mps)
         line = lane_line(case.route.graph, path, (case.agent.x_m, case.agent.y_m))
-        needs_m = line.project(*crossing).s_m
+        needs_m = line.project(*crossing).s_m if line is not None else 0.0
+        if needs_m == 0.0:
+            continue  # it is past the crossing
         times_s = np.arange(0.0, 60.0, 0.1)
         gone_m = [way_and_speed(speeds, own_mps, time_s)[0] for time_s in times_s.tolist()]
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])

@@ -152,6 +152,12 @@ def other(agent: TrafficAgent, **parts: Any) -> TrafficAgent:
         # 8 m/s in 2 s are 4 m/s^2; 5 are asked for, and 0.75 is the tolerance.
         ("hard_braking", lambda one: other(one, speeds=((2.0, 0.0),)), FindingKind.ASKED_MOTION),
         ("hard_braking", lambda one: replace(one, x_m=20.0), FindingKind.ASKED_DISTANCE),
+        # At 8 m/s it is past the end of the lanes, at 100 m, by then.
+        (
+            "hard_braking",
+            lambda one: other(one, start=AtTime(after_s=60.0)),
+            FindingKind.ASKED_MOTION,
+        ),
         (
             "u_turn",
             lambda one: other(one, path=None, speeds=((1.0, 4.0),)),

@@ -210,3 +210,12 @@ def test_whether_a_trigger_fires(
     found = of_kind(findings_on(ground, Modification(added=(stands,))), FindingKind.MOTION_TRIGGER)
     assert [one.severity for one in found] == [severity]
     assert next(iter(found[0].measured.values())) == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("step_s", [0.02, 0.1])
+def test_a_recording_of_a_moment_is_no_reason_to_fail(step_s: float) -> None:
+    states = np.array([(0.0, 0.0, 0.0, 8.0), (8.0 * step_s, 0.0, 0.0, 8.0)])
+    recording = Recording(times_s=np.array([0.0, step_s]), ego=states)
+    brakes = car(PlannedMotion(speeds=((0.05, 0.0),)))
+    found = findings_on(Ground.of(two_lanes(), lambda: recording), Modification(added=(brakes,)))
+    assert [one.severity for one in of_kind(found, FindingKind.MOTION_LIMITS)] == [WRONG]

@@ -141,6 +141,18 @@ def test_a_path_follows_lanes_through_a_junction_and_is_gone_past_the_map() -> N
     assert np.flatnonzero(~turning.is_present)[0] == np.ceil((20.0 + arc_m + 52.0) / 1.0)
 
 
+def test_where_a_path_ends_at_its_start_one_stands_at_a_point_and_leaves_at_the_end_of_lanes() -> (
+    None
+):
+    stops = PlannedMotion(path=PointPath(points_m=((38.0, 0.0),)), start=AtTime(after_s=1.0))
+    car = with_motion(vehicle("Agent2", 30.0, 0.0), stops, speed_mps=8.0, lane_id="Lane1")
+    assert moved(two_lanes(), car).states[[9, 10, 60], 0] == pytest.approx([37.2, 38.0, 38.0])
+    leaves = PlannedMotion(path=LanePath(lane_ids=("Lane1",)))
+    car = with_motion(vehicle("Agent2", 400.0, 0.0), leaves)
+    assert moved(two_lanes(), car).is_present.all()
+    assert moved(two_lanes(), replace(car, speed_mps=1.0)).is_present.nonzero()[0].tolist() == [0]
+
+
 @pytest.mark.parametrize(
     ("motion", "sentence"),
     [

@@ -209,6 +209,19 @@ def test_a_refusal_says_what_is_missing(
         with_preset(preset, scene(), agent)
 
 
+def test_nobody_runs_a_red_light_whose_crossing_is_behind() -> None:
+    past = replace(car(40.0, 5.0, heading_rad=math.pi / 2.0), lane_id="Connector1")
+    with pytest.raises(CannotPlace, match="crosses the ego's"):
+        with_preset(MotionPreset.RED_LIGHT, crossing(), past)
+
+
+def test_a_motion_that_nobody_could_read_again_is_refused() -> None:
+    # From 8 m/s at 0.1 m/s^2: 80 s, and a motion may take 60.
+    leader, slowly = car(20.0, 0.0, speed_mps=8.0), PresetNumbers(braking_mps2=0.1)
+    with pytest.raises(CannotPlace, match=r"Hard braking: .*speeds.* got 80"):
+        with_preset(MotionPreset.HARD_BRAKING, scene(), leader, slowly)
+
+
 def test_a_number_that_a_preset_has_not_is_refused() -> None:
     with pytest.raises(CannotPlace, match="braking_mps2 is none of its numbers: speed_mps"):
         with_preset(
