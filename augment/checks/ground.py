@@ -25,8 +25,7 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
-from augment.scene.motion import Motion, Movement, motion_of
-from augment.scene.planned_motion import AtPlace
+from augment.scene.motion import Motion, Movement, motion_of, with_movers_alone
 from augment.scene.recording import Recording
 
 SEAM_M = 0.3
@@ -178,19 +177,14 @@ class Ground:
 
         Args:
             modification: The change.
-            of_all: False for the ego, who is changed and whom they wait for, alone.
+            of_all: False for the ego, who is changed, who has a motion and whom those wait for.
 
         Raises:
             InvalidModification: The modification does not fit the scene.
         """
-        after, changed = apply(self.scene, modification), modification.changed
+        after = apply(self.scene, modification)
         if not of_all:
-            watched = {agent.id for agent in changed} | {
-                agent.motion.start.agent_id
-                for agent in changed
-                if agent.motion is not None and isinstance(agent.motion.start, AtPlace)
-            }
-            after = replace(after, agents=tuple(one for one in after.agents if one.id in watched))
+            after = with_movers_alone(after, {agent.id for agent in modification.changed})
         moved = [agent.id for agent in modification.moved]
         return motion_of(
             after,

@@ -4,7 +4,7 @@ Frame: ego frame of t0. T steps.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
+from augment.scene.planned_motion import AtPlace
 from augment.scene.planned_mover import HeldCourse, PlannedMover
 from augment.scene.recording import Recording, agent_of
 
@@ -125,6 +126,14 @@ def motion_of(
         others |= {one.agent.id: one for one in _later(recording, times_s, taken, replaced)}
     others |= _planned(scene, times_s, graph, {ego.agent.id: ego} | others)
     return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
+
+
+def with_movers_alone(scene: Scene, besides: Collection[str] = ()) -> Scene:
+    """Return the scene with those alone on whom planned motions depend, and some besides."""
+    motions = [(one.id, one.motion) for one in scene.agents if one.motion is not None]
+    names = {*besides, *(name for name, _ in motions)}
+    names |= {one.start.agent_id for _, one in motions if isinstance(one.start, AtPlace)}
+    return replace(scene, agents=tuple(one for one in scene.agents if one.id in names))
 
 
 # Private

@@ -140,6 +140,7 @@ def with_preset(
         agent = replace(agent, lane_id=lane_id)  # who drives holds it until the start
     place = route.locate_agent(agent)
     mover = _MAKERS[preset](_Case(preset, route, agent, lane_id, place, numbers))
+    assert mover.motion is not None
     try:
         _MOTION.from_parts(_MOTION.dump(mover.motion))
     except InvalidDocument as fault:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from augment.scene.entities import Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import STEP_S, FloatArray, motion_of
-from augment.scene.planned_motion import AtPlace, AtTime
+from augment.scene.motion import STEP_S, FloatArray, motion_of, with_movers_alone
+from augment.scene.planned_motion import AtTime
 from augment.scene.recording import Recording
 
 SHOWN_S = 6.0
@@ -60,7 +60,7 @@ def trails_of(
         return ()
     after = apply(scene, modification)
     replaced = frozenset([*(one.id for one in modification.moved), *modification.removed])
-    motion = motion_of(_concerned(after), recording=recording, replaced=replaced)
+    motion = motion_of(with_movers_alone(after), recording=recording, replaced=replaced)
     started = {one.agent.id: _trail_since(one.started_s, one.states) for one in motion.others}
     waiting = {name for name, found in started.items() if found is None}
     at_once = replace(
@@ -94,14 +94,6 @@ def ego_spots(scene: Scene, recording: Recording | None = None) -> tuple[Traffic
 
 
 # Private
-
-
-def _concerned(after: Scene) -> Scene:
-    """Only who has a motion and for whom somebody waits: the others change nothing about them."""
-    motions = [(one.id, one.motion) for one in after.agents if one.motion is not None]
-    names = {name for name, _ in motions}
-    names |= {one.start.agent_id for _, one in motions if isinstance(one.start, AtPlace)}
-    return replace(after, agents=tuple(one for one in after.agents if one.id in names))
 
 
 def _trail_since(

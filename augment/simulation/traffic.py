@@ -407,6 +407,8 @@ def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
         agent = at_start.get(track.agent_id)
         if track.agent_id in moved or track.agent_id in setting.modification.removed:
             continue
+        if agent is not None and (agent.motion is not None or agent.walk_to_m is not None):
+            continue
         answers = setting.reactive and track.type in _ON_LANES and _moves(track)
         # Who comes into sight later has no lane at t0 to start on; it stays away.
         if answers and (agent is None or lane_under(road, agent) is not None):

@@ -129,6 +129,18 @@ def test_ego_and_traffic_are_the_recorded_ones(
     assert match.start_s == pytest.approx(begins_s)
 
 
+def test_a_start_hangs_on_whomever_somebody_waits_for() -> None:
+    # Agent8 is within 2 m of x = 16 m after 14 m at 7 m/s; Agent9 stands until then, then goes
+    # 3 m at 5 m/s, to within 2 m of x = 5 m.
+    first = replace(vehicle("Agent8", 0.0, 12.0), speed_mps=7.0)
+    waits = PlannedMotion(speeds=FIVE_MPS, start=AtPlace(agent_id="Agent8", x_m=16.0, y_m=12.0))
+    second = with_motion(vehicle("Agent9", 0.0, 7.0), waits)
+    ground = Ground.of(replace(two_lanes(), agents=(first, second)))
+    start = AtPlace(agent_id="Agent9", x_m=5.0, y_m=7.0)
+    (match,) = displacement(starts(start), starts(AtTime()), ground).matches
+    assert match.start_s == pytest.approx(2.6)
+
+
 def test_other_motions_do_not_look_alike() -> None:
     assert are_alike(starts(AtTime()), starts(AtTime()))
     assert not are_alike(starts(AtTime()), starts(AtTime(after_s=2.0)))

@@ -147,3 +147,11 @@ def test_who_was_moved_or_removed_is_not_replayed() -> None:
     assert (
         "Agent2" not in after(recorded(modification=Modification(removed=("Agent2",))), 1)[1].ids
     )
+
+
+def test_who_has_a_motion_is_not_replayed() -> None:
+    setting = recorded()
+    (agent,) = setting.scene.agents
+    goes_on = replace(agent, motion=PlannedMotion(speeds=((0.0, 6.0),)))
+    made = after(replace(setting, scene=replace(setting.scene, agents=(goes_on,))), 40)
+    assert place(made[40], "Agent2") == pytest.approx((44.0, 0.0))
