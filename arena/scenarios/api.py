@@ -330,8 +330,8 @@ class SweepsView(ApiView):
         Poll it until nothing is under way.
         """
         asked = read_request(SweepRequest, given)
-        plan = partial(plan_sweep, scenario=_scenario(code), request=asked, actor=self.user)
-        sweep, warnings = keep_and_send(plan, enqueue_sweep)
+        planned = plan_sweep(scenario=_scenario(code), request=asked, actor=self.user)
+        sweep, warnings = keep_and_send(lambda: planned, enqueue_sweep)
         return result_of(sweep), warnings
 
 

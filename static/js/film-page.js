@@ -14,7 +14,11 @@ for (const group of document.querySelectorAll("[data-films]")) {
   const player = new Player(bar);
   const begin = async (plays) => {
     for (const name of ["click", "input"]) bar.removeEventListener(name, first, true);
-    player.show(await load(images.map((image) => image.dataset.film)), frames, plays);
+    try {
+      player.show(await load(images.map((image) => image.dataset.film)), frames, plays);
+    } catch {
+      bar.hidden = true; // the stills show each second of them
+    }
   };
   const first = (event) => {
     event.stopPropagation();

@@ -39,11 +39,17 @@ PNG = b"\x89PNG picture"
 def study(tmp_path: Path, settings: Settings) -> Study:
     """Closed and rated; Eva has changed her mind once, Finn has left pairs open.
 
-    One of its scenarios says in other words what stands in none of them.
+    One of its scenarios says in other words the last of four follow-ups that stand in none of
+    them.
     """
     settings.MEDIA_ROOT = tmp_path / "media"
     made = a_study()
-    Scenario.objects.filter(slug="place-0").update(paraphrase_of=scenario("said-first"))
+    said = None
+    for place in range(4):
+        step = scenario(f"said-{place}")
+        Scenario.objects.filter(pk=step.pk).update(follows=said)
+        said = step
+    Scenario.objects.filter(slug="place-0").update(paraphrase_of=said)
     first, second, third, *_ = matchups_of(made, "eva")
     earlier = vote(first, "left", comment="hm; =1+1")
     vote(first, "right", supersedes=earlier.key)

@@ -26,6 +26,7 @@ from augment.services.judging.sweeps import (
     ways_of,
 )
 from augment.services.judging.thresholds import conclude, result_of
+from augment.services.scenarios.editing import enter_intent
 from augment.services.scenarios.scenes import intent_of, reference_of
 from augment.simulation.drive import expert_of, run
 from augment.simulation.road import Road
@@ -33,6 +34,7 @@ from augment.simulation.score import score_drive
 from augment.simulation.traffic import DriveSetting
 from tests.drives import short_drive
 from tests.intents import cones, metres
+from tests.intents import parked as parked_car
 from tests.jobs import rows
 from tests.jobs.test_simulations import Straight
 from tests.scenes import scene, vehicle
@@ -175,6 +177,22 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     assert intent_of(sweep.hardest) == cones(20.0, 1, Shape.LINE)
 
 
+@pytest.mark.parametrize("now", [cones(60.0, 1, Shape.LINE), parked_car(20.0)])
+def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
+    now: Intent,
+) -> None:
+    scenario = rows.add_scenario("cones", intent=intent_to_document(cones(20.0, 2, Shape.LINE)))
+    sweep = plan_sweep(
+        scenario=scenario, request=asked(number="requests[0].count", low=1.0, high=2.0)
+    )
+    enter_intent(scenario="cones", document=intent_to_document(now))
+    settle_others(at_2=0.4)
+    drive_tested()
+    sweep.refresh_from_db()
+    assert sweep.hardest is not None
+    assert intent_of(sweep.hardest) is None
+
+
 @pytest.mark.parametrize(
     ("changed", "error", "words"),
     [
@@ -211,6 +229,8 @@ def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -
         assert f"{distance} ahead" in row.instruction
     with pytest.raises(Conflict, match="1 to 100"):
         add_family(scenario=scenario, count=0, seed=1)
+    with pytest.raises(Conflict, match="0 or more, not -1"):
+        add_family(scenario=scenario, count=1, seed=-1)
 
 
 def said(command: str, *arguments: str, **options: Any) -> str:

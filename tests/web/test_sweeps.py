@@ -6,11 +6,14 @@ import json
 from typing import Any
 
 import pytest
+from django.db import connection
 from django.urls import reverse
 from pytest_django import Settings
 
+from augment.baselines.rule_placer import place
 from augment.models import Scenario, Simulation, Sweep
 from augment.scene.codec import modification_to_document
+from augment.services.judging import sweeps
 from tests.api.tokens import program_of
 from tests.jobs import rows
 from tests.jobs.test_sweeps import ACROSS, STRAIGHT, drive_tested, parked, settle_others
@@ -98,3 +101,25 @@ def test_a_family_is_drawn_on_the_page_and_by_the_wire(scenario: Scenario) -> No
         reverse("family-draw", args=[scenario.code]), {"count": "3", "seed": "1"}, follow=True
     )
     assert "no intent" in told.content.decode()
+
+
+@pytest.mark.django_db(transaction=True)
+def test_no_lock_is_held_while_values_are_placed(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings.PLANNERS = (STRAIGHT.planner,)
+    locks: list[bool] = []
+
+    def noting(*given: Any, **more: Any) -> Any:
+        locks.append(connection.in_atomic_block)
+        return place(*given, **more)
+
+    monkeypatch.setattr(sweeps, "place", noting)
+    scenario, admin = rows.add_scenario("cones"), people()["admin"]
+    given = {"number": "requests[0].spot.distance", "low": 20, "high": 30, "count": 2}
+    form = given | {"planner": STRAIGHT.planner, "offsets": "paper"}
+    signed_in(admin).post(reverse("sweep-start", args=[scenario.code]), form)
+    address = f"/api/v1/scenarios/{scenario.code}/sweeps"
+    program_of(admin).post(address, json.dumps(given), content_type="application/json")
+    assert locks == [False] * 4
+    assert Sweep.objects.count() == 2

@@ -81,11 +81,12 @@ class Closure:
     @property
     def scenarios(self) -> Rows:
         """The same with what its paraphrases say in other words and its follow-ups follow."""
-        named = self.named_scenarios
-        found = Q(pk__in=named.values("pk"))
-        for column in ("paraphrase_of", "follows", "follows__follows"):
-            found |= Q(pk__in=named.exclude(**{column: None}).values(column))
-        return Scenario.objects.filter(found)
+        found = new = set(self.named_scenarios.values_list("pk", flat=True))
+        while new:
+            rows = Scenario.objects.filter(pk__in=new).values_list("paraphrase_of", "follows")
+            new = {pk for row in rows for pk in row if pk is not None} - found
+            found = found | new
+        return Scenario.objects.filter(pk__in=found)
 
     @property
     def readings(self) -> Rows:

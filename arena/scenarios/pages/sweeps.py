@@ -5,7 +5,6 @@ from typing import Any
 
 from django import forms
 from django.contrib import messages
-from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
@@ -77,9 +76,8 @@ def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
         tell_errors(request, form)
         return None
     asked = read_request(SweepRequest, form.cleaned_data)
-    with transaction.atomic():
-        sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
-        send_later(request, enqueue_sweep, sweep.pk)
+    sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
+    send_later(request, enqueue_sweep, sweep.pk)
     return redirect("sweep", code=sweep.code)
 
 

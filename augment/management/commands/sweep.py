@@ -43,11 +43,9 @@ class Command(TerminalCommand):
         also = () if options["queue"] else (request.planner,)
         if options["queue"]:
             check_broker()
-        with transaction.atomic():
-            sweep = plan_sweep(scenario=scenario, request=request, also=also)
-            if options["queue"]:
-                transaction.on_commit(lambda: enqueue_sweep(sweep.pk))
+        sweep = plan_sweep(scenario=scenario, request=request, also=also)
         if options["queue"]:
+            transaction.on_commit(lambda: enqueue_sweep(sweep.pk))
             self.stdout.write(f"{result_of(sweep).planned} drives wait for the workers.")
             return
         waiting = [drive.pk for line in result_of(sweep).lines for drive in line.drives]

@@ -25,6 +25,7 @@ from augment.services.scenarios.scenes import add_variant, intent_of, scene_of, 
 from augment.simulation.planners import IDM, OFFSETS_M, PDM_CLOSED
 
 LARGEST_FAMILY = 100
+SWEPT = Simulation.Subject.SWEPT
 _FURTHEST: dict[str, Any] = {"least": -1e6, "most": 1e6}
 
 
@@ -68,7 +69,6 @@ def numbers_of(scenario: Scenario) -> dict[str, float]:
     return list_numbers(_document(scenario, None))
 
 
-@transaction.atomic
 def plan_sweep(
     *,
     scenario: Scenario,
@@ -80,7 +80,8 @@ def plan_sweep(
 
     Each value is driven by the planner under test, and by those that may solve it: PDM-Closed with
     each of its offsets, and the IDM. A number of the intent is placed by the rule placer, always
-    with the same seed; a number of the reference is set there.
+    with the same seed; a number of the reference is set there. Call it outside a transaction: no
+    lock is held while values are placed, which may take seconds.
 
     Raises:
         UnknownName: The scenario has no such number, or there is no such planner.
@@ -89,7 +90,7 @@ def plan_sweep(
     """
     load_planner(request.options, also=also)
     changes = changes_of(scenario, request)
-    sweep = Sweep.objects.create(
+    sweep = Sweep(
         scenario=scenario, number=request.number, asked_by=actor, **asdict(request.options)
     )
     rows = [
@@ -98,13 +99,15 @@ def plan_sweep(
         else SweepValue(sweep=sweep, value=value, reason=str(change))
         for value, change in changes.items()
     ]
-    SweepValue.objects.bulk_create(rows)
-    Simulation.objects.bulk_create(
-        Simulation(scenario=scenario, swept=row, subject=Simulation.Subject.SWEPT, **asdict(way))
-        for row in rows
-        if row.modification is not None
-        for way in ways_of(request.options)
-    )
+    with transaction.atomic():
+        sweep.save()
+        SweepValue.objects.bulk_create(rows)
+        Simulation.objects.bulk_create(
+            Simulation(scenario=scenario, swept=row, subject=SWEPT, **asdict(way))
+            for row in rows
+            if row.modification is not None
+            for way in ways_of(request.options)
+        )
     return sweep
 
 
@@ -168,36 +171,38 @@ def ways_of(tested: Options) -> list[Options]:
     return list(dict.fromkeys([tested, *named]))
 
 
-@transaction.atomic
 def add_family(
     *, scenario: Scenario, count: int, seed: int, actor: User | None = None
 ) -> tuple[list[Scenario], list[FamilyMember]]:
-    """Add scenarios with numbers drawn from the ranges of one's intent.
+    """Add scenarios with numbers drawn from the ranges of one's intent; as `plan_sweep`.
 
     Returns:
         The scenarios, and the members that fit nowhere.
 
     Raises:
         CannotPlace: There is no intent, or none of its numbers is a range.
-        Conflict: The count is out of bounds.
+        Conflict: The count or the seed is out of bounds.
     """
     if not 1 <= count <= LARGEST_FAMILY:
         raise Conflict(f"A family has 1 to {LARGEST_FAMILY} members, not {count}.")
+    if seed < 0:
+        raise Conflict(f"A seed is 0 or more, not {seed}.")
     intent = intent_of(scenario)
     if intent is None:
         raise Conflict(f"“{scenario.slug}” has no intent whose ranges could be drawn from.")
     members = sample_family(scene_of(scenario), intent, count=count, seed=seed)
-    rows = [
-        add_variant(
-            scenario,
-            difference=tell_difference(intent, member.intent),
-            reference=member.modification,
-            intent=member.intent,
-            actor=actor,
-        )
-        for member in members
-        if member.modification is not None
-    ]
+    with transaction.atomic():
+        rows = [
+            add_variant(
+                scenario,
+                difference=tell_difference(intent, member.intent),
+                reference=member.modification,
+                intent=member.intent,
+                actor=actor,
+            )
+            for member in members
+            if member.modification is not None
+        ]
     return rows, [member for member in members if member.modification is None]
 
 

@@ -10,12 +10,15 @@ from dataclasses import dataclass
 from django.db import transaction
 from django.utils import timezone
 
+from augment.baselines.rule_placer import place
+from augment.errors import AugmentError
 from augment.models import Scenario, Simulation, Sweep, SweepValue
 from augment.scene import codec
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
 from augment.scene.intent_statements import list_statements
 from augment.scene.numbers import list_numbers, set_number
-from augment.services.scenarios.scenes import add_variant
+from augment.services.scenarios.scenes import add_variant, scene_of, seed_of
 from augment.simulation.score import ScoreKind
 from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
 
@@ -157,16 +160,28 @@ def _line(sweep: Sweep, row: SweepValue, drives: list[Simulation]) -> SweepLine:
 def _keep(sweep: Sweep, row: SweepValue) -> Scenario:
     """Return the value as a scenario, with its intent where the number is one of the intent."""
     scenario = sweep.scenario
-    intent, difference = None, f"{sweep.number}: {row.value:g}"
-    if scenario.intent is not None and sweep.number in list_numbers(scenario.intent):
+    difference = f"{sweep.number}: {row.value:g}"
+    reference = codec.modification_from_document(row.modification)
+    intent = _intent_with(sweep, row.value, reference)
+    if intent is not None:
         before = codec.intent_from_document(scenario.intent)
-        changed = set_number(scenario.intent, sweep.number, row.value)
-        intent = codec.intent_from_document(changed)
         difference = tell_difference(before, intent) or difference
     return add_variant(
-        scenario,
-        difference=difference,
-        reference=codec.modification_from_document(row.modification),
-        intent=intent,
-        actor=sweep.asked_by,
+        scenario, difference=difference, reference=reference, intent=intent, actor=sweep.asked_by
     )
+
+
+def _intent_with(sweep: Sweep, value: float, reference: Modification) -> Intent | None:
+    """Return the intent with a value that asks for the reference; None without such an intent."""
+    scenario = sweep.scenario
+    if scenario.intent is None or sweep.number not in list_numbers(scenario.intent):
+        return None
+    changed = set_number(scenario.intent, sweep.number, value)
+    # Somebody may have given the scenario another intent since.
+    try:
+        intent = codec.intent_from_document(changed)
+        made = place(scene_of(scenario), intent, seed=seed_of(scenario.slug)).modification
+    except AugmentError:
+        return None
+    stored = codec.modification_to_document(made)
+    return intent if codec.modification_from_document(stored) == reference else None
