@@ -54,9 +54,9 @@ def test_the_hardest_is_failed_by_the_planner_and_solved_with_the_least_score() 
 
 
 def test_of_equally_hard_ones_the_furthest_from_what_the_planner_passes_is_kept() -> None:
-    hardest = find_hardest([tried(1.0, "-", pdm=0.5), tried(2.0, "-", pdm=0.5), tried(3.0, "+")])
+    hardest = find_hardest([tried(1.0, "+"), tried(2.0, "-", pdm=0.5), tried(3.0, "-", pdm=0.5)])
     assert hardest is not None
-    assert hardest.value == 1.0
+    assert hardest.value == 3.0
 
 
 @pytest.mark.parametrize(
