@@ -14,6 +14,7 @@ from arena.people.queries import role_of
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
 from augment.services.scenarios.benchmarks import Split, Stratum
 from augment.services.scenarios.scenes import type_choices
+from augment.services.texts import motions_in_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +102,7 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
     Frame: ego frame, x forward and y left in metres.
     """
     parts = document or {}
+    motions = motions_in_words(document)
     changed = [("added", agent) for agent in parts.get("add", ())]
     changed += [("moved", agent) for agent in parts.get("move", ())]
     lines = [
@@ -110,6 +112,7 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
             "agent": agent["id"],
             "kind": agent["type"].replace("_", " ").lower(),
             "heading_deg": math.degrees(agent["heading_rad"]),
+            "moves": motions.get(agent["id"], ""),
         }
         for change, agent in changed
     ]
@@ -148,7 +151,7 @@ def _differences(was: dict[str, Any], line: dict[str, Any]) -> Iterator[str]:
         yield f"a {line['kind']}"
     if abs(turned_deg) >= 0.05:
         yield f"turned by {turned_deg:.1f}°"
-    told = {"x_m", "y_m", "kind", "type", "heading_deg", "heading_rad", "lane_id"}
+    told = {"x_m", "y_m", "kind", "type", "heading_deg", "heading_rad", "lane_id", "moves"}
     for name in sorted((was.keys() | line.keys()) - told):
         if was.get(name) != line.get(name):
             yield f"another {name.removesuffix('_m').removesuffix('_mps').replace('_', ' ')}"

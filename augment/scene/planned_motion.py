@@ -16,6 +16,8 @@ EGO_ID = "Agent1"
 """The ego's id in every scene."""
 CHANGE_M = 20.0
 """A lane change takes this long along the lane, where nobody says."""
+MOST_TOLD = 4
+"""So many points or speeds are told in words."""
 REACHED_M = 2.0
 """Somebody is at a place this near to it, where nobody says."""
 
@@ -67,6 +69,9 @@ class LanePath:
     lane_ids: Annotated[tuple[Id, ...], Field(fail_fast=True, min_length=1, max_length=20)]
     change_m: Annotated[Real, Field(ge=1.0, le=200.0)] = CHANGE_M
 
+    def __str__(self) -> str:
+        return f"along {', '.join(self.lane_ids)}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointPath:
@@ -80,6 +85,11 @@ class PointPath:
     points_m: Annotated[tuple[PointPair, ...], Field(fail_fast=True, min_length=1, max_length=200)]
     keeps_heading: Yes = False
 
+    def __str__(self) -> str:
+        shown = ", ".join(f"({x_m:.1f}, {y_m:.1f})" for x_m, y_m in self.points_m[:MOST_TOLD])
+        more = len(self.points_m) - MOST_TOLD
+        return f"through {shown}" + (f" and {more} more" if more > 0 else "")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AtTime:
@@ -88,6 +98,9 @@ class AtTime:
     kind: Literal["time"] = "time"
     after_s: Seconds = 0.0
 
+    def __str__(self) -> str:
+        return f"after {self.after_s:g} s" if self.after_s else "at once"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NearEgo:
@@ -95,6 +108,9 @@ class NearEgo:
 
     kind: Literal["ego_distance"] = "ego_distance"
     within_m: _Near
+
+    def __str__(self) -> str:
+        return f"when the ego is within {self.within_m:g} m"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,6 +122,10 @@ class AtPlace:
     x_m: Metres
     y_m: Metres
     within_m: _Near = REACHED_M
+
+    def __str__(self) -> str:
+        place = f"({self.x_m:g}, {self.y_m:g})"
+        return f"when {self.agent_id} is within {self.within_m:g} m of {place}"
 
 
 Path = Annotated[LanePath | PointPath, Field(discriminator="kind")]
@@ -137,3 +157,10 @@ class PlannedMotion:
             if after_s <= before_s:
                 raise ValueError(f"speeds: {after_s:g} s does not follow {before_s:g} s")
         return self
+
+    def __str__(self) -> str:
+        speeds = [f"{speed:g} m/s after {since:g} s" for since, speed in self.speeds[:MOST_TOLD]]
+        if len(self.speeds) > MOST_TOLD:
+            speeds.append(f"and {len(self.speeds) - MOST_TOLD} more")
+        parts = [f"sets out {self.start}", *([str(self.path)] if self.path else []), *speeds]
+        return ", ".join(parts)

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 from augment.errors import InvalidDocument
+from augment.scene.codec import modification_from_document
 
 
 def make_storable(text: str) -> str:
@@ -20,6 +21,14 @@ def make_document_storable(value: Any) -> Any:
     if isinstance(value, list):
         return [make_document_storable(item) for item in value]
     return value
+
+
+def motions_in_words(document: dict[str, Any] | None) -> dict[str, str]:
+    """Return what a stored modification makes its agents do, in words, by their ids."""
+    if document is None:
+        return {}
+    changed = modification_from_document(document).changed
+    return {agent.id: str(agent.motion) for agent in changed if agent.motion is not None}
 
 
 LONGEST_REASON = 2_000

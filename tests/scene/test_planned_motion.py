@@ -223,3 +223,33 @@ def test_a_motion_is_written_and_read_and_a_walk_beside_it_is_refused() -> None:
     document["add"][0]["motion"]["speeds"][1][0] = 0.0
     with pytest.raises(InvalidDocument, match="0 s does not follow 0 s"):
         modification_from_document(document)
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        (PlannedMotion(), "sets out at once"),
+        (
+            PlannedMotion(
+                path=LanePath(lane_ids=("Lane2", "Lane1")),
+                speeds=((0.0, 12.0), (2.5, 7.0)),
+                start=AtTime(after_s=2.0),
+            ),
+            "sets out after 2 s, along Lane2, Lane1, 12 m/s after 0 s, 7 m/s after 2.5 s",
+        ),
+        (
+            PlannedMotion(
+                path=PointPath(points_m=tuple((float(x), -1.0) for x in range(6))),
+                start=NearEgo(within_m=15.0),
+            ),
+            "sets out when the ego is within 15 m, through (0.0, -1.0), (1.0, -1.0), (2.0, -1.0), "
+            "(3.0, -1.0) and 2 more",
+        ),
+        (
+            PlannedMotion(start=AtPlace(agent_id="Agent3", x_m=1.0, y_m=2.5)),
+            "sets out when Agent3 is within 2 m of (1, 2.5)",
+        ),
+    ],
+)
+def test_a_motion_is_told_in_words(motion: PlannedMotion, words: str) -> None:
+    assert str(motion) == words

@@ -47,6 +47,8 @@ KEPT_NOTE = (
 )
 SIMULATED_NOTE = "Simulated contestants are marked; they say nothing about a real one."
 
+MOST_NAMED = 8
+"""So many scenario types are named; of more their number is told."""
 FAR = 4.0
 """Values this many times beyond the longest whisker make the axis logarithmic."""
 LINEAR_UP_TO_M = 1.0
@@ -92,6 +94,8 @@ class DisplacementTable:
         """Which scenario types count, in words."""
         if self.types == tuple(ScenarioType):
             return "All five scenario types"
+        if len(self.types) > MOST_NAMED:
+            return f"{len(self.types)} scenario types"
         labels = dict(type_choices())
         return f"Scenario types: {', '.join(labels.get(name, name) for name in self.types)}"
 
