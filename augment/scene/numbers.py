@@ -70,6 +70,8 @@ def sweep_values(low: float, high: float, count: int) -> tuple[float, ...]:
         problems.append(("count", f"goes from 2 to {MOST_VALUES}, not {count}"))
     if not -1e6 <= low < high <= 1e6:  # NaN is refused as well
         problems.append(("high", f"must be a number above low, got {low:g} to {high:g}"))
+    elif high - low < count * 10.0**-_DIGITS:
+        problems.append(("high", f"{low:g} to {high:g} is too short for {count} values"))
     if problems:
         raise InvalidDocument("sweep", problems)
     return tuple(round(float(value), _DIGITS) for value in np.linspace(low, high, count))

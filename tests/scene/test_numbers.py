@@ -82,5 +82,7 @@ def test_values_are_evenly_spaced_and_bounded() -> None:
     for low, high, count in ((1.0, 1.0, 4), (2.0, 1.0, 4), (0.0, 1.0, 1), (0.0, 1.0, 101)):
         with pytest.raises(InvalidDocument):
             sweep_values(low, high, count)
+    with pytest.raises(InvalidDocument, match="too short for 3 values"):
+        sweep_values(0.0, 1e-9, 3)
     with pytest.raises(InvalidDocument, match="high"):
         sweep_values(0.0, float("nan"), 3)
