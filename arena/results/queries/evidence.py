@@ -100,11 +100,12 @@ def _list_votes(
 ) -> list[ListedVote]:
     """Votes in their order; two queries."""
     related = (
-        *("matchup__scenario", "expert__person"),
+        *("matchup__scenario__follows", "expert__person"),
         *("shown_left__contestant", "shown_right__contestant"),
     )
     unread = (
         *("matchup__view", "matchup__scenario__reference"),
+        *("matchup__scenario__follows__reference", "matchup__scenario__follows__intent"),
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
     ties = [one for one in found if isinstance(one, Judged)]

@@ -87,9 +87,11 @@ def current_votes(study: Study) -> QuerySet[Vote]:
 
 def own_votes(study: Study, expert: User) -> QuerySet[Vote]:
     """Return an expert's current votes with what is shown of them, in the order of asking."""
-    votes = current_votes(study).filter(expert=expert).select_related("matchup__scenario")
+    votes = current_votes(study).filter(expert=expert)
+    votes = votes.select_related("matchup__scenario__follows")
     turns = [When(question=key, then=turn) for turn, key in enumerate(study.questions)]
-    return votes.defer("matchup__scenario__reference").order_by("matchup__position", Case(*turns))
+    unread = "matchup__scenario__reference", "matchup__scenario__follows__reference"
+    return votes.defer(*unread).order_by("matchup__position", Case(*turns))
 
 
 def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
@@ -107,8 +109,9 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
         *("left_token", "right_token", "original_token"),
         *("left_image", "right_image", "original_image"),
         *("scenario__instruction", "scenario__follows"),
+        *("scenario__follows__instruction", "scenario__follows__follows"),
     )
-    found = rows.select_related("scenario").only(*needed).order_by("position")[:n]
+    found = rows.select_related("scenario__follows").only(*needed).order_by("position")[:n]
     for matchup in found:
         matchup.asked = study.questions[matchup.answered]
     return list(found)
