@@ -219,15 +219,13 @@ def _followed(
     followed = []
     for match in matches:
         one, other = wanted[match.reference], found[match.generated]
-        if one.agent.motion is None and other.agent.motion is None:
-            average_m = final_m = match.distance_m
-        else:
+        average_m, final_m, start_s = match.distance_m, match.distance_m, None
+        if one.agent.motion is not None or other.agent.motion is not None:
             apart_m = np.hypot(*(one.states[compared, :2] - other.states[compared, :2]).T)
             apart_m = apart_m[~np.isnan(apart_m)]
             average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
-        start_s = None
-        if one.started_s is not None and other.started_s is not None:
-            start_s = other.started_s - one.started_s
+            if one.started_s is not None and other.started_s is not None:
+                start_s = other.started_s - one.started_s
         followed.append(replace(match, average_m=average_m, final_m=final_m, start_s=start_s))
     return followed
 

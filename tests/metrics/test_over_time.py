@@ -11,7 +11,7 @@ from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.scene.planned_motion import AtPlace, AtTime, LanePath, NearEgo, PlannedMotion, Trigger
 from augment.scene.recording import Recording, Track
 from tests.scene.test_planned_motion import two_lanes, with_motion
-from tests.scenes import cone, scene, vehicle
+from tests.scenes import cone, pedestrian, scene, vehicle
 
 FIVE_MPS = ((0.0, 5.0), (60.0, 5.0))
 
@@ -53,10 +53,12 @@ def test_a_start_that_never_comes_has_no_difference_but_a_distance() -> None:
 
 
 def test_who_has_no_motion_keeps_its_distance_and_all_count_alike() -> None:
-    reference = starts(AtTime(after_s=2.0), cone("Agent3", 20.0, 0.0))
-    found = followed(starts(AtTime(after_s=3.0), cone("Agent3", 20.0, 1.0)), reference)
+    walks = pedestrian("Agent3", 60.0, -5.0, (60.0, 5.0))  # from 1.2 s on, or from 1.4 s on
+    reference = starts(AtTime(after_s=2.0), walks)
+    found = followed(starts(AtTime(after_s=3.0), replace(walks, x_m=61.0)), reference)
     still = next(match for match in found.matches if match.generated == "Agent3")
     assert (still.distance_m, still.average_m, still.final_m) == (1.0, 1.0, 1.0)
+    assert still.start_s is None
     average_m = (0.5 * 55 + 150.0) / 61
     expected = OverTime(
         n=2, at_t0_m=0.5, average_m=(average_m + 1.0) / 2.0, final_m=3.0, start_s=1.0
