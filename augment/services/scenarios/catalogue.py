@@ -244,7 +244,10 @@ def _store_scenario(
         )
     wanted = own | said
     wanted["base_scene"] = BaseScene.objects.get(slug=entry.scene)
-    wanted["follows"] = Scenario.objects.filter(slug=entry.follows).first()
+    first = scene_rows.scenario_named(entry.follows) if entry.follows else None
+    if first is not None and first.pk >= row.pk:
+        raise Conflict(f"{row.slug!r} can't follow {first.slug!r}, which came after it.")
+    wanted["follows"] = first
     wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
