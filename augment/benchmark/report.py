@@ -7,7 +7,8 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from augment.benchmark.values import EntryStatus, SubmissionCard, SubmissionReport, SubmittedEntry
-from augment.metrics.displacement import HORIZON_S, Displacement, OverTime, Summary, summarise
+from augment.metrics.displacement import Displacement, OverTime, Summary, summarise
+from augment.scene.motion import HORIZON_S
 from augment.scene.schema import Codec
 
 CARD = Codec("submission card", TypeAdapter(SubmissionCard))

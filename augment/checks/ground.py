@@ -185,12 +185,8 @@ class Ground:
         after = apply(self.scene, modification)
         if not of_all:
             after = with_movers_alone(after, {agent.id for agent in modification.changed})
-        moved = [agent.id for agent in modification.moved]
         return motion_of(
-            after,
-            recording=self.recording,
-            replaced=frozenset([*moved, *modification.removed]),
-            with_later=of_all,
+            after, recording=self.recording, replaced=modification.replaced, with_later=of_all
         )
 
     def _areas(self, *kinds: AreaKind) -> list[Area]:

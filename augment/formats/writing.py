@@ -63,11 +63,10 @@ class Cell:
     @cached_property
     def motion(self) -> Motion:
         """What everybody does after t0."""
-        moved = [agent.id for agent in self.modification.moved]
         return motion_of(
             self.after,
             recording=self.recording,
-            replaced=frozenset([*moved, *self.modification.removed]),
+            replaced=self.modification.replaced,
             with_later=self.keeps_traffic,
         )
 

@@ -20,6 +20,7 @@ from pydantic import Field
 from augment.checks import Ground
 from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.motion import HORIZON_S
 
 
 class ObjectClass(StrEnum):
@@ -46,9 +47,6 @@ d (1 + 1e-6 d), which changes nothing else."""
 MISS_M = 10.0
 """What a missing or surplus object counts where one number says how far off a change is, and a
 matched one at most: about a junction's width, beyond which it stands somewhere else."""
-
-HORIZON_S = 6.0
-"""So far after t0 motions are compared, as long as a ballot shows them."""
 
 _IfMoving = Annotated[float | None, Field(exclude_if=lambda value: value is None)]
 
@@ -302,7 +300,7 @@ def box_of(values_m: Sequence[float]) -> BoxSummary:
 
 _UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})
 """Drawn upright whatever their heading."""
-_SHOWN_S = 1.0
+_ARROW_S = 1.0
 """A picture shows the motion of so much time as an arrow."""
 
 
@@ -346,7 +344,7 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
         math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),
         abs(one.length_m - other.length_m),
         abs(one.width_m - other.width_m),
-        abs(one.speed_mps - other.speed_mps) * _SHOWN_S,
+        abs(one.speed_mps - other.speed_mps) * _ARROW_S,
     ]
     if one.walk_to_m is not None and other.walk_to_m is not None:
         gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))

@@ -23,7 +23,7 @@ from augment.render.shapes import ring_of, sides
 from augment.scene.entities import Modification, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
 from augment.scene.recording import Recording
-from augment.scene.trails import ego_spots, has_motion, trails_of
+from augment.scene.trails import ego_spots, trails_of
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0
@@ -130,7 +130,7 @@ def camera_for(
         changes: What the scenario's contestants made of it.
         recording: What was recorded after t0, for motions.
     """
-    moving = [one for one in (reference, *changes) if one is not None and has_motion(one)]
+    moving = [one for one in (reference, *changes) if one is not None and one.has_motion]
     spots = [
         spot
         for change in moving

@@ -26,11 +26,10 @@ from augment.render.marks import draw_mark, is_small, is_upright
 from augment.render.palette import Colour, MarkStyle
 from augment.render.shapes import runs
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import STEP_S, Movement, motion_of
+from augment.scene.motion import HORIZON_S, STEP_S, Movement, motion_of
 from augment.scene.recording import Recording
-from augment.scene.trails import SHOWN_S
 
-STEPS = round(SHOWN_S / STEP_S) + 1
+STEPS = round(HORIZON_S / STEP_S) + 1
 _FINE = 10.0
 """Parts of a pixel."""
 _MARGIN_M = 3.0
@@ -58,11 +57,10 @@ def film_of(
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    replaced = frozenset([*(one.id for one in modification.moved), *modification.removed])
     motion = motion_of(
         apply(scene, modification),
         recording=recording,
-        replaced=replaced,
+        replaced=modification.replaced,
         with_later=keeps_traffic,
     )
     changed = {agent.id for agent in modification.changed}

@@ -23,7 +23,6 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-from augment.scene.trails import has_motion
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
@@ -146,7 +145,7 @@ def _entries(scene: Scene, modification: Modification) -> Iterator[tuple[_Sample
         yield _walk, "to where a walk ends"
     if any(abs(agent.speed_mps) > 0.0 and agent.walk_to_m is None for agent in everyone):
         yield _motion, "way in one second"
-    if has_motion(modification):
+    if modification.has_motion:
         yield _solid(palette.TRAIL[0]), "motion, an outline each second; dashed: not within 6 s"
     if modification.moved or modification.removed:
         yield _dashes(palette.GHOST, 5.0, 4.0), "where something was before"

@@ -309,6 +309,11 @@ class Modification:
         return self.added + self.moved
 
     @property
+    def replaced(self) -> frozenset[str]:
+        """Ids of the scene's agents whose recording counts no longer."""
+        return frozenset([*(agent.id for agent in self.moved), *self.removed])
+
+    @property
     def has_motion(self) -> bool:
         """Whether an agent is made to do something after t0."""
         return any(agent.motion is not None for agent in self.changed)

@@ -21,6 +21,8 @@ from augment.scene.recording import Recording, agent_of
 FloatArray = NDArray[np.float64]
 
 STEP_S: Final = 0.1
+HORIZON_S: Final = 6.0
+"""So much of a motion is shown, in a still since it set out, and filmed and compared since t0."""
 LENGTH_S: Final = 15.0
 """So far a scenario without a recording goes on: as long as the paper drives."""
 WALK_S: Final = 15.0

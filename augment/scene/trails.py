@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from augment.scene.entities import Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import STEP_S, FloatArray, motion_of, with_movers_alone
+from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, motion_of, with_movers_alone
 from augment.scene.planned_motion import AtTime
 from augment.scene.recording import Recording
 
-SHOWN_S = 6.0
-"""So much of a motion is shown: in a still since it set out, in a film since t0."""
 EVERY_S = 1.0
 _LEAST_M = 0.3
 
-_STEPS, _EVERY = round(SHOWN_S / STEP_S), round(EVERY_S / STEP_S)
+_STEPS, _EVERY = round(HORIZON_S / STEP_S), round(EVERY_S / STEP_S)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -25,22 +23,16 @@ class Trail:
     """One changed agent with a motion.
 
     Attributes:
-        way_m: (P, 2) centres from t0 to `SHOWN_S` after it set out; of one that does not set out
+        way_m: (P, 2) centres from t0 to `HORIZON_S` after it set out; of one that does not set out
             within that time, where it would go if it did so at once.
         spots: The agent every second since it set out, but where it has hardly moved.
-        sets_out: Whether it does within `SHOWN_S`; without, there are no spots.
+        sets_out: Whether it does within `HORIZON_S`; without, there are no spots.
     """
 
     agent: TrafficAgent
     way_m: FloatArray
     spots: tuple[TrafficAgent, ...]
     sets_out: bool
-
-
-def has_motion(*modifications: Modification | None) -> bool:
-    """Return whether somebody in them has a motion of their own."""
-    changes = [one for one in modifications if one is not None]
-    return any(agent.motion is not None for one in changes for agent in one.changed)
 
 
 def trails_of(
@@ -56,11 +48,12 @@ def trails_of(
     Raises:
         InvalidModification: The change does not fit the scene, or a path its lanes.
     """
-    if not has_motion(modification):
+    if not modification.has_motion:
         return ()
     after = apply(scene, modification)
-    replaced = frozenset([*(one.id for one in modification.moved), *modification.removed])
-    motion = motion_of(with_movers_alone(after), recording=recording, replaced=replaced)
+    motion = motion_of(
+        with_movers_alone(after), recording=recording, replaced=modification.replaced
+    )
     started = {one.agent.id: _trail_since(one.started_s, one.states) for one in motion.others}
     waiting = {name for name, found in started.items() if found is None}
     at_once = replace(
@@ -100,7 +93,7 @@ def _trail_since(
     started_s: float | None, states: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
     """The way (P, 2) and the states (K, 4) every second, None where it sets out too late."""
-    if started_s is None or started_s > SHOWN_S:
+    if started_s is None or started_s > HORIZON_S:
         return None
     start = round(started_s / STEP_S)
     return states[: start + _STEPS + 1, :2], states[start : start + _STEPS + 1 : _EVERY]

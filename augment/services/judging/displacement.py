@@ -13,7 +13,6 @@ from django.db.models import QuerySet
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
-from augment.metrics.displacement import HORIZON_S as HORIZON_S
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
 from augment.metrics.kept import KeptObject, kept_objects, summarise_kept
@@ -21,6 +20,7 @@ from augment.metrics.kept import KeptSummary as KeptSummary
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
+from augment.scene.motion import HORIZON_S as HORIZON_S
 from augment.services.scenarios.scenes import ground_of, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 

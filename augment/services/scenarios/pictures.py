@@ -23,7 +23,6 @@ from augment.render.film import film_of
 from augment.render.legend import change_keys, scene_keys
 from augment.scene import codec
 from augment.scene.entities import Modification, without_traffic
-from augment.scene.trails import has_motion
 from augment.services.events import log_change
 from augment.services.scenarios.scenes import (
     content_hash,
@@ -82,7 +81,8 @@ def camera_of(scenario: Scenario) -> Camera:
         codec.modification_from_document(document) for document in documents if document
     )
     reference = reference_of(scenario)
-    recording = recording_of(scenario) if has_motion(reference, *changes) else None
+    moves = any(one.has_motion for one in (reference, *changes) if one is not None)
+    recording = recording_of(scenario) if moves else None
     return camera_for(scene_of(scenario), reference, changes, recording)
 
 
@@ -252,7 +252,9 @@ def reference_picture(scenario: Scenario) -> str:
         return ""
     shown = [LOOK, scene_key(scenario), scenario.reference]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-    folder = f"references/{LOOK}-film" if has_motion(reference_of(scenario)) else "references"
+    reference = reference_of(scenario)
+    moves = reference is not None and reference.has_motion
+    folder = f"references/{LOOK}-film" if moves else "references"
     return f"{folder}/{digest}.png"
 
 
@@ -292,7 +294,7 @@ def draw_scenario(scenario_pk: int) -> None:
     name, reference = reference_picture(row), reference_of(row)
     if reference is None or is_drawn(name):
         return
-    recording = recording_of(row) if has_motion(reference) else None
+    recording = recording_of(row) if reference.has_motion else None
     camera = camera_for(scene_of(row), reference, recording=recording)
     _keep(name, *_drawn(row, reference, camera))
 
