@@ -5,6 +5,7 @@ sends another). Services never enqueue; doors do, by transaction.on_commit. Mess
 a connection that is tried once: where no broker answers, there is a sentence instead of a wait.
 """
 
+import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -34,6 +35,8 @@ from augment.services.scenarios import pictures
 from augment.services.scenarios.submissions import SUBMISSIONS
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
+
+logger = logging.getLogger(__name__)
 
 RESEND_AFTER = timedelta(minutes=10)
 """A message that waits longer than this may be lost; a second one does no harm."""
@@ -199,8 +202,11 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
         QueueFault: No broker, or it refuses.
     """
     for kind in KINDS.values():
-        kind.take_back_lost(now=now)
-        kind.tidy(now)
+        try:
+            kind.take_back_lost(now=now)
+            kind.tidy(now)
+        except Exception:  # one kind's fault leaves the others their work
+            logger.exception("Could not take back lost work of %s.", kind.model.__name__)
     queues = {kind.queue for kind in KINDS.values()}
     ages = {queue: timedelta(0) if at_start else _lost_after(queue) for queue in queues}
     for kind in KINDS.values():

@@ -72,6 +72,7 @@ def test_thirty_moving_pairs_are_voted_on_by_keys(
 def test_both_sides_move_in_step_by_keys_and_by_the_range(moving: Booth) -> None:
     page = moving.enter()
     clock = page.locator(".film-bar output")
+    expect(page.locator(FILMS)).to_have_count(2)  # loaded, and begun by themselves
     page.keyboard.press("p")
     expect(page.get_by_role("button", name="Play")).to_be_visible()
     time = page.get_by_role("slider", name="Time")
@@ -102,12 +103,8 @@ def test_both_sides_move_in_step_by_keys_and_by_the_range(moving: Booth) -> None
 def test_films_begin_by_themselves_at_once_and_go_with_their_pair(moving: Booth) -> None:
     page = moving.enter()
     expect(page.locator(FILMS)).to_have_count(2)
-    page.evaluate(
-        "() => document.querySelectorAll('canvas.reel').forEach((one) => { one.id = 'old'; })"
-    )
-    press(page, "1")
+    vote_and_wait(page)
     expect(page.locator(FILMS)).to_have_count(2)
-    assert page.locator("#old").count() == 0
     page.keyboard.down("o")  # the scene before the edit, which is a still
     expect(page.locator("canvas.reel").first).to_be_hidden()
     page.keyboard.up("o")
@@ -117,8 +114,7 @@ def test_films_begin_by_themselves_at_once_and_go_with_their_pair(moving: Booth)
 def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     page = moving.enter(reduced_motion="reduce")
     expect(page.locator(".film-bar")).to_be_visible()
-    press(page, "1")
-    page.wait_for_timeout(300)
+    vote_and_wait(page)
     assert page.locator(FILMS).count() == 0
     page.keyboard.press(".")
     expect(page.locator(FILMS)).to_have_count(2)
@@ -131,6 +127,16 @@ def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) ->
     expect(page.locator(".film-bar")).to_be_visible()
     assert overflows(page) is False
     assert faults(page) == []
+
+
+def vote_and_wait(page: Page) -> None:
+    """Vote, and wait until the films of the next pair lie over its stills."""
+    page.evaluate(
+        "() => document.querySelectorAll('canvas.reel').forEach((one) => { one.id = 'old'; })"
+    )
+    press(page, "1")
+    expect(page.locator("#old")).to_have_count(0)
+    expect(page.locator("canvas.reel")).to_have_count(2)
 
 
 def overflows(page: Page) -> bool:

@@ -11,6 +11,7 @@ from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.management.waiting import wait
 from augment.models import Augmentation, GenerationJob
+from augment.services.judging.simulations import DRIVES
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
 from augment.tasks import check_broker
@@ -97,6 +98,19 @@ def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: B
     tasks.recover(now=timezone.now())
     job.refresh_from_db()
     assert job.state == GenerationJob.State.FINISHED
+
+
+def test_a_fault_of_one_kind_of_work_leaves_the_others_theirs(
+    broker: Broker, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_: object) -> None:
+        raise RuntimeError("nothing is tidy")
+
+    launch()
+    monkeypatch.setattr(DRIVES, "tidy", fail)
+    tasks.recover(now=timezone.now(), at_start=True)
+    assert "Could not take back lost work of Simulation." in caplog.text
+    assert len(broker) == 1
 
 
 def test_generate_launches_what_all_and_catalogue_stand_for(

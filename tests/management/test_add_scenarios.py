@@ -50,7 +50,7 @@ def test_a_csv_file_is_added_row_by_row(
         "2 scenarios.",
     ]
     one = Scenario.objects.get(slug="one")
-    assert (one.type, one.type_label, one.keep_traffic) == ("cut_in", "Cut in", True)
+    assert (one.type, one.type_label, one.keep_traffic) == ("cut_in", "Cut-in", True)
     assert one.instruction == "Let a car cut in, closely."
     assert Scenario.objects.get(slug="street-scene-jaywalker-1").reference is not None
 

@@ -31,6 +31,7 @@ from augment.services.scenarios.scenes import (
     scene_key,
     scene_of,
 )
+from augment.services.texts import is_stored_name
 
 FOLDER = "bev"
 
@@ -116,13 +117,18 @@ def film_name(picture: str) -> str:
 
 
 def film_document(picture: str) -> dict[str, Any] | None:
-    """The film of a picture, with the name of the picture that it plays over; None without one."""
+    """The film of a picture, with the name of the picture that it plays over; None without one.
+
+    A film of an imported folder that names no picture is none.
+    """
     name = film_name(picture)
     if not name or not default_storage.exists(name):
         return None
     with default_storage.open(name) as file:
         document: dict[str, Any] = json.load(file)
-    return document
+    ground, window = document.get("ground"), document.get("window")
+    is_film = isinstance(ground, str) and isinstance(window, str) and is_stored_name(ground)
+    return document if is_film else None
 
 
 def shrunken_picture(name: str, widest: int) -> NDArray[np.uint8] | None:
