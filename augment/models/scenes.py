@@ -167,12 +167,22 @@ class Scenario(models.Model):
         return bool(self.catalogue_set)
 
     @property
+    def followed(self) -> "list[Scenario]":
+        """Those before it in a conversation, the first one first.
+
+        Each once, also where an imported folder leads in a circle.
+        """
+        chain: list[Scenario] = []
+        before = self.follows
+        while before is not None and before not in (self, *chain):
+            chain.insert(0, before)
+            before = before.follows
+        return chain
+
+    @property
     def wording(self) -> str:
         """The instruction; of a follow-up all that was said up to it, a numbered line each."""
-        said, before = [self.instruction], self.follows
-        while before is not None:
-            said.insert(0, before.instruction)
-            before = before.follows
+        said = [*(before.instruction for before in self.followed), self.instruction]
         if len(said) == 1:
             return self.instruction
         return "\n".join(f"{number}. {text}" for number, text in enumerate(said, start=1))

@@ -50,12 +50,6 @@ def _check_scenario(row: models.Scenario) -> None:
     label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
-    known, followed = {row.pk}, row.follows
-    while followed is not None:
-        if followed.pk in known:
-            raise InvalidDocument("scenario", [("follows", "leads in a circle")])
-        known.add(followed.pk)
-        followed = followed.follows
     if row.intent is not None:
         intent_from_document(row.intent)
     if row.reference is not None:

@@ -125,7 +125,7 @@ def conversation_of(answer: Augmentation | None) -> tuple[Message, ...]:
 def steps_to(row: Augmentation) -> list[Augmentation]:
     """Return the steps of a conversation up to this one, the first answer first."""
     steps, before = [row], row.follows
-    while before is not None:
+    while before is not None and before not in steps:
         steps.insert(0, before)
         before = before.follows
     return steps

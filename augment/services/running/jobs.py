@@ -123,9 +123,7 @@ def with_followed(scenarios: Iterable[Scenario]) -> list[Scenario]:
     """Return the scenarios, each behind those that it follows."""
     ordered: dict[int, Scenario] = {}
     for scenario in scenarios:
-        if scenario.follows is not None:
-            ordered |= {one.pk: one for one in with_followed([scenario.follows])}
-        ordered[scenario.pk] = scenario
+        ordered |= {one.pk: one for one in (*scenario.followed, scenario)}
     return list(ordered.values())
 
 
