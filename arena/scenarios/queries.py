@@ -14,7 +14,7 @@ from arena.people.queries import role_of
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
 from augment.services.scenarios.benchmarks import Split, Stratum
 from augment.services.scenarios.scenes import type_choices
-from augment.services.texts import motions_in_words
+from augment.services.texts import motion_in_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +102,6 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
     Frame: ego frame, x forward and y left in metres.
     """
     parts = document or {}
-    motions = motions_in_words(document)
     changed = [("added", agent) for agent in parts.get("add", ())]
     changed += [("moved", agent) for agent in parts.get("move", ())]
     lines = [
@@ -112,7 +111,7 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
             "agent": agent["id"],
             "kind": agent["type"].replace("_", " ").lower(),
             "heading_deg": math.degrees(agent["heading_rad"]),
-            "moves": motions.get(agent["id"], ""),
+            "moves": motion_in_words(agent),
         }
         for change, agent in changed
     ]

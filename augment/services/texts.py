@@ -3,8 +3,10 @@
 import re
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from augment.errors import InvalidDocument
-from augment.scene.codec import modification_from_document
+from augment.scene.planned_motion import PlannedMotion
 
 
 def make_storable(text: str) -> str:
@@ -23,12 +25,12 @@ def make_document_storable(value: Any) -> Any:
     return value
 
 
-def motions_in_words(document: dict[str, Any] | None) -> dict[str, str]:
-    """Return what a stored modification makes its agents do, in words, by their ids."""
-    if document is None:
-        return {}
-    changed = modification_from_document(document).changed
-    return {agent.id: str(agent.motion) for agent in changed if agent.motion is not None}
+_MOTION = TypeAdapter(PlannedMotion)
+
+
+def motion_in_words(agent: dict[str, Any]) -> str:
+    """Return what an agent of a stored modification is made to do; empty where nothing is."""
+    return str(_MOTION.validate_python(agent["motion"])) if "motion" in agent else ""
 
 
 LONGEST_REASON = 2_000
