@@ -27,7 +27,7 @@ HEADING = "Sweeps by several workers"
 DRIVES, VALUES, WORKERS = 10_000, 100, (1, 2, 4)
 STREET_END_M = 20.0
 LEAST_LINEAR, MOST_MB = 0.9, 300.0
-BATCH, PAUSE_S, POLL_S = 40, 0.2, 5.0
+BATCH, WINDOW, PAUSE_S, POLL_S = 20, 1_000, 0.2, 5.0
 
 
 def plan(count: int) -> None:
@@ -77,9 +77,9 @@ def work(seed: int) -> None:
 
     rng = random.Random(seed)
     while Simulation.objects.filter(state__in=Simulation.UNDER_WAY).exists():
-        waiting = list(KIND.waiting().order_by("pk").values_list("pk", flat=True)[:BATCH])
-        rng.shuffle(waiting)  # so that two workers seldom want the same one
-        for pk in waiting:
+        waiting = list(KIND.waiting().order_by("pk").values_list("pk", flat=True)[:WINDOW])
+        rng.shuffle(waiting)  # so that two workers seldom want the same one, as with a broker
+        for pk in waiting[:BATCH]:
             KIND.perform(pk, worker=str(os.getpid()))
         if not waiting:
             KIND.take_back_lost()
