@@ -9,7 +9,7 @@ let bars = null;
 export function draw(lens) {
   bars ??= lens.panels.map((panel) => {
     const bar = document.createElement("span");
-    bar.className = "bar";
+    bar.className = "scale-bar";
     bar.style.cssText = LOOK;
     return panel.appendChild(bar);
   });

@@ -62,7 +62,7 @@ def test_x_holds_b_in_the_place_of_a_and_v_marks_what_differs(drawn: Booth) -> N
     page.keyboard.press("v")
     expect(page.locator(".side canvas")).to_have_count(0)
     page.keyboard.press("z")
-    expect(page.locator(".bar").first).to_be_visible()
+    expect(page.locator(".side .scale-bar").first).to_be_visible()
     press(page, "1")
     page.keyboard.press("v")
     expect(page.locator(".side canvas")).to_have_count(2)

@@ -31,8 +31,8 @@ pytestmark = pytest.mark.django_db
 def study() -> Study:
     """Two experts always prefer the picture of which more is drawn, on two scenarios."""
     made = study_rows.a_study(votes_per_expert=6, scenarios=2)
-    for row in Augmentation.objects.all():
-        study_rows.hang(row, store(png(row.pk) + bytes(row.pk)))
+    for number, row in enumerate(Augmentation.objects.order_by("pk")):
+        study_rows.hang(row, store(png(number) + bytes(number)))
     for matchup in made.matchups.all():
         study_rows.vote(matchup, "left" if matchup.left_id > matchup.right_id else "right")
     return close_study(study=made)
