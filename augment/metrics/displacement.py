@@ -9,10 +9,10 @@ Notation: R objects of the reference, G generated ones.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from itertools import chain
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -311,8 +311,8 @@ _ALIKE_M, _ALIKE_RAD = 0.15, math.radians(2.0)
 def are_alike(one: Modification, other: Modification) -> bool:
     """Return whether every object of either change has a counterpart that looks the same.
 
-    Place, size, end of a walk and way in a second are held against the distance. What is moved,
-    what is removed and motions of one's own must be the same.
+    Place, size, end of a walk and way in a second are held against the distance; so are the
+    metres, seconds and m/s of motions. What is moved and what is removed must be the same.
     """
     moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
     return (
@@ -338,7 +338,8 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     """Return whether two objects look the same, whatever their ids."""
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
-    if one.motion != other.motion:
+    motions = [agent.motion and asdict(agent.motion) for agent in (one, other)]
+    if not _are_close(*motions):
         return False
     gaps_m = [
         math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),
@@ -350,3 +351,16 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
         gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
     turn_rad = 0.0 if one.type in _UPRIGHT else difference(one.heading_rad, other.heading_rad)
     return max(gaps_m) <= _ALIKE_M + 1e-9 and abs(turn_rad) <= _ALIKE_RAD + 1e-9
+
+
+def _are_close(one: Any, other: Any) -> bool:
+    """Return whether two parts of documents differ in their numbers alone, and in these little."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, float):
+        return abs(one - other) <= _ALIKE_M + 1e-9
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_are_close(one[key], other[key]) for key in one)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(_are_close, one, other))
+    return bool(one == other)

@@ -12,17 +12,20 @@ for (const group of document.querySelectorAll("[data-films]")) {
     return frame;
   });
   const player = new Player(bar);
-  const begin = async (plays) => {
+  const begin = async (plays, then) => {
     for (const name of ["click", "input"]) bar.removeEventListener(name, first, true);
     try {
       player.show(await load(images.map((image) => image.dataset.film)), frames, plays);
+      then?.();
     } catch {
       bar.hidden = true; // the stills show each second of them
     }
   };
   const first = (event) => {
     event.stopPropagation();
-    begin(event.type === "click");
+    const wanted = event.target.closest("[data-film]")?.dataset.film;
+    const step = Number(player.range.value);
+    begin(wanted === "play", () => (wanted ? wanted === "play" || player[wanted]() : player.jump(step)));
   };
   bar.hidden = false;
   if (group.dataset.films === "auto") begin();

@@ -3,12 +3,15 @@
 from collections.abc import Iterator
 
 import pytest
+from django.urls import reverse
 from playwright.sync_api import Browser, Page, Response, expect
 from pytest_django.live_server_helper import LiveServer
 
+from augment.models import Augmentation
 from tests.browser.booth import Booth, press, ready
 from tests.browser.test_voting_page import faults
 from tests.moving import a_moving_study
+from tests.web.cast import people
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
@@ -127,6 +130,18 @@ def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) ->
     expect(page.locator(".film-bar")).to_be_visible()
     assert overflows(page) is False
     assert faults(page) == []
+
+
+def test_on_other_pages_the_first_press_loads_and_does_what_its_button_says(moving: Booth) -> None:
+    people()
+    result = Augmentation.objects.filter(contestant__slug="ann")[0]
+    page = moving.visit("the-admin", reverse("augmentation", args=[result.code]), {})
+    page.get_by_role("button", name="A tenth of a second on").click()
+    expect(page.locator(".film-bar output")).to_have_text("0.1 s")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    page.reload()
+    page.get_by_role("slider", name="Time").fill("10")
+    expect(page.locator(".film-bar output")).to_have_text("1.0 s")
 
 
 def vote_and_wait(page: Page) -> None:

@@ -15,9 +15,11 @@ from augment.metrics.displacement import (
     are_alike,
     box_of,
     displacement,
+    look_alike,
     summarise,
 )
 from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion
 from tests.scenes import cone, pedestrian, vehicle
 
 
@@ -192,6 +194,29 @@ def test_every_object_is_matched_or_counted_once(
 
 CAR = vehicle("New1", 20.0, 0.0)
 WALKER = pedestrian("New2", 10.0, -4.0, (10.0, 4.0))
+
+
+BRAKING = PlannedMotion(speeds=((0.0, 8.0), (2.0, 0.0)), start=NearEgo(within_m=15.0))
+
+
+@pytest.mark.parametrize(
+    ("changed", "alike"),
+    [
+        (BRAKING, True),
+        (replace(BRAKING, start=NearEgo(within_m=15.15)), True),
+        (replace(BRAKING, start=NearEgo(within_m=15.16)), False),
+        (replace(BRAKING, speeds=((0.0, 8.1), (2.1, 0.0))), True),
+        (replace(BRAKING, speeds=((0.0, 8.0), (2.2, 0.0))), False),
+        (replace(BRAKING, speeds=((0.0, 8.0),)), False),
+        (replace(BRAKING, start=AtTime(after_s=15.0)), False),
+        (replace(BRAKING, path=LanePath(lane_ids=("Lane1",))), False),
+        (None, False),
+    ],
+)
+def test_two_motions_against_the_tolerance(changed: PlannedMotion | None, alike: bool) -> None:
+    one, other = replace(CAR, motion=BRAKING), replace(CAR, motion=changed)
+    assert look_alike(one, other) is alike
+    assert look_alike(other, one) is alike
 
 
 @pytest.mark.parametrize(

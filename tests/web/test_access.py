@@ -63,14 +63,15 @@ ACTIONS = _table(
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
             "study-draft-discard study-hand-over first-step benchmark-retired board-batch "
-            "submission-decline sweep-start sweep-remove follow-up"
+            "submission-decline sweep-start follow-up"
         ),
         (302, 302, 403): (
             "scene-send upload-show scenarios-write study-write set-intent results-open "
             "benchmark-write board-publish board-share board-unshare family-draw"
         ),
         ADMIN: (
-            "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"
+            "invite person-link scenario-delete scene-delete sweep-remove job-cancel study-close "
+            "study-cancel"
         ),
         (302, 302, 302): "theme language",
         (422, 422, 403): "edit-check",
@@ -104,7 +105,7 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
 
 
 ASKS_FIRST = {
-    **{"scenario-delete": 200, "scene-delete": 200},
+    **{"scenario-delete": 200, "scene-delete": 200, "sweep-remove": 200},
     **{"study-close": 200, "study-cancel": 200, "job-cancel": 200},
     "labelling-close": 404,
 }

@@ -59,7 +59,9 @@ def test_a_sweep_is_started_followed_and_read(scenario: Scenario) -> None:
     drive = Simulation.objects.filter(planner=STRAIGHT.planner).first()
     assert drive is not None
     assert f"{ACROSS} = 2" in researcher.get(reverse("drive", args=[drive.code])).content.decode()
-    removed = admin.post(reverse("sweep-remove", args=[sweep.code]))
+    remove = reverse("sweep-remove", args=[sweep.code])
+    assert "Its drives are deleted with it" in admin.post(remove).content.decode()
+    removed = admin.post(remove, {"sure": "1"})
     assert removed.headers["Location"] == listed
     assert not Simulation.objects.exists()
     assert Scenario.objects.filter(slug="parked-1").exists(), "what was kept stays"

@@ -7,12 +7,13 @@ from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils.text import slugify
 
 from arena.exports.formats import download
 from arena.jobs.exports.sweeps import SWEEP_FORMATS
-from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
-from arena.site.acts import looks_again, send_later, tell_errors
+from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
+from arena.site.acts import Confirmation, ask, is_sure, looks_again, send_later, tell_errors
 from arena.site.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
 from augment.services.inputs import inputs_of, read_request
@@ -127,10 +128,18 @@ def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse
     return download(SWEEP_FORMATS, form, stem, result_of(sweep))
 
 
-@act_for(ADMIN, back="scenarios")
+@form_for(ADMIN)
 def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Delete a sweep with its drives; what it kept stays."""
+    """Delete a sweep with its drives, once that is confirmed."""
     sweep = _sweep(code)
+    if not is_sure(request):
+        question = Confirmation(
+            title=f"Delete the sweep of {sweep.number}?",
+            facts=("Its drives are deleted with it; a scenario that it kept stays.",),
+            button="Delete",
+            back=reverse("sweep", args=[code]),
+        )
+        return ask(request, question)
     delete_sweep(sweep, actor=user_of(request))
     messages.success(request, f"The sweep of {sweep.number} is deleted.")
     return redirect("sweeps", code=sweep.scenario.code)
