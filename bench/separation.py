@@ -2,8 +2,9 @@
 
 Both answer every scenario of the still sets (paper and hard) and of the moving set, without a
 server: the good one as the rule placer does, the careless one with its mistakes, `SAMPLES` times.
-Measured is the displacement, over time where something moves. Scenarios are clusters: the
-intervals are percentiles of the bootstrap over them. Writes into docs/catalogue.md.
+Measured is the displacement, over time where something moves, and its spread: the standard
+deviation of the good one's over the scenarios. Scenarios are clusters: the intervals are
+percentiles of the bootstrap over them, the spread held. Writes into docs/catalogue.md.
 """
 
 from collections.abc import Sequence
@@ -84,11 +85,16 @@ def report() -> str:
         drawn = [drawn_differences(pairs, rng) for pairs in (before, now)]
         for title, pairs, found in zip(("still", "moving"), (before, now), drawn, strict=True):
             medians = [f"{median_m:.2f}" for median_m in np.median(pairs, axis=0)]
-            rows.append([name, title, str(len(pairs)), *medians, _within(_apart(pairs), found)])
+            spread = f"{np.std(pairs[:, 0], ddof=1):.2f}"
+            apart = _within(_apart(pairs), found)
+            rows.append([name, title, str(len(pairs)), *medians, spread, apart])
+        spread_m = np.std(before[:, 0], ddof=1)
+        by_spread = _within(_apart(now) / spread_m, drawn[1] / spread_m)
+        rows.append([name, "moving : still spread", "", "", "", "", by_spread])
         ratio = _within(_apart(now) / _apart(before), drawn[1] / drawn[0])
-        rows.append([name, "moving : still", "", "", "", ratio])
+        rows.append([name, "moving : still", "", "", "", "", ratio])
     head = ["answers", "set", "scenarios", "good, median (m)", "careless, median (m)"]
-    return table([*head, "mean difference (m)"], rows)
+    return table([*head, "good, SD (m)", "mean difference (m)"], rows)
 
 
 def _apart(pairs: Pairs) -> float:
