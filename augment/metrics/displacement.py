@@ -358,7 +358,7 @@ def _are_close(one: Any, other: Any) -> bool:
     if type(one) is not type(other):
         return False
     if isinstance(one, float):
-        return abs(one - other) <= _ALIKE_M + 1e-9
+        return bool(abs(one - other) <= _ALIKE_M + 1e-9)
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(_are_close(one[key], other[key]) for key in one)
     if isinstance(one, tuple):

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
 
-from bench.report import PAGE, table, write_block
+from bench.report import PAGE, write_block
 from tests.environment import fix_environment
 from tests.mutants.mutation import Mutation, mutations
 from tests.mutants.trees import FAILED, PASSED, Tree
@@ -96,16 +96,14 @@ def _outcome(trees: SimpleQueue[Tree], one: Mutation) -> Outcome:
 
 
 def report(found: Sequence[Outcome]) -> str:
-    """Return how many mutations of each area were caught, as a table."""
-    counts = {
-        area: Counter(one.came for one in found if one.of.area == area)
-        for area in dict.fromkeys(one.of.area for one in found)
-    }
-    rows = [
-        [area, str(came.total()), str(came[CAUGHT]), str(came[EQUIVALENT])]
-        for area, came in counts.items()
-    ]
-    return table(["area", "mutations", CAUGHT, EQUIVALENT], rows)
+    """Return how many mutations of each area were caught, and what came of the others."""
+    areas = []
+    for area in dict.fromkeys(one.of.area for one in found):
+        came = Counter(one.came for one in found if one.of.area == area)
+        others = [f"{number} {what}" for what, number in came.items() if what != CAUGHT]
+        areas.append(f"{area} {came.total()}" + (f" ({', '.join(others)})" if others else ""))
+    caught = [one.came for one in found].count(CAUGHT)
+    return f"{caught} of {len(found)} are caught: {', '.join(areas)}."
 
 
 if __name__ == "__main__":
