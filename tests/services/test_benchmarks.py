@@ -91,6 +91,13 @@ def test_wordings_and_alike_wishes_are_in_one_split(streets: list[Scenario]) -> 
     assert [task.paraphrase_of for task in tasks] == ["", "street-1", ""]
 
 
+def test_a_follow_up_is_left_out_and_refused_where_it_is_named(streets: list[Scenario]) -> None:
+    add_street(6, follows=streets[0])
+    assert len(plan_benchmark(asked("street-*"))) == 5
+    with pytest.raises(Conflict, match="“street-6” says how to change an answer to “street-1”"):
+        plan_benchmark(asked("street-*", "street-6"))
+
+
 def test_what_has_no_reference_is_for_the_test() -> None:
     add_street(1, reference=None)
     add_street(2, reference=None, intent=None, intent_origin="")
