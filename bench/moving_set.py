@@ -12,7 +12,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from augment.scene.planned_motion import MotionPreset
+from augment.scene.planned_motion import EGO_ID, MotionPreset
 from augment.scene.planned_mover import PlannedMover
 from augment.simulation import shapes
 from augment.simulation.drive import Drive, expert_of, run
@@ -20,7 +20,7 @@ from augment.simulation.planners import PDM_CLOSED, planner_named
 from augment.simulation.road import Road
 from augment.simulation.score import collisions, criticality, score_drive
 from augment.simulation.states import HEADING, SPEED, STEP_S, Objects
-from augment.simulation.traffic import EGO_ID, DriveSetting
+from augment.simulation.traffic import DriveSetting
 from bench.report import ROOT, table, write_block
 from tests.fixtures.shelf import MOVING_SLUGS, entry, shown_scene
 
@@ -157,7 +157,7 @@ def _named(objects: Objects, names: set[str]) -> Objects:
 def _fired_s(setting: DriveSetting, road: Road, drive: Drive) -> float | None:
     """When the motion set out in a drive, which is gone through again."""
     (agent,) = [agent for agent in setting.after.agents if agent.motion is not None]
-    mover = PlannedMover(agent, road.graph, ego_id=EGO_ID)
+    mover = PlannedMover(agent, road.graph)
     for step, (box, objects) in enumerate(zip(drive.boxes, drive.objects, strict=True)):
         everybody = zip([EGO_ID, *objects.ids], [box, *objects.boxes], strict=True)
         mover.advance(step * STEP_S)

@@ -145,11 +145,7 @@ def _planned(
     scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
 ) -> dict[str, Movement]:
     """Those with a motion of their own, who watch everybody for their triggers."""
-    movers = [
-        PlannedMover(agent, graph, ego_id=scene.ego.id)
-        for agent in scene.agents
-        if agent.motion is not None
-    ]
+    movers = [PlannedMover(agent, graph) for agent in scene.agents if agent.motion is not None]
     if not movers:
         return {}
     rows: dict[str, list[FloatArray]] = {mover.agent.id: [] for mover in movers}

@@ -71,7 +71,6 @@ class PlannedMover:
     Args:
         agent: With a motion.
         graph: Of its scene.
-        ego_id: How the ego is called among the places.
 
     Raises:
         InvalidModification: Its path leads over lanes that don't follow each other.
@@ -80,11 +79,11 @@ class PlannedMover:
         started_s: When it set out, None until then.
     """
 
-    def __init__(self, agent: TrafficAgent, graph: LaneGraph, *, ego_id: str = EGO_ID) -> None:
+    def __init__(self, agent: TrafficAgent, graph: LaneGraph) -> None:
         assert agent.motion is not None
         if isinstance(agent.motion.path, LanePath):
             check_lane_path(graph, agent.motion.path)
-        self.agent, self._motion, self._graph, self._ego_id = agent, agent.motion, graph, ego_id
+        self.agent, self._motion, self._graph = agent, agent.motion, graph
         self._held = HeldCourse(agent, graph)
         self._line: Polyline | None = None
         self.started_s: float | None = None
@@ -124,9 +123,9 @@ class PlannedMover:
             case AtTime():
                 return
             case NearEgo(within_m=within_m):
-                who, place = self._ego_id, tuple(self.state()[:2].tolist())
+                who, place = EGO_ID, tuple(self.state()[:2].tolist())
             case AtPlace(agent_id=agent_id, x_m=x_m, y_m=y_m, within_m=within_m):
-                who, place = (self._ego_id if agent_id == EGO_ID else agent_id), (x_m, y_m)
+                who, place = agent_id, (x_m, y_m)
         if who in places and math.dist(places[who], place) <= within_m:
             self._start(self._time_s)
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.planned_motion import EGO_ID
 from augment.scene.planned_mover import PlannedMover
 from augment.scene.recording import Recording, Track, agent_of
 from augment.simulation import shapes
@@ -46,8 +47,6 @@ _KEPT_WAYS = 5
 """nuPlan keeps this many ways of a driver's route; the limit of the last one is its wish."""
 STANDS_BELOW_MPS = 0.5
 """Recorded speeds of what is parked are not quite 0."""
-EGO_ID = "the ego"
-"""What the ego is called among the objects that lane drivers look at."""
 _ON_LANES = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 
 
@@ -181,7 +180,7 @@ class PlannedMovers:
 
     def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
         self._base, self._step = objects_of(agents), 0
-        self._movers = [PlannedMover(agent, road.graph, ego_id=EGO_ID) for agent in agents]
+        self._movers = [PlannedMover(agent, road.graph) for agent in agents]
 
     def objects(self) -> Objects:
         """Return those who are still on the map."""
