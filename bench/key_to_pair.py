@@ -12,9 +12,8 @@ import statistics
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, CDPSession, Page
 
 from tests.browser.chromium import chromium
 from tests.stack import SMALL_DEMO, Home
@@ -84,6 +83,15 @@ def prepare(home: Home, votes: int) -> None:
 def _vote(
     browser: Browser, address: str, latency_ms: int, votes: int
 ) -> tuple[list[float], list[float]]:
+    page, _ = sign_in(browser, address, latency_ms)
+    vote(page, votes, ready="body.is-live #answers:not([inert])", stopwatch=STOPWATCH)
+    found = _numbers(page, "visible"), _numbers(page, "painted")
+    page.context.close()
+    return found
+
+
+def sign_in(browser: Browser, address: str, latency_ms: int) -> tuple[Page, CDPSession]:
+    """The expert's home in a context of its own, and its wire, which has the latency from now."""
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()
     page.goto(f"{address}/login/")
@@ -93,26 +101,21 @@ def _vote(
     page.wait_for_url(f"{address}/")
     wire = context.new_cdp_session(page)
     wire.send("Network.enable")
-    wire.send("Network.emulateNetworkConditions", conditions(latency_ms))
+    throughput = {"downloadThroughput": -1, "uploadThroughput": -1}
+    how = {"offline": False, "latency": latency_ms, **throughput}
+    wire.send("Network.emulateNetworkConditions", how)
+    return page, wire
+
+
+def vote(page: Page, votes: int, *, ready: str, stopwatch: str) -> None:
+    """Go to the voting page and vote by keys, the stopwatch running once `ready` is there."""
     page.click("a[href*='/vote/']")
-    page.wait_for_selector("body.is-live #answers:not([inert])")
+    page.wait_for_selector(ready)
     page.wait_for_timeout(2000)
-    page.evaluate(STOPWATCH)
+    page.evaluate(stopwatch)
     for number in range(votes):
         page.keyboard.press("123"[number % 3])
         page.wait_for_timeout(PAUSE_MS)
-    found = _numbers(page, "visible"), _numbers(page, "painted")
-    context.close()
-    return found
-
-
-def conditions(latency_ms: int) -> dict[str, Any]:
-    return {
-        "offline": False,
-        "latency": latency_ms,
-        "downloadThroughput": -1,
-        "uploadThroughput": -1,
-    }
 
 
 def _numbers(page: Page, name: str) -> list[float]:

@@ -16,7 +16,7 @@ from typing import Any
 
 from playwright.sync_api import Browser
 
-from bench.key_to_pair import LATENCIES_MS, PASSWORD, PAUSE_MS, conditions, prepare
+from bench.key_to_pair import LATENCIES_MS, prepare, sign_in, vote
 from tests.browser.chromium import chromium
 from tests.stack import SMALL_DEMO, Home
 
@@ -84,14 +84,7 @@ def _vote(
     browser: Browser, address: str, latency_ms: int, votes: int
 ) -> tuple[list[float], float]:
     """How long the films of each pair took, and the bytes of a pair, which has three pictures."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
-    page = context.new_page()
-    page.goto(f"{address}/login/")
-    page.fill("input[name=username]", f"expert-{latency_ms}")
-    page.fill("input[name=password]", PASSWORD)
-    page.click("main form button")
-    page.wait_for_url(f"{address}/")
-    wire = context.new_cdp_session(page)
+    page, wire = sign_in(browser, address, latency_ms)
     picture_of: dict[str, str] = {}
     sizes: dict[str, float] = {}
 
@@ -106,17 +99,9 @@ def _vote(
 
     wire.on("Network.requestWillBeSent", asked)
     wire.on("Network.loadingFinished", loaded)
-    wire.send("Network.enable")
-    wire.send("Network.emulateNetworkConditions", conditions(latency_ms))
-    page.click("a[href*='/vote/']")
-    page.wait_for_selector("canvas.reel:not([hidden])")
-    page.wait_for_timeout(2000)
-    page.evaluate(STOPWATCH)
-    for number in range(votes):
-        page.keyboard.press("123"[number % 3])
-        page.wait_for_timeout(PAUSE_MS)
+    vote(page, votes, ready="canvas.reel:not([hidden])", stopwatch=STOPWATCH)
     moved: list[float] = page.evaluate("window.moved")
-    context.close()
+    page.context.close()
     return moved, sum(sizes.values()) / (len(sizes) / 3)
 
 
