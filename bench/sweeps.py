@@ -5,13 +5,19 @@ the same rows, leases and scores as every drive; a sweep has 100 of them, at 100
 car. Database: PostgreSQL. The processes take rows without a broker. After a third of a run one of
 them is killed with SIGKILL and another one starts: its row must come back. Processor time and
 memory are the operating system's, of all processes with the killed one and their start.
+
+Workers ask for long turns on a core: with Linux' usual ones, four processes on two cores use a
+sixth more processor time for the same drives, even if they share nothing, not even a database.
 """
 
 import argparse
+import ctypes
 import hashlib
 import json
 import os
+import platform
 import random
+import struct
 import subprocess
 import sys
 import tempfile
@@ -28,6 +34,9 @@ DRIVES, VALUES, WORKERS = 10_000, 100, (1, 2, 4)
 STREET_END_M = 20.0
 LEAST_LINEAR, MOST_MB = 0.9, 300.0
 BATCH, WINDOW, PAUSE_S, POLL_S = 20, 1_000, 0.2, 5.0
+TURN_NS = 100_000_000
+SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
+"""Numbers of the system call, for which Python and libc have no function."""
 
 
 def plan(count: int) -> None:
@@ -70,6 +79,7 @@ def work(seed: int) -> None:
     """Take rows until none waits or is worked on, and take back those of dead workers."""
     import django
 
+    take_long_turns()
     django.setup()
     from augment.models import Simulation
     from augment.services.clock import DATABASE_TIME
@@ -85,6 +95,14 @@ def work(seed: int) -> None:
             KIND.take_back_lost()
             KIND.tidy(DATABASE_TIME)
             time.sleep(PAUSE_S)
+
+
+def take_long_turns() -> None:
+    """Ask Linux to let this process run longer before another one has its turn."""
+    attributes = struct.pack("=IIQiIQQQ", 48, 0, 0, 0, 0, TURN_NS, 0, 0)  # struct sched_attr
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.syscall(SCHED_SETATTR[platform.machine()], 0, attributes, 0):
+        raise OSError(ctypes.get_errno(), "sched_setattr")
 
 
 def read_outcome() -> dict[str, Any]:
@@ -130,9 +148,14 @@ def measure(count: int, workers: int, database: str, folder: Path) -> dict[str, 
     running = [start("-m", "bench.sweeps", "work", str(seed)) for seed in range(workers)]
     while json.loads(answer("-m", "bench.sweeps", "outcome"))["done"] < count / 3:
         time.sleep(POLL_S)
+        if any(process.poll() is not None for process in running):
+            raise RuntimeError("a worker ended before its work was done")
     running[0].kill()
     running.append(start("-m", "bench.sweeps", "work", str(workers)))
-    used = [os.wait4(process.pid, 0)[2] for process in running]
+    ends = [os.wait4(process.pid, 0) for process in running]
+    if any(status for _, status, _ in ends[1:]):
+        raise RuntimeError("a worker failed")
+    used = [usage for _, _, usage in ends]
     outcome: dict[str, Any] = json.loads(answer("-m", "bench.sweeps", "outcome"))
     return outcome | {
         "elapsed_s": time.perf_counter() - begun,
