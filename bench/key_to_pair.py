@@ -1,20 +1,23 @@
 """How long an expert waits from the press of a key to the next pair on the screen.
 
-    python -m bench.key_to_pair [VOTES]
+    python -m bench.key_to_pair [VOTES] [--write]
 
-Serves the demo's catalogue and votes in Chromium at 1280x720 without and with a network latency of
-150 ms. Visible means: the number of the pair has changed, both new pictures are complete, and one
-more animation frame has passed. "Painted" is the browser's own account of the same presses (Event
-Timing, in steps of 8 ms), which includes decoding and drawing.
+Serves the demo's scenarios that stand still and votes in Chromium at 1280x720 without and with a
+network latency of 150 ms. Visible means: the number of the pair has changed, both new pictures are
+complete, and one more animation frame has passed. "Painted" is the browser's own account of the
+same presses (Event Timing, in steps of 8 ms), which includes decoding and drawing.
 """
 
+import argparse
 import statistics
-import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from playwright.sync_api import Browser, CDPSession, Page
 
+from augment.scene.entities import CatalogueSet
+from bench.report import load, table, write_section
 from tests.browser.chromium import chromium
 from tests.stack import SMALL_DEMO, Home
 
@@ -47,22 +50,27 @@ new PerformanceObserver((list) => {
 }"""
 
 
-def main() -> None:
-    """Measure and print the table."""
-    votes = int(sys.argv[1]) if len(sys.argv) > 1 else VOTES
+HEADING = "From the key to the next pair"
+
+
+def main(votes: int, is_written: bool) -> None:
+    """Measure, print the table, and write it into docs/benchmarks.md where that is asked for."""
+    before, rows = load(), []
     with tempfile.TemporaryDirectory(prefix="arena-keys-") as folder:
         home = Home.at(Path(folder))
         home.must(*SMALL_DEMO)
-        prepare(home, votes)
-        print("| latency | presses | visible: median | p95 | max | painted: median | p95 |")
-        print("|---|---|---|---|---|---|---|")
+        prepare(home, votes, sets=[CatalogueSet.PAPER])
         with home.serving() as address, chromium() as browser:
             for latency in LATENCIES_MS:
-                visible, painted = _vote(browser, address, latency, votes)
-                print(_row(latency, visible, painted))
+                rows.append(_row(latency, *_vote(browser, address, latency, votes)))
+    head = ["latency", "presses", "visible, ms: median", "p95", "max", "painted: median", "p95"]
+    text = f"`python -m bench.key_to_pair --write`; {before}.\n\n{table(head, rows)}"
+    print(text)
+    if is_written:
+        write_section(HEADING, text)
 
 
-def prepare(home: Home, votes: int) -> None:
+def prepare(home: Home, votes: int, *, sets: Sequence[CatalogueSet]) -> None:
     """An expert for each latency, and a study of one pair more than they vote on."""
     names = [f"expert-{latency}" for latency in LATENCIES_MS]
     made = "; ".join(
@@ -72,6 +80,7 @@ def prepare(home: Home, votes: int) -> None:
     scenarios = home.rows(
         "SELECT slug FROM augment_scenario WHERE id IN"
         " (SELECT scenario_id FROM augment_augmentation)"
+        f" AND catalogue_set IN ({', '.join(repr(one.value) for one in sets)})"
     )
     home.must(
         *("open_study", "Keys", "--experts", *names, "--votes-per-expert", str(votes + 1)),
@@ -123,17 +132,25 @@ def _numbers(page: Page, name: str) -> list[float]:
     return found
 
 
-def _row(latency_ms: int, visible: list[float], painted: list[float]) -> str:
+def _row(latency_ms: int, visible: list[float], painted: list[float]) -> list[str]:
     # Presses that were painted within 16 ms are not reported by the browser.
     painted = painted + [16.0] * (len(visible) - len(painted))
     figures = [*_spread(visible), max(visible), *_spread(painted)]
-    cells = [f"{latency_ms} ms", str(len(visible)), *(f"{figure:.1f}" for figure in figures)]
-    return f"| {' | '.join(cells)} |"
+    return [f"{latency_ms} ms", str(len(visible)), *(f"{figure:.1f}" for figure in figures)]
 
 
 def _spread(values: list[float]) -> tuple[float, float]:
     return statistics.median(values), statistics.quantiles(values, n=20)[-1]
 
 
+def read_arguments(votes: int) -> tuple[int, bool]:
+    """How many votes, and whether the table goes into the docs."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("votes", type=int, nargs="?", default=votes)
+    parser.add_argument("--write", action="store_true", help="into docs/benchmarks.md")
+    asked = parser.parse_args()
+    return asked.votes, asked.write
+
+
 if __name__ == "__main__":
-    main()
+    main(*read_arguments(VOTES))

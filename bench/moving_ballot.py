@@ -1,6 +1,6 @@
 """How soon a pair's films move after the key, and how many bytes such a pair takes.
 
-    python -m bench.moving_ballot [VOTES]
+    python -m bench.moving_ballot [VOTES] [--write]
 
 Serves the demo's catalogue, in which whatever was added or moved now drives or walks 40 m straight
 on from 1 s on, and votes in Chromium at 1280x720 without and with a network latency of 150 ms.
@@ -9,14 +9,15 @@ it; bytes are those on the wire, of pictures, films and what films play over.
 """
 
 import statistics
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import Browser
 
-from bench.key_to_pair import LATENCIES_MS, prepare, sign_in, vote
+from augment.scene.entities import CatalogueSet
+from bench.key_to_pair import LATENCIES_MS, prepare, read_arguments, sign_in, vote
+from bench.report import load, table, write_section
 from tests.browser.chromium import chromium
 from tests.stack import SMALL_DEMO, Home
 
@@ -61,23 +62,29 @@ addEventListener("keydown", (event) => {
 }"""
 
 
-def main() -> None:
-    """Measure and print the table."""
-    votes = int(sys.argv[1]) if len(sys.argv) > 1 else VOTES
+HEADING = "From the key to the first frame of films"
+
+
+def main(votes: int, is_written: bool) -> None:
+    """Measure, print the table, and write it into docs/benchmarks.md where that is asked for."""
+    before, rows = load(), []
     with tempfile.TemporaryDirectory(prefix="arena-films-") as folder:
         home = Home.at(Path(folder))
         home.must(*SMALL_DEMO)
         home.must("shell", "-c", MOVE)
-        prepare(home, votes)
-        print("| latency | pairs | first frame, ms: median | p95 | max | kB a pair |")
-        print("|---|---|---|---|---|---|")
+        prepare(home, votes, sets=[CatalogueSet.PAPER, CatalogueSet.MOVING])
         with home.serving() as address, chromium() as browser:
             for latency in LATENCIES_MS:
                 moved, bytes_a_pair = _vote(browser, address, latency, votes)
                 p95 = statistics.quantiles(moved, n=20)[-1]
                 figures = [statistics.median(moved), p95, max(moved), bytes_a_pair / 1000]
-                cells = [f"{latency} ms", str(len(moved)), *(f"{one:.1f}" for one in figures)]
-                print(f"| {' | '.join(cells)} |")
+                cells = [f"{one:.1f}" for one in figures]
+                rows.append([f"{latency} ms", str(len(moved)), *cells])
+    head = ["latency", "pairs", "first frame, ms: median", "p95", "max", "kB a pair"]
+    text = f"`python -m bench.moving_ballot --write`; {before}.\n\n{table(head, rows)}"
+    print(text)
+    if is_written:
+        write_section(HEADING, text)
 
 
 def _vote(
@@ -106,4 +113,4 @@ def _vote(
 
 
 if __name__ == "__main__":
-    main()
+    main(*read_arguments(VOTES))

@@ -191,8 +191,8 @@ def main(count: int, is_written: bool) -> None:
     text = (
         f"`python -m bench.sweeps --write`: {count:,} drives of IDM to the end of a street, about "
         f"2 s each, in sweeps of {VALUES}; one worker is killed in each run. Workers ask for "
-        "turns of 100 ms on a core: with Linux' usual ones four processes on two cores take a sixth "
-        f"more processor time, also without a database. {before}.\n\n"
+        "turns of 100 ms on a core: with Linux' usual ones four processes on two cores take "
+        f"a sixth more processor time, also without a database. {before}.\n\n"
         f"{table(head, rows)}\n\nEvery run has the same results."
     )
     print(text)
