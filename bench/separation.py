@@ -88,9 +88,10 @@ def report() -> str:
             spread = f"{np.std(pairs[:, 0], ddof=1):.2f}"
             apart = _within(_apart(pairs), found)
             rows.append([name, title, str(len(pairs)), *medians, spread, apart])
-        spread_m = float(np.std(before[:, 0], ddof=1))
-        by_spread = _within(_apart(now) / spread_m, drawn[1] / spread_m)
-        rows.append([name, "moving : still spread", "", "", "", "", by_spread])
+        if name == "all":
+            spread_m = float(np.std(before[:, 0], ddof=1))
+            by_spread = _within(_apart(now) / spread_m, drawn[1] / spread_m)
+            rows.append([name, "moving : still spread", "", "", "", "", by_spread])
         ratio = _within(_apart(now) / _apart(before), drawn[1] / drawn[0])
         rows.append([name, "moving : still", "", "", "", "", ratio])
     head = ["answers", "set", "scenarios", "good, median (m)", "careless, median (m)"]

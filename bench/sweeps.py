@@ -190,9 +190,9 @@ def main(count: int, is_written: bool) -> None:
     head = ["workers", "processor s", "ms a drive", "linear", "elapsed s", "most MB", "done"]
     text = (
         f"`python -m bench.sweeps --write`: {count:,} drives of IDM to the end of a street, about "
-        f"2 s each, in sweeps of {VALUES}; one worker is killed in each run. Workers ask for "
-        "turns of 100 ms on a core: with Linux' usual ones four processes on two cores take "
-        f"a sixth more processor time, also without a database. {before}.\n\n"
+        f"2 s each, in sweeps of {VALUES}; one worker is killed in each run. Workers have "
+        "turns of 100 ms on a core; with usual ones four on two cores take a sixth more, also "
+        f"without a database. {before}.\n\n"
         f"{table(head, rows)}\n\nEvery run has the same results."
     )
     print(text)

@@ -96,14 +96,10 @@ def _outcome(trees: SimpleQueue[Tree], one: Mutation) -> Outcome:
 
 
 def report(found: Sequence[Outcome]) -> str:
-    """Return how many mutations of each area were caught, and what came of the others."""
-    areas = []
-    for area in dict.fromkeys(one.of.area for one in found):
-        came = Counter(one.came for one in found if one.of.area == area)
-        others = [f"{number} {what}" for what, number in came.items() if what != CAUGHT]
-        areas.append(f"{area} {came.total()}" + (f" ({', '.join(others)})" if others else ""))
-    caught = [one.came for one in found].count(CAUGHT)
-    return f"{caught} of {len(found)} are caught: {', '.join(areas)}."
+    """Return how many mutations there are, and what came of them."""
+    counts = Counter(one.came for one in found).most_common()
+    outcomes = ", ".join(f"{number} {came}" for came, number in counts)
+    return f"{len(found)} mutations in {len({one.of.area for one in found})} areas: {outcomes}."
 
 
 if __name__ == "__main__":
