@@ -32,7 +32,7 @@ check: lint ## The quick round: style, floors, types and the tests of the pure p
 	$(BIN)/python -m pytest -n 2 -q -m "not slow and not realdata" $(PURE:%=tests/%)
 
 fuzz: $(VENV)/.test ## New random examples for every property, ten times as many as in `make test`
-	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz
+	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz --randomly-seed=default
 
 lint: $(VENV)/.test ## Format, style, floors and types
 	$(BIN)/ruff format --check .
