@@ -357,7 +357,7 @@ class FamilyBody(StrictSerializer):
     seed = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME, required=False, default=0)
 
 
-class FamilyDocument(serializers.Serializer[Any]):
+class FamilyDocument(WarnedDocument):
     """The scenarios that were drawn."""
 
     scenarios = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
@@ -372,13 +372,18 @@ class FamilyView(ApiView):
     writers = STAFF
 
     @operation(FamilyDocument, takes=FamilyBody, status=201, name="drawFamily")
-    def post(self, code: uuid.UUID, given: Given) -> dict[str, list[str]]:
-        """Add scenarios with numbers drawn from the ranges of one's intent."""
+    def post(self, code: uuid.UUID, given: Given) -> tuple[dict[str, list[str]], list[str]]:
+        """Add scenarios with numbers drawn from the ranges of one's intent.
+
+        A worker draws them.
+        """
         rows, refused = add_family(scenario=_scenario(code), **given, actor=self.user)
-        return {
+        sent = [keep_and_send(partial(_scenario, row.code), enqueue_scenario) for row in rows]
+        family = {
             "scenarios": [row.slug for row in rows],
             "refused": [member.refusal for member in refused],
         }
+        return family, list(dict.fromkeys(text for _, warnings in sent for text in warnings))
 
 
 def _scenario(code: uuid.UUID) -> Scenario:

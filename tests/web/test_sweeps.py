@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from django.db import connection
 from django.urls import reverse
-from pytest_django import Settings
+from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 
 from augment.baselines.rule_placer import place
 from augment.models import Scenario, Simulation, Sweep
@@ -86,7 +86,9 @@ def test_a_program_starts_a_sweep_and_reads_it(scenario: Scenario) -> None:
     assert [(one["value"], one["lawful"]) for one in own] == [(2.0, False), (3.0, True)]
 
 
-def test_a_family_is_drawn_on_the_page_and_by_the_wire(scenario: Scenario) -> None:
+def test_a_family_is_drawn_on_the_page_and_by_the_wire(
+    scenario: Scenario, django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
+) -> None:
     ranged = json.loads(json.dumps(rows.add_scenario("cones").intent))
     ranged["requests"][0]["spot"]["distance"] = {"low_m": 20.0, "high_m": 40.0}
     first = Scenario.objects.get(slug="cones")
@@ -97,8 +99,10 @@ def test_a_family_is_drawn_on_the_page_and_by_the_wire(scenario: Scenario) -> No
     assert "3 added: cones-1 to cones-3" in shown.content.decode()
     body = json.dumps({"count": 1, "seed": 2})
     address = f"/api/v1/scenarios/{first.code}/family"
-    answer = program_of(researcher).post(address, body, content_type="application/json")
-    assert (answer.status_code, answer.json()) == (201, {"scenarios": ["cones-4"], "refused": []})
+    with django_capture_on_commit_callbacks() as sent:
+        answer = program_of(researcher).post(address, body, content_type="application/json")
+    family = {"scenarios": ["cones-4"], "refused": [], "warnings": []}
+    assert (answer.status_code, answer.json(), len(sent)) == (201, family, 1)
     told = signed_in(researcher).post(
         reverse("family-draw", args=[scenario.code]), {"count": "3", "seed": "1"}, follow=True
     )
