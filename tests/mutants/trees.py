@@ -21,7 +21,7 @@ PASSED, FAILED = 0, 1
 LONGEST_S = 600
 OPTIONS = (
     *("-q", "--no-header", "--tb=no", "--timeout=60", "--reuse-db", "--hypothesis-seed=0"),
-    *("-p", "no:cacheprovider", "-p", "no:randomly"),
+    *("-p", "no:cacheprovider", "--randomly-dont-reorganize"),
     *("-W", "ignore:Module already imported:pytest.PytestAssertRewriteWarning"),
 )
 LIBRARIES = (
