@@ -14,7 +14,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from arena.contestants.queries import asking_of, probe_lines, state_of
 from arena.people.queries import role_of
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import refusals_in, send_later
+from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm, offer
 from arena.site.listing import read_listing, read_page
 from augment.errors import AugmentError
@@ -250,10 +250,9 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "row": row,
         "form": form,
         "probe": probe,
-        "is_live": is_live,
+        **wait_for_workers(waits=is_live),
         "state": state_of(row, probe),
         "lines": probe_lines(row, probe),
-        "workforce": workforce() if is_live else None,
     }
     return render(request, "endpoints/model.html", context, status=422 if form.errors else 200)
 

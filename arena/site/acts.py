@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from typing import Any
 
 from django.contrib import messages
 from django.core.exceptions import NON_FIELD_ERRORS
@@ -13,6 +14,7 @@ from django.shortcuts import render
 from django.utils.text import capfirst, slugify
 
 from augment.errors import AugmentError, InvalidDocument, QueueFault
+from augment.services.running.workers import workforce
 
 SURE = "sure"
 """What the page's own button sends; without it nothing is done."""
@@ -22,10 +24,6 @@ CHANGE = "change"
 
 TYPED, WHY = "typed", "why"
 """What the question's own fields send: a name as it was typed, and a reason."""
-
-
-LOOKS = 40
-"""How often a page reloads itself while it waits for a worker."""
 
 
 class _Refusals(AbstractContextManager[None, bool]):
@@ -134,13 +132,11 @@ def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> 
     transaction.on_commit(send_now)
 
 
-def looks_again(request: HttpRequest, *, waits: bool) -> int:
-    """Return how often a page has reloaded itself, this time included; 0 to stop.
+def wait_for_workers(*, waits: bool) -> dict[str, Any]:
+    """Return what the template of a page needs that shows itself anew for as long as it waits."""
+    return {"is_live": waits, "workforce": workforce() if waits else None}
 
-    Args:
-        request: Whose address counts the reloads.
-        waits: Whether there is anything to wait for.
-    """
-    given = request.GET.get("look", "0")
-    looked = int(given) if given.isdecimal() and len(given) < 4 else 0
-    return looked + 1 if waits and looked < LOOKS else 0
+
+def looks_again(request: HttpRequest) -> bool:
+    """Return whether it is a page that waits, not a person, who asks (`static/js/live.js`)."""
+    return "X-Looks-Again" in request.headers

@@ -18,6 +18,8 @@ form.addEventListener("drop", (event) => {
   field.files = event.dataTransfer.files;
   form.requestSubmit();
 });
-field.addEventListener("change", () => {
+function sendChosen() {
   if (field.files.length) form.requestSubmit();
-});
+}
+field.addEventListener("change", sendChosen);
+sendChosen(); // what was chosen before this script was there

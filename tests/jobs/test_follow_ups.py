@@ -274,7 +274,7 @@ def test_the_page_the_api_and_the_command_say_what_comes_next(
     made = Augmentation.objects.latest("pk")
     assert asked.headers["Location"] == f"/augmentations/{made.code}/"
     assert (made.follows, made.job.cap_calls, made.job.launched_by) == (second, 2, admin)
-    assert 'http-equiv="refresh"' in browser.get(asked.headers["Location"]).content.decode()
+    assert "js/live.js" in browser.get(asked.headers["Location"]).content.decode()
 
     wire = program_of(admin)
     address = f"/api/v1/augmentations/{second.code}"

@@ -55,7 +55,7 @@ def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
     held.settle(rows.done(), now=rows.NOON)
     shown = admin.get(url).content.decode()
     assert "Paused" in shown
-    assert "js/job.js" not in shown, "nothing moves"
+    assert "js/live.js" not in shown, "nothing moves"
     admin.post(reverse("job-resume", args=[job.code]))
     job.refresh_from_db()
     assert job.state == GenerationJob.State.RUNNING

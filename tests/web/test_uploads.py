@@ -13,6 +13,7 @@ from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.scene.codec import scene_to_document
 from augment.services.scenarios import pictures, uploads
 from augment.services.scenarios import uploads as upload_moments
+from tests.jobs.rows import add_scenario
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in
 
@@ -89,3 +90,15 @@ def test_a_file_that_is_too_large_is_not_kept(researcher: Client, settings: Lazy
     assert "files of at most 1 MB" in shown
     assert not SceneUpload.objects.exists()
     assert "Use this moment" in send(researcher, STREET + b" " * (1_000_000 - len(STREET)))
+
+
+def test_a_page_that_looks_again_asks_for_no_picture_anew(
+    researcher: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row, asked = add_scenario("street", scene=scene()).base_scene, list[int]()
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", asked.append)
+    page = reverse("scenes")
+    researcher.get(page, headers={"X-Looks-Again": "1"})
+    assert asked == []
+    researcher.get(page)
+    assert asked == [row.pk]

@@ -66,6 +66,7 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
         return redirect("job", code=code)
     context = {
         **{"counts": counts, "tab": shown, "tab_template": f"jobs/tabs/{shown}.html"},
+        "is_live": not counts.is_over,
         "tabs": {name: TABS[name][0] for name in tabs},
         **TABS[shown][1](request, counts),
     }

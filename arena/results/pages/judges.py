@@ -25,16 +25,15 @@ from arena.site.acts import (
     Confirmation,
     ask,
     is_sure,
-    looks_again,
     send_later,
     tell_errors,
+    wait_for_workers,
     wants_to_change,
 )
 from arena.site.forms import RequestForm, offer
 from augment.models import EndpointModel, JudgeRun
 from augment.services.inputs import inputs_of, read_request
 from augment.services.running.judge_runs import JudgeEstimate, JudgeRequest, cancel_judge
-from augment.services.running.workers import workforce
 from augment.tasks import enqueue_judge
 
 MOVING = JudgeRun.State.RUNNING
@@ -82,8 +81,7 @@ def judges_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "answers": [agreement_sentence(list(one.values())) for one in agreement.values() if one],
         "form": JudgeForm(study),
         "imported": is_imported(study),
-        "look": looks_again(request, waits=is_moving),
-        "workforce": workforce() if is_moving else None,
+        **wait_for_workers(waits=is_moving),
     }
     return render(request, "results/judges.html", context)
 

@@ -9,7 +9,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from arena.contestants.queries import asking_of
 from arena.scenarios.queries import modification_lines, step_changes
 from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
-from arena.site.acts import looks_again, send_later, tell_errors
+from arena.site.acts import send_later, tell_errors, wait_for_workers
 from arena.site.forms import RequestForm
 from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
@@ -47,7 +47,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
-        "look": looks_again(request, waits=augmentation.state in Augmentation.UNDER_WAY),
+        **wait_for_workers(waits=augmentation.state in Augmentation.UNDER_WAY),
         "steps": _steps(augmentation),
         "follow_ups": augmentation.follow_ups.select_related("scenario"),
         "form": FollowUpForm() if can_go_on else None,

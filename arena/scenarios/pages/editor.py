@@ -11,7 +11,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.scenarios import services
 from arena.site.access import STAFF, act_for, form_for, user_of
-from arena.site.acts import looks_again, refusals_in, refusals_told, send_later
+from arena.site.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
 from arena.site.forms import offer, read_code, read_json
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
@@ -207,8 +207,8 @@ def _editor(
     request: HttpRequest, draft: Scenario, text: str | None, more: dict[str, Any]
 ) -> HttpResponse:
     drawn = is_drawn(scene_picture(draft.base_scene, SceneView.BACKDROP))
-    look = looks_again(request, waits=not drawn and request.method != "POST")
-    if look == 1:
+    waits = not drawn and request.method != "POST"
+    if waits and not looks_again(request):
         send_later(request, enqueue_scene, draft.base_scene.pk)
     context = {
         "scenario": draft,
@@ -217,7 +217,7 @@ def _editor(
         "text": text or "",
         "types": [(one.value, one.value.replace("_", " ").lower()) for one in editing.PLACED],
         "is_drawn": drawn,
-        "look": look,
+        **wait_for_workers(waits=waits),
         **more,
     }
     # What was sent has been refused.

@@ -10,7 +10,15 @@ from django.urls import reverse
 
 from arena.scenarios import queries, services
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
+from arena.site.acts import (
+    Confirmation,
+    ask,
+    is_sure,
+    looks_again,
+    refusals_told,
+    send_later,
+    wait_for_workers,
+)
 from arena.site.forms import read_code, read_json
 from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
@@ -81,8 +89,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     is_waiting = not scenario.original_image or (
         scenario.reference is not None and not has_picture
     )
-    look = looks_again(request, waits=is_waiting)
-    if look == 1:
+    if is_waiting and not looks_again(request):
         send_later(request, enqueue_scenario, scenario.pk)
     readers = EndpointModel.objects.select_related("endpoint")
     context = {
@@ -91,7 +98,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "follow_ups": scenario.follow_ups.filter(retired_at=None),
         "has_picture": has_picture,
         "reference_name": reference,
-        "look": look,
+        **wait_for_workers(waits=is_waiting),
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),
         "statements": statements_of(scenario.intent),

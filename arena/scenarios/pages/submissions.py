@@ -13,7 +13,7 @@ from arena.people.queries import role_of
 from arena.scenarios.queries import is_waiting, submissions_for
 from arena.scenarios.services import was_too_large
 from arena.site.access import ADMIN, ENTRANT, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import looks_again, refusals_in, send_later
+from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm, offer
 from arena.site.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
@@ -58,8 +58,9 @@ class AcceptForm(RequestForm):
 def submissions_page(request: HttpRequest) -> HttpResponse:
     """Show staff all submissions, those that wait for them first, and entrants their own."""
     page = read_page(request, submissions_for(user_of(request)), size=AT_ONCE)
-    look = looks_again(request, waits=any(row.state in row.UNDER_WAY for row in page.object_list))
-    return render(request, "submissions/list.html", {"page": page, "look": look})
+    waits = any(row.state in row.UNDER_WAY for row in page.object_list)
+    context = {"page": page, **wait_for_workers(waits=waits)}
+    return render(request, "submissions/list.html", context)
 
 
 @form_for(*STAFF, ENTRANT)
@@ -108,7 +109,7 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "is_own": row.uploaded_by == request.user,
         "page": page,
         "remarks": (row.report or {}).get("remarks", ()),
-        "look": looks_again(request, waits=row.state in row.UNDER_WAY),
+        **wait_for_workers(waits=row.state in row.UNDER_WAY),
     }
     status = 422 if form.errors else 200
     return render(request, "submissions/submission.html", context, status=status)

@@ -13,7 +13,7 @@ from django.utils.text import slugify
 from arena.exports.formats import download
 from arena.jobs.exports.sweeps import SWEEP_FORMATS
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import Confirmation, ask, is_sure, looks_again, send_later, tell_errors
+from arena.site.acts import Confirmation, ask, is_sure, send_later, tell_errors, wait_for_workers
 from arena.site.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
 from augment.services.inputs import inputs_of, read_request
@@ -27,7 +27,6 @@ from augment.services.judging.sweeps import (
     plan_sweep,
 )
 from augment.services.judging.thresholds import driver_of, result_of
-from augment.services.running.workers import workforce
 from augment.tasks import enqueue_scenario, enqueue_sweep
 
 
@@ -114,8 +113,7 @@ def sweep_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "done": result.planned - result.under_way,
         "finer": sorted(result.edges[0]) if result.edges else (),
         "forms": list(SWEEP_FORMATS),
-        "look": looks_again(request, waits=bool(result.under_way)),
-        "workforce": workforce() if result.under_way else None,
+        **wait_for_workers(waits=bool(result.under_way)),
     }
     return render(request, "scenarios/sweep.html", context)
 

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.scenarios.services import was_too_large
 from arena.site.access import STAFF, act_for, page_for, user_of
-from arena.site.acts import looks_again, refusals_told, send_later
+from arena.site.acts import looks_again, refusals_told, send_later, wait_for_workers
 from arena.site.forms import read_code
 from arena.site.listing import read_page
 from augment.errors import Conflict
@@ -34,15 +34,14 @@ def scenes_page(request: HttpRequest) -> HttpResponse:
     shown = [(row, is_drawn(scene_picture(row, SceneView.KEPT))) for row in page.object_list]
     sent = SceneUpload.objects.defer("tracks").select_related("uploaded_by")[:UPLOADS_SHOWN]
     waits = any(row.state in row.UNDER_WAY for row in sent) or not all(has for _, has in shown)
-    look = looks_again(request, waits=waits)
-    for row, has_picture in shown if look == 1 else ():
-        if not has_picture:
+    for row, has_picture in shown:
+        if not has_picture and not looks_again(request):
             send_later(request, enqueue_scene, row.pk)
     context = {
         "page": page,
         "scenes": shown,
         "uploads": sent,
-        "look": look,
+        **wait_for_workers(waits=waits),
         "formats": uploads.FORMATS.items(),
         "most_megabytes": uploads.most_megabytes(),
     }
@@ -87,7 +86,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "notes": notes_of(((moment and moment.report) or {}).get("notes", ())),
         "slug": free_slug(row.name.partition(".")[0]),
         "kept": moments.filter(state=UploadMoment.State.KEPT),
-        "look": looks_again(request, waits=waits),
+        **wait_for_workers(waits=waits),
     }
     return render(request, "scenes/upload.html", context)
 

@@ -1,0 +1,62 @@
+"""Pages that wait for workers show themselves anew and lose nothing of what is done on them."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from django.urls import reverse
+from playwright.sync_api import Browser, Page, Route, expect
+from pytest_django.live_server_helper import LiveServer
+
+from arena.models import Study
+from augment.models import BaseScene, SceneUpload
+from augment.services.scenarios.pictures import draw_scene
+from tests.browser.booth import Booth
+from tests.jobs.rows import add_scenario
+from tests.scenes import scene
+from tests.web.cast import people
+
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+SLOW_S = 2
+"""Longer than a person who has been here before needs to choose a file."""
+
+
+@pytest.fixture
+def scenes_page(live_server: LiveServer, browser: Browser) -> Iterator[Page]:
+    """A page that waits for the picture of its only scene."""
+    people()
+    add_scenario("street", scene=scene(), reference=None)
+    booth = Booth(address=live_server.url, browser=browser, study=Study())
+    yield booth.visit("the-researcher", reverse("scenes"), {})
+    booth.leave()
+
+
+def _after_a_while(route: Route) -> None:
+    time.sleep(SLOW_S)
+    route.continue_()
+
+
+def _send(page: Page, tmp_path: Path) -> None:
+    file = tmp_path / "drive.json"
+    file.write_text("{}")
+    with page.expect_response(f"**{reverse('scene-send')}"):
+        page.set_input_files("[name=file]", file)
+    assert SceneUpload.objects.get().name == "drive.json"
+
+
+def test_a_file_that_is_chosen_before_the_script_is_there_is_sent(
+    scenes_page: Page, tmp_path: Path
+) -> None:
+    scenes_page.route("**/drop*.js", _after_a_while)
+    scenes_page.reload(wait_until="commit")
+    _send(scenes_page, tmp_path)
+
+
+def test_a_picture_appears_on_the_page_that_waits_for_it(scenes_page: Page) -> None:
+    scenes_page.evaluate("isTheSamePage = true")
+    expect(scenes_page.locator("#live img")).to_have_count(0)
+    draw_scene(BaseScene.objects.get().pk)
+    expect(scenes_page.locator("#live img")).to_have_count(1)
+    expect(scenes_page.locator("#live[data-live]")).to_have_count(0)
+    assert scenes_page.evaluate("isTheSamePage")
