@@ -9,7 +9,6 @@ from collections import deque
 
 import numpy as np
 
-from arena.errors import NothingToPlan
 from arena.pairing.order import BoolArray, FloatArray, IntArray
 
 
@@ -130,7 +129,7 @@ def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
 _MOST_AT_ONCE = 250
 """Units of an expert that are held against each other at a time."""
 _TRIES = 8
-"""Rounds over all experts without an exchange, after which there is none."""
+"""Rounds over all experts without an exchange, after which units are taken over."""
 
 
 def bring_together(
@@ -139,30 +138,22 @@ def bring_together(
     """Exchange units until so many of the judged ones are judged by two experts or more.
 
     Args:
-        chosen: (E, P, S), changed in place; sums over pairs and over scenarios stay for everybody.
+        chosen: (E, P, S), changed in place; everybody's sums over pairs and over scenarios stay,
+            unless no exchange within them is left: then units are taken over from others.
         showable: (P, S), where a unit can be.
         share: Of the judged units, from 0 to 1; a plan that has more keeps it.
         rng: Says which.
-
-    Raises:
-        NothingToPlan: It can't be reached; the text says how far.
     """
     judges = chosen.sum(axis=0)
     idle = 0
     while not _is_reached(judges, share):
+        bring = _exchange if idle < _TRIES else _take_over
         moved = sum(
-            _exchange(chosen[expert], judges, showable, rng)
+            bring(chosen[expert], judges, showable, rng)
             for expert in rng.permutation(len(chosen))
             if not _is_reached(judges, share)
         )
-        idle = 0 if moved else idle + 1
-        if idle == _TRIES:
-            raise NothingToPlan(
-                f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
-                f"more; with these experts, votes and pictures {int((judges > 1).sum())} of "
-                f"{int((judges > 0).sum())} are reached. "
-                "Ask for less, or for more votes per expert."
-            )
+        idle = 0 if moved and idle < _TRIES else idle + 1
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -196,4 +187,22 @@ def _exchange(
     ):
         mine[unit] = change > 0
         judges[unit] += change
+    return True
+
+
+def _take_over(mine: BoolArray, judges: IntArray, _: BoolArray, rng: np.random.Generator) -> bool:
+    """Give up a unit of one expert (P, S) for one of others, as near to even sums as can be."""
+    alone = rng.permutation(np.argwhere(mine & (judges == 1)))[:_MOST_AT_ONCE]
+    others = rng.permutation(np.argwhere(~mine & (judges > 0)))[:_MOST_AT_ONCE]
+    if not len(alone) or not len(others):
+        return False
+    cost = np.where(judges[tuple(others.T)] == 1, 0, judges.size)[None, :]
+    for axis in (0, 1):
+        here, there = alone[:, None, axis], others[None, :, axis]
+        for counts in (mine.sum(axis=1 - axis), judges.sum(axis=1 - axis)):
+            cost = cost + np.where(here == there, 0, counts[there] - counts[here] + 1)
+    given, taken = np.unravel_index(int(cost.argmin()), cost.shape)
+    for unit, change in ((alone[given], -1), (others[taken], 1)):
+        mine[tuple(unit)] = change > 0
+        judges[tuple(unit)] += change
     return True
