@@ -17,7 +17,14 @@ from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rat
 from arena.rating.lines import HEADS as PAPERS_HEADS
 from arena.rating.lines import align_cells, caption_text, escape, latex_table, notes_by_reason
 from arena.rating.ranking import Separation
-from arena.rating.rules import METHOD_TEXTS, Unit, default_intervals, unit_for
+from arena.rating.rules import (
+    FEWEST_DRAWS,
+    METHOD_TEXTS,
+    MOST_DRAWS,
+    Unit,
+    default_intervals,
+    unit_for,
+)
 from arena.rating.votes_file import OPTIONAL, as_comparisons, read_table
 from augment.escaping import escape_controls
 
@@ -27,7 +34,6 @@ HELP = (
 )
 _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
 ROUNDS_OF_MANY, MANY_VOTES, MANY_MODELS = 1000, 500_000, 100
-MOST_ROUNDS = 100_000
 
 COLUMNS = {
     "model": "name",
@@ -116,8 +122,8 @@ def run(
     Raises:
         CsvNotRated: The file can't be read or the options don't fit it.
     """
-    if rounds is not None and not 1 <= rounds <= MOST_ROUNDS:
-        raise CsvNotRated(f"rounds go from 1 to {MOST_ROUNDS}, not {rounds}")
+    if rounds is not None and not FEWEST_DRAWS <= rounds <= MOST_DRAWS:
+        raise CsvNotRated(f"rounds go from {FEWEST_DRAWS} to {MOST_DRAWS}, not {rounds}")
     if seed < 0:
         raise CsvNotRated(f"a seed is 0 or more, not {seed}")
     try:

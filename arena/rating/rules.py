@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+FEWEST_DRAWS, MOST_DRAWS = 100, 100_000
+"""Rounds that may be asked for; of fewer, what 95 % of them say is chance."""
+
 
 class Method(StrEnum):
     """How votes become ratings."""

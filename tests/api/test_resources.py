@@ -170,7 +170,7 @@ def test_a_researcher_reads_and_rates_and_changes_nothing_else() -> None:
     for path in ("jobs", f"studies/{here.study.code}/close", "people", "endpoints"):
         error_of(send(researcher, path), 403, "forbidden")
     close_study(study=here.study)
-    assert send(researcher, f"studies/{here.study.code}/snapshots", rounds=20).status_code == 201
+    assert send(researcher, f"studies/{here.study.code}/snapshots", rounds=100).status_code == 201
 
 
 def test_results_of_an_open_study_need_an_early_look() -> None:
@@ -185,7 +185,7 @@ def test_results_of_an_open_study_need_an_early_look() -> None:
     open_early(study=here.study, actor=accounts["researcher"])
     for path in paths:
         assert asking.get(API + path).status_code == 200
-    assert send(asking, rating, rounds=20).json()["is_early"] is True
+    assert send(asking, rating, rounds=100).json()["is_early"] is True
     error_of(program_of(accounts["admin"]).get(API + paths[0]), 403, "study_still_open")
 
 

@@ -32,7 +32,7 @@ def test_json_has_standings_best_first(votes: Any) -> None:
 
 def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any) -> None:
     file = votes(*clustered(), head=WITH_CLUSTERS)
-    found = document(file, method="elo", rounds=50)
+    found = document(file, method="elo", rounds=100)
     assert (found["method"], found["resample"]) == ("elo", "vote")
     assert any("does not shrink with more votes" in note for note in found["notes"])
     with pytest.raises(CsvNotRated, match="Elo resamples single votes only, not by expert"):
@@ -90,7 +90,7 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
     )
     assert "-0/+0" not in run(file=votes("a,b,tie"))
     two = [*PLAIN, *[line.replace("a,", "x,").replace("b,", "y,") for line in PLAIN[:55]]]
-    parts = document(votes(*two), rounds=50)
+    parts = document(votes(*two), rounds=100)
     assert parts["status"] == "disconnected"
     assert [row["part"] for row in parts["standings"]] == [0, 0, 0, 1, 1]
 
@@ -101,7 +101,7 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
 def test_django_passes_every_option_on(votes: Any) -> None:
     printed = io.StringIO()
     file = votes(*clustered(), head=WITH_CLUSTERS)
-    options = {"rounds": 50, "format": "json", "intervals": "resamples", "seed": 2}
+    options = {"rounds": 100, "format": "json", "intervals": "resamples", "seed": 2}
     call_command("rate_csv", file, stdout=printed, **options)
     assert printed.getvalue() == run(file=file, **options)  # type: ignore[arg-type]
 
@@ -116,7 +116,7 @@ def manage(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_line_prints_the_table_or_one_sentence(votes: Any) -> None:
-    done = manage(votes(*PLAIN), "--rounds", "50")
+    done = manage(votes(*PLAIN), "--rounds", "100")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("Model")
     failed = manage(votes("a,b,draw"))

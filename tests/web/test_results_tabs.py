@@ -109,17 +109,17 @@ def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, reader:
     sent = {
         "method": "bt",
         "resample": "vote",
-        "rounds": "60",
+        "rounds": "160",
         "seed": "9",
         "types": [ScenarioType.NUDGE.value],
         "experts": [str(person.code)],
     }
     reader.post(reverse("study-rate", args=[study.code]), sent)
     made = study.snapshots.order_by("-pk")[0]
-    assert (made.rounds, made.seed, made.resampling_unit) == (60, 9, "vote")
+    assert (made.rounds, made.seed, made.resampling_unit) == (160, 9, "vote")
     assert made.filters["experts"] == [str(person.code)]
     assert 0 < made.votes_counted < 90
-    reader.post(reverse("study-rate", args=[study.code]), {"rounds": "0"})
+    reader.post(reverse("study-rate", args=[study.code]), {"rounds": "99"})
     assert study.snapshots.count() == 2
 
 

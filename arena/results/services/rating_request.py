@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from arena.models import Question
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Method
-from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
+from arena.rating.rules import FEWEST_DRAWS, METHOD_TEXTS, MOST_DRAWS, UNIT_TEXTS
 from arena.results.queries.votes import Filters
-from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, Choices
+from arena.results.services.ratings import DEFAULT_ROUNDS, Choices
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.services.inputs import InputKind, input_field
 from augment.services.scenarios.scenes import types_named
@@ -41,7 +41,7 @@ class RatingRequest:
         default=None,
     )
     rounds: int = input_field(
-        InputKind.WHOLE, "Rounds", least=1, most=MOST_ROUNDS, default=DEFAULT_ROUNDS
+        InputKind.WHOLE, "Rounds", least=FEWEST_DRAWS, most=MOST_DRAWS, default=DEFAULT_ROUNDS
     )
     seed: int = input_field(InputKind.WHOLE, "Seed", least=0, most=HIGHEST_SEED, default=0)
     question: str | None = input_field(

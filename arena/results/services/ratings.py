@@ -17,7 +17,14 @@ from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vot
 from arena.models.ratings import stored_values
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import Intervals, TooManyContestants, Unit, choose_rules, unit_for
+from arena.rating.rules import (
+    MOST_DRAWS,
+    Intervals,
+    TooManyContestants,
+    Unit,
+    choose_rules,
+    unit_for,
+)
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Results
 from arena.results.queries.access import votes_in
@@ -46,7 +53,6 @@ from augment.services.events import log_event
 from augment.services.work import Lease, WorkKind
 
 DEFAULT_ROUNDS = 10_000
-MOST_ROUNDS = 100_000
 WHILE_WAITING = 20_000
 """Up to so many votes a person waits for the page; more are a worker's job."""
 
@@ -284,8 +290,8 @@ def _planned(
     is_early = study.state == Study.State.OPEN
     if is_early and not early:
         raise StudyStillOpen(study.name)
-    if not 1 <= rounds <= MOST_ROUNDS:
-        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
+    if not 1 <= rounds <= MOST_DRAWS:
+        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_DRAWS}, not {rounds}.")
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
     filters = filters or Filters()
