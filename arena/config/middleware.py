@@ -5,9 +5,12 @@ from collections.abc import Callable
 from typing import Any
 
 from django.conf import settings
+from django.contrib.auth.middleware import LoginRequiredMiddleware
+from django.contrib.auth.views import redirect_to_login
 from django.db.backends.base.base import BaseDatabaseWrapper
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, HttpResponseRedirect
 from django.http.response import HttpResponseBase
+from django.utils.http import url_has_allowed_host_and_scheme
 
 from arena.config import faults
 from arena.errors import DatabaseBusy
@@ -35,6 +38,19 @@ class BusyMiddleware:
             logger.error("%s", exception)
             return faults.answer_busy(request, lacks_pictures=True)
         return None
+
+
+class SignInMiddleware(LoginRequiredMiddleware):
+    """Lead who is not signed in to the login, and from there to a page that can be looked at."""
+
+    def handle_no_permission(
+        self, request: HttpRequest, view_func: Callable[..., Any]
+    ) -> HttpResponseRedirect:
+        """Return the redirect; what was sent is lost, and its address often takes nothing else."""
+        page = request.headers.get("Referer")
+        if request.method == "POST" and url_has_allowed_host_and_scheme(page, request.get_host()):
+            return redirect_to_login(str(page))
+        return super().handle_no_permission(request, view_func)
 
 
 def limit_connection(connection: BaseDatabaseWrapper, **_: Any) -> None:

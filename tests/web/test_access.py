@@ -1,5 +1,7 @@
 """Every page times every role, as one table."""
 
+from urllib.parse import parse_qs, urlsplit
+
 import pytest
 from django.test import Client
 from django.urls import reverse
@@ -117,6 +119,21 @@ def test_an_action_needs_a_post() -> None:
     for name in ACTIONS:
         answer = signed_in(admin).get(address(name, here))
         assert answer.status_code == ASKS_FIRST.get(name, 405), name
+
+
+def test_a_button_pressed_after_the_session_ended_leads_back_to_its_page() -> None:
+    """The button's own address takes a POST alone: there the browser would show an error."""
+    here, admin = world(), people()["admin"]
+    page = f"http://testserver{address('job', here)}"
+    pause = address("job-pause", here)
+    for referer, leads_to in ((page, page), ("http://elsewhere/x/", pause), ("", pause)):
+        answer = Client().post(pause, headers={"referer": referer})
+        asked = parse_qs(urlsplit(answer.headers["Location"]).query)
+        assert asked == {"next": [leads_to]}
+    admin.set_password("x")
+    admin.save()
+    given = {"username": admin.username, "password": "x", "next": page}
+    assert Client().post(reverse("login"), given).headers["Location"] == page
 
 
 def test_the_login_alone_is_open_to_the_world() -> None:
