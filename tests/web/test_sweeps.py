@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from typing import Any
 
 import pytest
@@ -35,7 +36,10 @@ def test_a_sweep_is_started_followed_and_read(scenario: Scenario) -> None:
     cast = people()
     admin, researcher = signed_in(cast["admin"]), signed_in(cast["researcher"])
     listed = reverse("sweeps", args=[scenario.code])
-    assert f"{ACROSS} (now 0)" in admin.get(listed).content.decode()
+    shown = admin.get(listed).content.decode()
+    assert f"{ACROSS} (now 0)" in shown
+    ids = re.findall(r' id="([^"]+)"', shown)
+    assert len(ids) == len(set(ids)), "labels of both forms lead to their own fields"
     start = reverse("sweep-start", args=[scenario.code])
     asked = FORM | {"planner": STRAIGHT.planner}
     assert researcher.post(start, asked).status_code == 403

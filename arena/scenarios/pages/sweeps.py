@@ -62,7 +62,7 @@ def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "scenario": scenario,
         "sweeps": [(row, driver_of(row)) for row in scenario.sweeps.select_related("hardest")],
         "form": SweepForm(scenario, initial=given),
-        "family": FamilyForm(),
+        "family": FamilyForm(auto_id="family_%s"),
     }
     return render(request, "scenarios/sweeps.html", context)
 
