@@ -35,6 +35,11 @@ WINDOW_M = """() => JSON.parse(document.getElementById("given").textContent).pai
     ({ width, px_per_m: scale }) => width / scale)[0]"""
 
 
+CUT = """() => [...document.querySelectorAll(".vote .button")].filter(
+    (one) => one.scrollWidth > one.clientWidth).map((one) => one.innerText)"""
+"""The buttons whose words are wider than they are."""
+
+
 @pytest.fixture
 def moving(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
     study = a_moving_study(scenarios=3, votes=9)
@@ -130,6 +135,9 @@ def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) ->
     expect(page.locator(".film-bar")).to_be_visible()
     assert overflows(page) is False
     assert faults(page) == []
+    page.add_style_tag(content="html { font-size: 200% }")
+    assert overflows(page) is False
+    assert page.evaluate(CUT) == []
 
 
 def test_on_other_pages_the_first_press_loads_and_does_what_its_button_says(moving: Booth) -> None:

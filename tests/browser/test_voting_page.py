@@ -9,9 +9,11 @@ from playwright.sync_api import Browser, Page, expect
 from pytest_django.live_server_helper import LiveServer
 
 from arena.studies.services.opening import close_study
+from arena.voting.screen import LONGEST
 from augment.services.scenarios.catalogue import read_catalogue
 from tests import study_rows
 from tests.browser.booth import PHONE, Booth, furnish, press, ready
+from tests.moving import a_moving_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 RULES = {
@@ -61,30 +63,39 @@ BLANK = """() => {
 """The share of the window that is no picture: text, buttons, frames, bands and margins."""
 
 
+@pytest.mark.parametrize("films", [0, 2])
 @pytest.mark.parametrize("size", [(1280, 720), (1440, 900), (1920, 1080)])
 def test_over_the_catalogue_a_quarter_at_most_is_no_picture_and_nothing_moves(
-    live_server: LiveServer, browser: Browser, size: tuple[int, int]
+    live_server: LiveServer, browser: Browser, size: tuple[int, int], films: int
 ) -> None:
-    booth = Booth(address=live_server.url, browser=browser, study=furnish(scenarios=50, votes=9))
+    # Films take long to draw, and the longest instructions alone settle how high the text is.
+    study = a_moving_study(scenarios=LONGEST, votes=9) if films else furnish(scenarios=50, votes=9)
+    booth = Booth(address=live_server.url, browser=browser, study=study)
     entries = read_catalogue(settings.BASE_DIR / "fixtures")[1]
-    for scenario, entry in zip(booth.study.scenarios.all(), entries, strict=True):
-        scenario.instruction = entry.instruction
+    texts = sorted((entry.instruction for entry in entries), key=len, reverse=True)
+    for scenario, text in zip(study.scenarios.all(), texts, strict=not films):
+        scenario.instruction = text
         scenario.save()
     page = booth.enter(viewport={"width": size[0], "height": size[1]})
     places = []
+    standing = page.locator(".panel, .answers .button")
     for _ in range(3):
-        places.append([panel.bounding_box() for panel in page.locator(".panel").all()])
+        expect(page.locator(".film-bar:visible")).to_have_count(films // 2)
+        expect(page.locator("canvas.reel")).to_have_count(films)
+        places.append([one.bounding_box() for one in standing.all()])
         assert page.evaluate(
             "document.documentElement.scrollHeight <= innerHeight"
             " && document.documentElement.scrollWidth <= innerWidth"
         )
         assert page.evaluate(BLANK) <= 0.25
         press(page, "1")
-    assert all(place == places[0] for place in places)
     for button in page.locator(".voting .button:visible").all():
         box = button.bounding_box()
         assert box is not None
         assert min(box["height"], box["width"]) >= 44, button.inner_text()
+    page.evaluate("for (const bar of document.querySelectorAll('.film-bar')) bar.hidden = true")
+    places.append([one.bounding_box() for one in standing.all()])  # as of a pair without films
+    assert all(place == places[0] for place in places)
     booth.leave()
 
 
