@@ -7,8 +7,9 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Case, Count, Exists, IntegerField, OuterRef, Q, QuerySet, When
+from django.db.models import Case, Count, Exists, OuterRef, Q, QuerySet, When
 from django.db.models.expressions import RawSQL
+from django.db.models.fields import BooleanField, IntegerField
 from django.utils import timezone
 
 from arena.errors import NotYours
@@ -62,16 +63,12 @@ def hold_matchup(*, expert: User, code: UUID) -> Matchup:
     Raises:
         NotYours: It is somebody else's, does not exist, or is closed to the expert.
     """
-    rows = Matchup.objects.select_for_update(of=("self",)).filter(code=code, expert=expert)
-    matchup = (
-        rows.exclude(study__early_looks__user=expert)
-        .select_related("study")
-        .only("study__name", "study__state", "study__questions", "left", "right")
-        .first()
-    )
-    if matchup is None:
-        raise NotYours("This matchup is not yours.")
-    return matchup
+    rows = Matchup.objects.select_for_update(of=("self",)).select_related("study")
+    needed = ("study__name", "study__state", "study__questions", "left", "right")
+    try:
+        return rows.only(*needed).get(_SAW_NO_RESULTS, code=code, expert=expert)
+    except Matchup.DoesNotExist as error:
+        raise NotYours("This matchup is not yours.") from error
 
 
 def of_skipped_pair() -> Q:
@@ -102,8 +99,8 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """
     if study.state != Study.State.OPEN:
         return []
-    rows = Matchup.objects.filter(study=study, expert=expert).annotate(answered=_ANSWERED)
-    rows = rows.filter(answered__lt=len(study.questions))
+    waits = RawSQL(_WAITS, (study.questions[-1],), output_field=BooleanField())
+    rows = Matchup.objects.filter(waits, study=study, expert=expert).annotate(answered=_ANSWERED)
     needed = (
         *("code", "study_id", "expert_id", "position", "kind", "view"),
         *("left_token", "right_token", "original_token"),
@@ -117,21 +114,34 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     return list(found)
 
 
-# Built once, as _STATE is. Questions are answered in their order, so that their number says which.
+# Written out: thousands of votes ask this, and building it anew cost as much as asking it.
+_SAW_NO_RESULTS = RawSQL(
+    """
+NOT EXISTS (
+    SELECT 1 FROM arena_earlylook look
+    WHERE look.study_id = arena_matchup.study_id AND look.user_id = arena_matchup.expert_id)
+""",
+    (),
+    output_field=BooleanField(),
+)
+_SKIPS = """
+(vote.outcome = 'skip' AND NOT EXISTS (
+    SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id))
+"""
+# Questions are answered in their order: their number says which comes next, the last ends a pair.
 _ANSWERED = RawSQL(
     """
-CASE WHEN EXISTS (
-    SELECT 1 FROM arena_vote skipped WHERE skipped.matchup_id = arena_matchup.id
-    AND skipped.outcome = 'skip' AND NOT EXISTS (
-      SELECT 1 FROM arena_vote later WHERE later.supersedes_id = skipped.id))
-THEN 99 ELSE (
-    SELECT COUNT(DISTINCT vote.question) FROM arena_vote vote
+(SELECT COUNT(DISTINCT vote.question) FROM arena_vote vote
     WHERE vote.matchup_id = arena_matchup.id)
-END
 """,
     (),
     output_field=IntegerField(),
 )
+_WAITS = f"""
+NOT EXISTS (
+    SELECT 1 FROM arena_vote vote
+    WHERE vote.matchup_id = arena_matchup.id AND (vote.question = %s OR {_SKIPS}))
+"""
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
@@ -163,23 +173,20 @@ def voting_state(
     return row, progress, row.just_now
 
 
-# Thousands of votes ask this, and building the query anew cost as much as asking it.
-_STATE = """
+# A matchup's expert is its votes'; said of both, PostgreSQL reads no other's matchups.
+_OWN = """
+arena_vote vote JOIN arena_matchup matchup
+ON matchup.id = vote.matchup_id AND matchup.expert_id = vote.expert_id
+WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
+"""
+_STATE = f"""
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
        study.ask_strength, study.allow_replay, study.questions,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
-       (SELECT COUNT(DISTINCT vote.matchup_id) FROM arena_vote vote
-        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
-        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND ((vote.question = %(last)s AND vote.supersedes_id IS NULL)
-            OR (vote.outcome = 'skip' AND NOT EXISTS (
-              SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)))) AS decided,
-       (SELECT COUNT(*) FROM arena_vote vote
-        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
-        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND vote.outcome = 'skip' AND NOT EXISTS (
-            SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)) AS skipped,
+       (SELECT COUNT(DISTINCT vote.matchup_id) FROM {_OWN}
+        AND (vote.question = %(last)s OR {_SKIPS})) AS decided,
+       (SELECT COUNT(*) FROM {_OWN} AND {_SKIPS}) AS skipped,
        (SELECT COUNT(*) FROM arena_vote vote
         WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now
 FROM arena_study study

@@ -179,11 +179,7 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
     matchup = hold_matchup(expert=expert, code=decision.matchup)
     asked = matchup.study.questions
     decision = replace(decision, question=decision.question or asked[0])
-    known = list(
-        Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk))
-        .select_related("supersedes", "superseded_by")
-        .order_by("pk")
-    )
+    known = list(Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk)).order_by())
     vote = next((vote for vote in known if vote.key == decision.key), None)
     is_new = vote is None
     if vote is not None:
@@ -233,7 +229,8 @@ def _superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
         if supersedes is not None:
             raise Conflict("There is no vote yet that this one could supersede.")
         return None
-    current = next(vote for vote in reversed(known) if not hasattr(vote, "superseded_by"))
+    superseded = {vote.supersedes_id for vote in known}
+    current = next(vote for vote in known if vote.pk not in superseded)
     if supersedes != current.key:
         raise AlreadyDecided(current.outcome)
     return current
