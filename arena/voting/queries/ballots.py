@@ -173,23 +173,20 @@ def voting_state(
     return row, progress, row.just_now
 
 
-# A matchup's expert is its votes'; said of both, PostgreSQL reads no other's matchups.
-_OWN = """
-arena_vote vote JOIN arena_matchup matchup
-ON matchup.id = vote.matchup_id AND matchup.expert_id = vote.expert_id
-WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-"""
+# Votes have the expert of their matchup; said so, PostgreSQL reads no other expert's matchups.
 _STATE = f"""
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
-       study.ask_strength, study.allow_replay, study.questions,
+       study.ask_strength, study.allow_replay, study.questions, own.decided, own.skipped,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
-       (SELECT COUNT(DISTINCT vote.matchup_id) FROM {_OWN}
-        AND (vote.question = %(last)s OR {_SKIPS})) AS decided,
-       (SELECT COUNT(*) FROM {_OWN} AND {_SKIPS}) AS skipped,
        (SELECT COUNT(*) FROM arena_vote vote
         WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now
-FROM arena_study study
+FROM arena_study study, (
+    SELECT COUNT(CASE WHEN {_SKIPS} THEN 1 END) AS skipped, COUNT(DISTINCT
+           CASE WHEN vote.question = %(last)s OR {_SKIPS} THEN vote.matchup_id END) AS decided
+    FROM arena_vote vote JOIN arena_matchup matchup
+         ON matchup.id = vote.matchup_id AND matchup.expert_id = vote.expert_id
+    WHERE matchup.study_id = %(study)s AND vote.expert_id = %(expert)s) own
 WHERE study.id = %(study)s
 """
 
