@@ -25,7 +25,7 @@ class AccountBackend(ModelBackend):
     def get_user(self, user_id: Any) -> User | None:
         """Return the account of a session, None where it is gone or not active."""
         accounts = User.objects.select_related("person").prefetch_related("groups")
-        user = accounts.filter(pk=user_id).first()
+        user = next(iter(accounts.filter(pk=user_id)), None)
         return user if user is not None and self.user_can_authenticate(user) else None
 
 

@@ -100,15 +100,7 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     if study.state != Study.State.OPEN:
         return []
     waits = RawSQL(_WAITS, (study.questions[-1],), output_field=BooleanField())
-    rows = Matchup.objects.filter(waits, study=study, expert=expert).annotate(answered=_ANSWERED)
-    needed = (
-        *("code", "study_id", "expert_id", "position", "kind", "view"),
-        *("left_token", "right_token", "original_token"),
-        *("left_image", "right_image", "original_image"),
-        *("scenario__instruction", "scenario__follows"),
-        *("scenario__follows__instruction", "scenario__follows__follows"),
-    )
-    found = rows.select_related("scenario__follows").only(*needed).order_by("position")[:n]
+    found = _PAIRS.filter(waits, study=study, expert=expert)[:n]
     for matchup in found:
         matchup.asked = study.questions[matchup.answered]
     return list(found)
@@ -129,19 +121,27 @@ _SKIPS = """
     SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id))
 """
 # Questions are answered in their order: their number says which comes next, the last ends a pair.
-_ANSWERED = RawSQL(
-    """
+_ANSWERED = """
 (SELECT COUNT(DISTINCT vote.question) FROM arena_vote vote
     WHERE vote.matchup_id = arena_matchup.id)
-""",
-    (),
-    output_field=IntegerField(),
-)
+"""
 _WAITS = f"""
 NOT EXISTS (
     SELECT 1 FROM arena_vote vote
     WHERE vote.matchup_id = arena_matchup.id AND (vote.question = %s OR {_SKIPS}))
 """
+_PAIRS = (
+    Matchup.objects.annotate(answered=RawSQL(_ANSWERED, (), output_field=IntegerField()))
+    .select_related("scenario__follows")
+    .only(
+        *("code", "study_id", "expert_id", "position", "kind", "view"),
+        *("left_token", "right_token", "original_token"),
+        *("left_image", "right_image", "original_image"),
+        *("scenario__instruction", "scenario__follows"),
+        *("scenario__follows__instruction", "scenario__follows__follows"),
+    )
+    .order_by("position")
+)
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
