@@ -353,6 +353,7 @@ def _restore(
         _write_media(source, media, written)
         say(f"pictures: {len(written)}")
         with transaction.atomic():
+            stored_rows.prepared_rows().delete()
             write()
     except BaseException:
         for name in written:

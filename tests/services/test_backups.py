@@ -21,6 +21,7 @@ from arena.management.backups import take_backup
 from arena.models import Vote
 from arena.results.services.stored_rows import applied_migrations, frozen_rows
 from augment.models import Event
+from augment.services.endpoints.contestants import ensure_builtin
 from tests.house.source import ROOT
 from tests.services.backup_rows import (
     NOW,
@@ -42,6 +43,7 @@ def test_what_was_restored_backs_up_to_the_same_bytes(tmp_path: Path) -> None:
     take_backup(first, now=NOW, say=quiet)
     votes = list(Vote.objects.order_by("pk").values())
     empty()
+    ensure_builtin()  # as `prepare` and `serve` do, also where nobody has been yet
     call_command("restore", str(first))
     assert list(Vote.objects.order_by("pk").values()) == votes
     with default_storage.open(PICTURE) as picture:

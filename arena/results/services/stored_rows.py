@@ -19,6 +19,8 @@ from django.db.migrations.loader import MigrationLoader
 from django.db.models import QuerySet
 
 from arena.site.services import REFUSALS
+from augment.models import Contestant
+from augment.services.endpoints.contestants import BUILTIN
 from augment.services.texts import make_storable
 
 LEFT_OUT = frozenset(
@@ -33,7 +35,8 @@ LEFT_OUT = frozenset(
 that are made again when somebody asks for them."""
 
 MADE_BY_MIGRATING = ("auth.permission", "contenttypes.contenttype", "auth.group")
-"""What an empty installation has already; a restore puts the backup's in its place."""
+"""What an empty installation has already, beside the contestants that are built in; a restore puts
+the backup's in its place."""
 
 AT_ONCE = 500
 
@@ -136,8 +139,15 @@ def find_filled_tables() -> list[str]:
         for model in find_tables()
         if model._meta.db_table in there
         and label_of(model) not in MADE_BY_MIGRATING
-        and model._base_manager.exists()
+        and model._base_manager.exclude(
+            pk__in=prepared_rows() if model is Contestant else ()
+        ).exists()
     ]
+
+
+def prepared_rows() -> QuerySet[Contestant]:
+    """Return the contestants that `prepare` makes, which a restore brings itself."""
+    return Contestant.objects.filter(slug__in=BUILTIN)
 
 
 # --- Private -----------------------------------------------------------------------------------

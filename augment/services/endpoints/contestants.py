@@ -28,7 +28,7 @@ LONGEST_NAME = 120
 VARIANTS = tuple(RECIPES)
 
 REFERENCE = "reference"
-_BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
+BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
     slug: (placer.name, Kind.RULE if placer.is_rule else Kind.BASELINE)
     for slug, placer in PLACERS.items()
 }
@@ -83,7 +83,7 @@ def ensure_builtin() -> list[Contestant]:
     """Return the contestants that need no endpoint: reference, rule placer, baselines."""
     return [
         Contestant.objects.get_or_create(slug=slug, defaults={"name": name, "kind": kind})[0]
-        for slug, (name, kind) in _BUILTIN.items()
+        for slug, (name, kind) in BUILTIN.items()
     ]
 
 
