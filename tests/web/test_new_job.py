@@ -9,11 +9,14 @@ from django.urls import reverse
 
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
+from augment.services.running.entering import AcceptRequest, accept_submission
 from augment.services.running.jobs import JobRequest
+from tests.entering import a_benchmark, entrant, read, sent
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
+ACCEPTED = AcceptRequest(slug="theirs", name="Theirs", runs=False)
 OTM, VQA, FC = "otm|here|seer", "vqa|here|seer", "fc|here|seer"
 
 
@@ -52,6 +55,25 @@ def test_impossible_cells_are_disabled_and_say_why_in_the_text(
     assert shown.count("nobody knows whether it sees pictures: probe it") == 2
     assert "is not one of the available choices" in send(admin, cells=["vqa|here|blind"])
     assert not GenerationJob.objects.exists()
+
+
+def test_whoever_can_not_run_on_every_scenario_is_not_ticked_at_first(
+    admin: Client, models: Endpoint
+) -> None:
+    """A scenario that is only a sentence has no reference, a submission answers its own alone."""
+    for slug, kind in (("reference", "reference"), ("rule-placer", "rule")):
+        rows.add_kind(slug, kind)
+
+    def ticked() -> list[str]:
+        shown = admin.get(reverse("job-new")).content.decode()
+        return re.findall(r'name="contestants"\s+value="([^"]+)" checked', shown)
+
+    assert ticked() == ["reference", "rule-placer"]
+    rows.add_scenario("sentence", reference=None)
+    assert ticked() == ["rule-placer"]
+    enno = entrant()
+    accept_submission(read(sent(a_benchmark(), enno)), ACCEPTED, actor=enno)
+    assert ticked() == ["rule-placer"]
 
 
 def test_a_cell_becomes_its_contestant_once_and_other_options_another(

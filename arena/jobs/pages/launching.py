@@ -17,10 +17,10 @@ from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.site.access import ADMIN, form_for, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import ChoiceForm, Offer, offer
-from augment.models import Contestant, EndpointModel, GenerationJob
+from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
 from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.inputs import inputs_of, read_request, read_values
-from augment.services.running.choosing import find_obstacle
+from augment.services.running.choosing import can_run, find_obstacle
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
 from augment.services.running.matrix import add_cells, find_cells, matrix_of
@@ -68,12 +68,14 @@ class LaunchForm(ChoiceForm, OptionsForm):
         return [Offer(row=row, obstacle=find_obstacle(row)) for row in self.offered]
 
     def usual(self) -> dict[str, Any]:
-        """Return what is filled in at first: all that can run, on every scenario, within a cap."""
+        """Return what is filled in at first: all that can run on every scenario, within a cap."""
+        shown = [row.pk for group in self.groups for row in group.scenarios]
+        where = Scenario.objects.filter(pk__in=shown).only("slug", "reference")
         ready = [
-            one.row.slug
-            for one in self.offers
-            if not one.obstacle
-            and getattr(one.row.endpoint, "key_variable", "") not in self.missing_keys
+            row.slug
+            for row in self.offered
+            if can_run(row, where)
+            and getattr(row.endpoint, "key_variable", "") not in self.missing_keys
         ]
         return {
             "name": f"Job {GenerationJob.objects.count() + 1}",

@@ -1,6 +1,6 @@
 """What people mean when they name contestants and jobs, and what no job can do."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from uuid import UUID
 
@@ -89,6 +89,15 @@ def refuse_impossible(
     for row in who:
         if row.kind == Kind.SUBMISSION:
             refuse_unanswered(row, [one.slug for one in where], samples=samples)
+
+
+def can_run(contestant: Contestant, where: Iterable[Scenario]) -> bool:
+    """Return whether a job can run a contestant on every one of these scenarios."""
+    try:
+        refuse_impossible([contestant], list(where))
+    except Conflict:
+        return False
+    return True
 
 
 def resolve_contestants(given: Sequence[str]) -> list[str]:
