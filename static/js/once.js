@@ -1,0 +1,11 @@
+// A form is sent once: pressed again while the answer is on its way, it would launch a second job.
+const AGAIN_MS = 10_000;
+const pressed = new WeakSet();
+
+addEventListener("submit", (event) => {
+  const form = event.target;
+  if (event.defaultPrevented || form.getAttribute("method") !== "post") return;
+  if (pressed.has(form)) return event.preventDefault();
+  pressed.add(form);
+  setTimeout(() => pressed.delete(form), AGAIN_MS);
+});
