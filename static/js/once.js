@@ -1,6 +1,6 @@
 // A form is sent once: pressed again while the answer is on its way, it would launch a second job.
 const AGAIN_MS = 10_000;
-const pressed = new WeakSet();
+let pressed = new WeakSet();
 
 addEventListener("submit", (event) => {
   const form = event.target;
@@ -9,3 +9,5 @@ addEventListener("submit", (event) => {
   pressed.add(form);
   setTimeout(() => pressed.delete(form), AGAIN_MS);
 });
+// Who goes back to the page may send it again.
+addEventListener("pageshow", () => (pressed = new WeakSet()));
