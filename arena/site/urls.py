@@ -46,7 +46,6 @@ urlpatterns: list[URLPattern] = [
     path("people/<uuid:code>/forget/", experts.forget_person, name="person-forget"),
     path("audit/", pages.audit_page, name="audit"),
     path("studies/", studies.studies_page, name="studies"),
-    path("studies/checks/", setup.draw_checks, name="checks-draw"),
     path("studies/import/", setup.upload_votes_page, name="import-votes"),
     path("studies/new/", setup.new_study_page, name="study-new"),
     path("studies/drafts/<uuid:code>/", setup.draft_page, name="study-draft"),

@@ -63,7 +63,7 @@ ACTIONS = _table(
         (302, 403, 403): (
             "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
-            "scenario-retired intent-read job-resume checks-draw study-again "
+            "scenario-retired intent-read job-resume study-again "
             "study-draft-discard study-hand-over first-step benchmark-retired board-batch "
             "submission-decline sweep-start follow-up"
         ),

@@ -100,8 +100,9 @@ def test_attention_checks_are_drawn_by_a_worker_with_one_click(
     sent: list[int] = []
     monkeypatch.setattr(tasks, "send_checks", sent.append)
     admin = people()["admin"]
-    answer = signed_in(admin).post(reverse("checks-draw"))
-    assert answer.headers["Location"] == reverse("study-new")
+    entered = {"name": "Half filled in", "draw": "1"}
+    shown = signed_in(admin).post(reverse("study-new"), entered).content.decode()
+    assert 'value="Half filled in"' in shown
     tasks.draw_checks(*sent)
     tasks.draw_checks(*sent)
     drawn = Augmentation.objects.get(contestant__kind="check")

@@ -80,14 +80,6 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study-draft", code=draft.code)
 
 
-@act_for(ADMIN, back="study-new")
-def draw_checks(request: HttpRequest) -> None:
-    """Have workers draw the attention checks that are missing; twice does no harm."""
-    tasks.send_checks(user_of(request).pk)
-    text = "Attention checks are being drawn. Reload this page in a moment."
-    messages.success(request, text)
-
-
 # --- The form ----------------------------------------------------------------------------------
 
 
@@ -99,6 +91,10 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     form = _form(entered)
     if KEEP in posted or PREVIEW in posted:
         return _keep(request, draft, form)
+    if "draw" in posted:  # twice does no harm
+        with refusals_told(request):
+            tasks.send_checks(user_of(request).pk)
+            messages.success(request, "Workers draw the missing attention checks.")
     if is_sure(request) and form.is_valid():
         with refusals_in(form):
             study = drafts.open_draft(

@@ -279,7 +279,7 @@ def raise_caps(job: GenerationJob, caps: Caps) -> None:
     for name, value in columns.items():
         current = getattr(job, name)
         if current is None or value <= current:
-            raise Conflict(f"A new cap must be higher than that of the job: {limit_of(job)}.")
+            raise Conflict(f"A cap is raised, not added or lowered; the job's: {limit_of(job)}.")
         setattr(job, name, value)
     job.save(update_fields=list(columns))
 
