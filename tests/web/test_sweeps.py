@@ -44,6 +44,9 @@ def test_a_sweep_is_started_followed_and_read(scenario: Scenario) -> None:
     asked = FORM | {"planner": STRAIGHT.planner}
     assert researcher.post(start, asked).status_code == 403
     assert "Values" in admin.post(start, asked | {"count": "1"}, follow=True).content.decode()
+    refused = admin.post(start, asked | {"low": "7", "high": "3"}, follow=True).content.decode()
+    assert "must be a number above low, got 7 to 3" in refused
+    assert 'value="7"' in refused, "what was typed is still there"
     page = admin.post(start, asked).headers["Location"]
     assert "0 of 8 drives" in researcher.get(page).content.decode()
     settle_others(at_2=0.7)

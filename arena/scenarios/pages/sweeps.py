@@ -2,6 +2,7 @@
 
 import uuid
 from typing import Any
+from urllib.parse import urlencode
 
 from django import forms
 from django.contrib import messages
@@ -13,7 +14,15 @@ from django.utils.text import slugify
 from arena.exports.formats import download
 from arena.jobs.exports.sweeps import SWEEP_FORMATS
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import Confirmation, ask, is_sure, send_later, tell_errors, wait_for_workers
+from arena.site.acts import (
+    Confirmation,
+    ask,
+    is_sure,
+    refusals_told,
+    send_later,
+    tell_errors,
+    wait_for_workers,
+)
 from arena.site.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
 from augment.services.inputs import inputs_of, read_request
@@ -28,6 +37,9 @@ from augment.services.judging.sweeps import (
 )
 from augment.services.judging.thresholds import driver_of, result_of
 from augment.tasks import enqueue_scenario, enqueue_sweep
+
+KEPT = ("number", "low", "high", "count", "planner", "offsets")
+"""What the form of a new sweep is filled in with by an address."""
 
 
 class SweepForm(RequestForm):
@@ -57,7 +69,7 @@ class FamilyForm(forms.Form):
 def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the sweeps of a scenario, with the forms of a new one and of a family."""
     scenario = _scenario(code)
-    given = {name: request.GET[name] for name in ("number", "low", "high") if name in request.GET}
+    given = {name: request.GET[name] for name in KEPT if name in request.GET}
     context = {
         "scenario": scenario,
         "sweeps": [(row, driver_of(row)) for row in scenario.sweeps.select_related("hardest")],
@@ -68,17 +80,20 @@ def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @act_for(ADMIN, back="sweeps")
-def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
+def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have the values driven by the workers."""
     scenario = _scenario(code)
     form = SweepForm(scenario, request.POST)
     if not form.is_valid():
         tell_errors(request, form)
-        return None
-    asked = read_request(SweepRequest, form.cleaned_data)
-    sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
-    send_later(request, enqueue_sweep, sweep.pk)
-    return redirect("sweep", code=sweep.code)
+    else:
+        with refusals_told(request):
+            asked = read_request(SweepRequest, form.cleaned_data)
+            sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
+            send_later(request, enqueue_sweep, sweep.pk)
+            return redirect("sweep", code=sweep.code)
+    given = urlencode({name: request.POST.get(name, "") for name in KEPT})
+    return redirect(f"{reverse('sweeps', args=[code])}?{given}")
 
 
 @act_for(*STAFF, back="sweeps")
