@@ -18,6 +18,7 @@ from arena.site.access import ADMIN, EXPERT, form_for, page_for, user_of
 from arena.site.pictures import shown_response
 from arena.studies.services.experts import answer_practice, is_due, practice_pairs, skip_practice
 from arena.voting.queries.ballots import own_votes
+from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import drives_of_pair, picture_shown
 from arena.voting.screen import over_context, vote_context
 
@@ -94,6 +95,7 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = over_context(study, expert) | {
         "pair": pair,
         "pairs": len(pairs),
+        "preferences": {**voting_switches(expert), "keys": KEYS},
         "is_told": answered is not None,
         "is_last": all(pair.answer for pair in pairs),
     }

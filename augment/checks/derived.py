@@ -397,6 +397,10 @@ def _sentence(
     if goal is TurnType.STRAIGHT:
         way = " The ego is to go straight on."
     lead = "Change the scene" if kind is None else _LEADS[kind]
+    if kind is ScenarioType.JAYWALKER and not any(
+        one.walk_to_m or one.id in wishes for one in others if one.type is AgentType.PEDESTRIAN
+    ):
+        lead = "Change the scene"  # nobody crosses
     return f"{lead}: {'; '.join(parts)}.{way}"
 
 

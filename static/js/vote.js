@@ -119,7 +119,7 @@ function afterwards() {
   const coming = pairs.list[review ? 0 : 1];
   coming?.warm();
   // A phone that is held upright shows a part of the picture: that with the change.
-  if (coming?.originals && upright.matches) compared(({ changeOf }) => changeOf(coming));
+  if (coming?.originals && upright.matches) compared(({ changeOf }) => changeOf(coming).catch(() => null));
 }
 
 // --- Deciding ------------------------------------------------------------------------------------

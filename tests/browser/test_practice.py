@@ -55,6 +55,17 @@ def test_practice_comes_first_and_only_once(wanted: Booth) -> None:
     expect(page.locator("#place")).to_have_text("1")
 
 
+def test_practice_is_answered_by_the_keys_that_answer_pairs(wanted: Booth) -> None:
+    page = wanted.visit("eva", wanted.path, {})
+    pair = practice_pairs(wanted.study, User.objects.get(username="eva"))[0]
+    expect(page.locator(".answers kbd:visible")).to_have_count(3)
+    page.wait_for_load_state("networkidle")
+    page.keyboard.press("1" if pair.good_is_left else "3")
+    expect(page.locator("#feedback-title")).to_contain_text("Right.")
+    page.keyboard.press("Enter")
+    expect(page.locator("#question")).to_contain_text("Practice 2 of 5.")
+
+
 @pytest.mark.parametrize(("theme", "size"), LOOKS)
 def test_practice_is_whole_on_every_window_and_axe_finds_nothing(
     wanted: Booth, theme: str, size: dict[str, int]

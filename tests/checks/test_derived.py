@@ -74,6 +74,17 @@ def test_what_is_added_moved_and_removed_is_said(
     assert set(statements) <= set(list_statements(intent))
 
 
+@pytest.mark.parametrize(
+    ("walk_to_m", "lead"),
+    [((12.0, -4.0), "Let somebody cross the road"), (None, "Change the scene")],
+)
+def test_only_who_walks_crosses(walk_to_m: tuple[float, float] | None, lead: str) -> None:
+    person = replace(vehicle("Added1", 12.0, 4.0), type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)
+    change = Modification(added=(person,))
+    sentence, _ = describe_change(ScenarioType.JAYWALKER, change, scene())
+    assert sentence.startswith(lead)
+
+
 def test_a_drawing_without_a_lane_for_the_ego_has_words_alone() -> None:
     change = Modification(added=(vehicle("Added1", 12.0, 2.0),))
     sentence, intent = describe_change(ScenarioType.NUDGE, change, scene(lanes=()))
