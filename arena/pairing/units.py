@@ -9,6 +9,7 @@ from collections import deque
 
 import numpy as np
 
+from arena.errors import NothingToPlan
 from arena.pairing.order import BoolArray, FloatArray, IntArray
 
 
@@ -143,6 +144,9 @@ def bring_together(
         showable: (P, S), where a unit can be.
         share: Of the judged units, from 0 to 1; a plan that has more keeps it.
         rng: Says which.
+
+    Raises:
+        NothingToPlan: One expert alone, or one with far more units than the others.
     """
     judges = chosen.sum(axis=0)
     idle = 0
@@ -153,6 +157,12 @@ def bring_together(
             for expert in rng.permutation(len(chosen))
             if not _is_reached(judges, share)
         )
+        if not moved and bring is _take_over:
+            raise NothingToPlan(
+                f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
+                f"more; {int((judges > 1).sum())} of {int((judges > 0).sum())} are reached. "
+                "Ask for less, or for more experts."
+            )
         idle = 0 if moved and idle < _TRIES else idle + 1
 
 

@@ -4,6 +4,7 @@ import math
 from collections import Counter, defaultdict
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from arena.errors import NothingToPlan
 from arena.pairing.order import MAIN
 from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
+from arena.pairing.units import bring_together
 from tests.pairing.studies import check_extras, pair, paper_rules
 from tests.properties import examples
 
@@ -127,3 +129,10 @@ def test_experts_of_whom_each_has_scenarios_and_pairs_of_their_own_share_some(
 def test_what_can_not_be_is_refused_with_numbers(wrong: dict[str, object], said: str) -> None:
     with pytest.raises(NothingToPlan, match=said):
         plan(replace(twelve_by_forty(0.0), **wrong))  # type: ignore[arg-type]
+
+
+def test_what_one_expert_alone_judges_can_not_be_brought_together() -> None:
+    chosen = np.zeros((2, 1, 8), dtype=bool)
+    chosen[0, 0, :6] = chosen[1, 0, :2] = True
+    with pytest.raises(NothingToPlan, match=r"50% are .* 2 of 6 are reached"):
+        bring_together(chosen, np.ones((1, 8), dtype=bool), 0.5, np.random.default_rng(1))
