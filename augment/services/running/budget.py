@@ -279,7 +279,9 @@ def raise_caps(job: GenerationJob, caps: Caps) -> None:
     for name, value in columns.items():
         current = getattr(job, name)
         if current is None or value <= current:
-            raise Conflict(f"A cap is raised, not added or lowered; the job's: {limit_of(job)}.")
+            raise Conflict(
+                f"Only a cap that the job has is raised, and must be higher: {limit_of(job)}."
+            )
         setattr(job, name, value)
     job.save(update_fields=list(columns))
 
