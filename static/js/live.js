@@ -41,7 +41,8 @@ function replace(old, fresh) {
     if (same) same.open = details.open;
   }
   const focused = old.contains(document.activeElement) ? document.activeElement.id : "";
-  old.replaceWith(document.adoptNode(fresh));
+  // What is as it was stays: pictures would load anew.
+  if (!fresh.isEqualNode(old)) old.replaceWith(document.adoptNode(fresh));
   shown = newest;
   if (focused) document.getElementById(focused)?.focus();
 }
