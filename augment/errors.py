@@ -227,6 +227,10 @@ class JobCancelled(Unwanted):
         super().__init__("The job was cancelled.")
 
 
+class QuestionInFlight(AugmentError):
+    """Somebody else has just asked the model the same: wait for that answer."""
+
+
 class Abandoned(ModelFault):
     """A call in flight was given up, because nobody needs its answer; it may be billed.
 

@@ -48,7 +48,11 @@ class Transcript(Protocol):
         ...
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
-        """Note that this request is about to be sent; returns the number of the call."""
+        """Note that this request is about to be sent; returns the number of the call.
+
+        Raises:
+            QuestionInFlight: Somebody else has just sent the same; its answer will be known.
+        """
         ...
 
     def sending(self, number: int) -> None:
@@ -218,6 +222,8 @@ class Respondents:
             except errors.ParameterRefused:
                 if client.fitted(request) == sent:
                     raise
+            except errors.QuestionInFlight:
+                continue  # the transcript waits for the answer
 
     def _attempt(self, role: ModelRole, request: Request, version: str) -> Reply:
         """Send the request as it is, as often as patience allows."""

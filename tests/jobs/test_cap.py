@@ -1,7 +1,9 @@
 """Eight workers and a cap that admits about half: never above it, and nothing paid twice."""
 
 import queue
+import time
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal
 
@@ -12,6 +14,7 @@ from django.db.models import Q
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
+from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import (
@@ -66,15 +69,22 @@ class Watcher:
 
 def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
     """Eight workers, each with what a queue hands it, until nothing is left to hand out."""
+    work_off(
+        AUGMENTATIONS.find_unsent(now=NOON, older_than=STALE, only=Q(job=job.pk)), model, watcher
+    )
+    job.refresh_from_db()
+
+
+def work_off(pks: list[int], model: Model, after_each: Callable[[], object]) -> None:
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for pk in AUGMENTATIONS.find_unsent(now=NOON, older_than=STALE, only=Q(job=job.pk)):
+    for pk in pks:
         waiting.put(pk)
 
     def work(number: int) -> None:
         try:
             while True:
                 runner.Augmentations(model).perform(waiting.get_nowait(), worker=f"{number}")
-                watcher()
+                after_each()
         except queue.Empty:
             return
         finally:
@@ -82,7 +92,6 @@ def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
 
     with ThreadPoolExecutor(max_workers=WORKERS) as pool:
         list(pool.map(work, range(WORKERS)))
-    job.refresh_from_db()
 
 
 @pytest.mark.parametrize("kind", ["usd", "calls", "tokens"])
@@ -114,6 +123,17 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     check_the_books(job)
     assert job.spent_calls == CALLS
     assert job.spent_tokens == job.spent_nano_usd // 1000 == CALLS * USED
+
+
+def test_what_eight_workers_ask_at_once_is_paid_once() -> None:
+    asked = JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"])
+    rounds = [llama_job(), *(jobs.launch(asked) for _ in range(WORKERS - 1))]
+    model = Model(looking_on=lambda: time.sleep(0.3))
+    rows = Augmentation.objects.filter(job__in=rounds)
+    work_off(list(rows.values_list("pk", flat=True)), model, lambda: None)
+    assert {row.state for row in rows} == {Augmentation.State.DONE}
+    assert len(model.requests) == 1
+    assert [call.is_cached for call in ModelCall.objects.order_by("pk")] == [False] + 7 * [True]
 
 
 def check_the_books(job: GenerationJob) -> None:

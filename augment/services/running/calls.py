@@ -2,7 +2,8 @@
 
 The request is stored and its worst case reserved before it is sent, the answer stored before it
 is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
-Faults are never served from the store; a served answer is served again from its source.
+Faults are never served from the store; a served answer is served again from its source. A question
+that is in flight for another row is not paid twice: its answer is waited for.
 """
 
 import logging
@@ -10,10 +11,12 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from datetime import timedelta
 from typing import Any, NamedTuple
 
+from django.conf import settings
 from django.db import OperationalError, connection, transaction
-from django.db.models import QuerySet
+from django.db.models import Q, QuerySet
 from django.utils import timezone
 
 from augment.errors import (
@@ -23,6 +26,7 @@ from augment.errors import (
     LeaseLost,
     ModelFault,
     NotSent,
+    QuestionInFlight,
 )
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
@@ -40,7 +44,7 @@ IMAGES = "asked"
 """The folder in the media storage of the images that models are shown."""
 
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
-"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
+"""Between looks at what calls in flight hold: room or an answer; and at a locked database."""
 
 STORE_WITHIN_S = 600.0
 """How long an answer that was paid for is held until a locked database stores it."""
@@ -134,20 +138,31 @@ class CallTranscript(ABC):
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
 
-    def answers_to(self, request_hash: str) -> QuerySet[ModelCall]:
-        """Return the calls whose answer may serve that request again."""
-        return ModelCall.objects.filter(
-            request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
-        )
+    def calls_with(self, request_hash: str) -> QuerySet[ModelCall]:
+        """Return the calls whose answer may serve that request again, once they have one."""
+        return ModelCall.objects.filter(request_hash=request_hash, served_from=None)
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """Return this request's earlier answer, recorded as a call that cost nothing.
 
+        An answer that is on its way to another row is waited for.
+
         Raises:
             LeaseLost: Another worker has the row now.
+            JobCancelled: Its job is cancelled.
+            WorkerStopping: This worker is to stop.
         """
         columns = self._columns(role, request, prompt_version)
-        earlier = self.answers_to(columns["request_hash"]).order_by("-pk").first()
+        useful = Q(answer__isnull=False, fault="") | _in_flight()
+        alike = self.calls_with(columns["request_hash"]).filter(useful)
+        alike = alike.alias(is_open=Q(settled_at=None)).order_by("is_open", "-pk")
+        wait_s = FIRST_WAIT_S
+        while (earlier := alike.first()) is not None and earlier.settled_at is None:
+            workers.insist_on_going_on()
+            with transaction.atomic():
+                self.insist()
+            self._sleep(wait_s)
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
         if earlier is None:
             return None
         now = timezone.now()
@@ -177,6 +192,7 @@ class CallTranscript(ABC):
             BudgetSpent: The job has no room for the call, and is stopped.
             WorkerStopping: This worker is to stop; what it was answered so far is kept.
             Conflict: The job is capped in USD and the price is unknown.
+            QuestionInFlight: Another row has just asked the same.
         """
         columns = self._columns(role, request, prompt_version)
         for message in request.messages:
@@ -274,6 +290,9 @@ class CallTranscript(ABC):
     ) -> tuple[budget.Room, int]:
         """Take room and write the row in one transaction, or nothing of both."""
         self.insist()
+        _hold_question(columns["request_hash"])
+        if self.calls_with(columns["request_hash"]).filter(_in_flight()).exists():
+            raise QuestionInFlight
         room = self.reserve(worst, price)
         if room != budget.Room.TAKEN:
             return room, 0
@@ -319,9 +338,9 @@ class RowTranscript(CallTranscript):
     def insist(self) -> None:
         insist_wanted(self._held, lock=True)
 
-    def answers_to(self, request_hash: str) -> QuerySet[ModelCall]:
+    def calls_with(self, request_hash: str) -> QuerySet[ModelCall]:
         """Return them; of a fresh job the row's own attempts' alone, each once, to be replayed."""
-        calls = super().answers_to(request_hash)
+        calls = super().calls_with(request_hash)
         if self._row.job.is_fresh:
             own = calls.filter(attempt__augmentation=self._row)
             calls = own.exclude(attempt=self._attempt).exclude(copies__attempt=self._attempt)
@@ -345,6 +364,19 @@ class RowTranscript(CallTranscript):
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _in_flight() -> Q:
+    """Return the condition of calls that may still be answered; those of dead workers grow old."""
+    longest_s = settings.LLM_QUEUE_S + settings.LLM_TIMEOUT_S
+    return Q(settled_at=None, started_at__gt=timezone.now() - timedelta(seconds=longest_s))
+
+
+def _hold_question(request_hash: str) -> None:
+    """Let nobody else ask the same until the transaction ends; SQLite's holds the whole file."""
+    if connection.vendor == "postgresql":
+        with connection.cursor() as cursor:
+            cursor.execute("SELECT pg_advisory_xact_lock(%s)", [int(request_hash[:15], 16)])
 
 
 def _columns_of(reply: Reply) -> dict[str, Any]:
