@@ -9,21 +9,24 @@ differ judge a lease alike.
 from __future__ import annotations
 
 import logging
+import sqlite3
+import time
 import uuid
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import timedelta
 from enum import StrEnum
+from functools import partial
 from threading import Event
 from typing import Any, Generic, TypeVar
 
 from django.conf import settings
-from django.db import Error, connection, transaction
+from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q, QuerySet
 
-from augment.errors import AugmentError, BudgetSpent, LeaseLost, WorkerStopping
+from augment.errors import AugmentError, BudgetSpent, DatabaseLocked, LeaseLost, WorkerStopping
 from augment.llm.messages import shorten
 from augment.models import FAILED, Work
 from augment.services.clock import DATABASE_TIME, Moment, repeating
@@ -32,6 +35,13 @@ from augment.services.texts import LONGEST_REASON, make_storable
 logger = logging.getLogger(__name__)
 
 Row = TypeVar("Row", bound=Work)
+Result = TypeVar("Result")
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
+"""Between looks at what others hold: a locked database, room for a call, its answer."""
+
+PATIENCE_S = 600.0
+"""How long a database that takes nothing is waited for."""
 
 FREE: Mapping[str, Any] = {"claim": None, "heartbeat_at": None}
 
@@ -231,27 +241,36 @@ class WorkKind(ABC, Generic[Row]):
         return Lease(kind=self, pk=pk, token=token)
 
     def perform(self, pk: int, *, worker: str = "") -> bool:
-        """Take a row and work on it. Returns whether it could be taken."""
-        held = self.take(pk, worker=worker)
-        if held is None:
-            return False
-        self.work(held)
-        return True
+        """Take a row and work on it, anew where the database was locked.
 
-    def work(self, held: Lease[Row]) -> None:
+        Returns:
+            Whether it could be taken.
+        """
+        give_up_at = time.monotonic() + PATIENCE_S
+        is_taken = False
+        while held := wait_out(partial(self.take, pk, worker=worker)):
+            is_taken = True
+            if self.work(held) or time.monotonic() > give_up_at:
+                break
+        return is_taken
+
+    def work(self, held: Lease[Row]) -> bool:
         """Work on a row that was taken; however the work ends, the row is settled or given back.
 
         An error with a sentence fails the row with it, an unforeseen one with its class and text.
         A worker that shuts down (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row
         back, and so does one whose job has no room for the next call. A lost lease ends quietly:
-        the new holder brings the outcome.
+        the new holder brings the outcome. A locked database is no outcome: the row is given back.
+
+        Returns:
+            Whether nothing but another message is left to do; False where the database was locked.
         """
         row = self.rows.select_related(*self.related).get(pk=held.pk)
         settled = None
         try:
             with held.kept_alive():
                 outcome = self.run(row, held)
-                if outcome is not None and held.settle(outcome):
+                if outcome is not None and wait_out(partial(held.settle, outcome)):
                     settled = outcome
         except LeaseLost as error:
             logger.warning("Stopped work on %s: %s", held, error)
@@ -263,6 +282,10 @@ class WorkKind(ABC, Generic[Row]):
         except AugmentError as error:
             held.settle(Settlement(state=FAILED, reason=str(error)))
         except Exception as error:
+            if is_passing(error):
+                logger.warning("Gave %s back: %s", held, error)
+                wait_out(partial(held.release, reason=f"The database was locked: {error}"))
+                return False
             logger.exception("Work on %s broke.", held)
             reason = f"unexpected: {type(error).__name__}: {error}"
             held.settle(Settlement(state=FAILED, reason=reason))
@@ -270,7 +293,8 @@ class WorkKind(ABC, Generic[Row]):
             held.release()
             raise
         finally:
-            self.over(row, settled)
+            wait_out(partial(self.over, row, settled))
+        return True
 
     def take_back_lost(self, *, now: Moment = DATABASE_TIME) -> list[int]:
         """Take back every lease that has gone silent; returns the rows that wait again."""
@@ -316,6 +340,38 @@ KINDS: dict[str, WorkKind[Any]] = {}
 def register(*kinds: WorkKind[Any]) -> None:
     """Let workers take these kinds, and recover what is lost of them."""
     KINDS.update({kind.name: kind for kind in kinds})
+
+
+def is_passing(error: Exception) -> bool:
+    """Return whether the same may succeed later: a lock, a deadlock, a full disk, no connection.
+
+    SQLite reports a statement that is wrong by the same class.
+    """
+    code = getattr(error.__cause__, "sqlite_errorcode", None)
+    return isinstance(error, OperationalError) and code != sqlite3.SQLITE_ERROR
+
+
+def wait_out(act: Callable[[], Result], *, sleep: Callable[[float], None] = time.sleep) -> Result:
+    """Return what a transaction returns, tried again for as long as the database is locked.
+
+    Raises:
+        DatabaseLocked: It took nothing for PATIENCE_S.
+    """
+    wait_s, waited_s = FIRST_WAIT_S, 0.0
+    while True:
+        try:
+            return act()
+        except OperationalError as error:
+            if not is_passing(error):
+                raise
+            if waited_s >= PATIENCE_S:
+                raise DatabaseLocked(str(error)) from error
+            logger.warning("The database takes nothing yet, trying again: %s", error)
+            if not connection.in_atomic_block:
+                connection.close_if_unusable_or_obsolete()
+        sleep(wait_s)
+        waited_s += wait_s
+        wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
 
 @transaction.atomic

@@ -1,5 +1,6 @@
 """A cancelled job frees the places of its calls in flight; what was paid for is counted, kept."""
 
+import sqlite3
 from datetime import timedelta
 from typing import Any
 
@@ -12,9 +13,10 @@ from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
 from augment.services.endpoints.client import Queue, place_at
-from augment.services.running import budget, jobs, runner
+from augment.services.running import budget, calls, jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.models import Wire, llama_job, ran, reply
+from augment.services.work import Lease
+from tests.jobs.models import Model, Wire, llama_job, ran, reply
 from tests.jobs.rows import only_row
 from tests.llm.raw_server import drip, head, speaking
 from tests.variants.playing import GOOD
@@ -88,11 +90,11 @@ def locked(times: int, function: Any) -> Any:
     """The function, that finds the database locked so many times first."""
     left = [times]
 
-    def called(**arguments: Any) -> Any:
+    def called(*given: Any, **named: Any) -> Any:
         if left[0] > 0:
             left[0] -= 1
             raise OperationalError("database is locked")
-        return function(**arguments)
+        return function(*given, **named)
 
     return called
 
@@ -129,9 +131,37 @@ def test_a_place_that_can_not_be_given_back_costs_no_answer(
     assert lease.expires_at < timezone.now() + timedelta(seconds=61)
 
 
-def test_a_database_that_stays_locked_is_a_named_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [
+        (runner.Augmentations, "take"),
+        (budget, "reserve"),
+        (calls.CallTranscript, "sending"),
+        (runner, "picture_of"),
+        (Lease, "settle"),
+        (jobs, "finish_if_over"),
+    ],
+)
+def test_a_lock_is_waited_out_and_is_never_an_outcome(
+    monkeypatch: pytest.MonkeyPatch, owner: Any, name: str
+) -> None:
     job = llama_job()
-    monkeypatch.setattr(budget, "reserve", locked(1, budget.reserve))
-    row = ran(only_row(job), Wire(GOOD))
-    assert row.state == State.FAILED
-    assert row.reason == "The database was locked for too long: database is locked."
+    monkeypatch.setattr(owner, name, locked(2, getattr(owner, name)))
+    model = Model()
+    row = ran(only_row(job), model)
+    job.refresh_from_db()
+    assert (row.state, row.reason) == (State.DONE, "")
+    assert len(model.requests) == 1
+    assert job.state == GenerationJob.State.FINISHED
+    assert {one.outcome for one in row.attempts.all()} <= {"done", "released"}
+    assert not ModelCall.objects.filter(settled_at=None).exists()
+
+
+def test_a_wrong_statement_is_no_lock(monkeypatch: pytest.MonkeyPatch) -> None:
+    def break_down(*_: object) -> None:
+        cause = sqlite3.OperationalError()
+        cause.sqlite_errorcode = sqlite3.SQLITE_ERROR
+        raise OperationalError("no such column") from cause
+
+    monkeypatch.setattr(runner, "picture_of", break_down)
+    assert ran(only_row(llama_job()), Model()).reason.startswith("unexpected: ")

@@ -11,12 +11,14 @@ import pytest
 from django.db import connection
 from django.db.models import Q
 
+from arena.voting.services import turns
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
+from tests.held_lock import kept_busy
 from tests.jobs.models import (
     COMPLETION_TOKENS,
     PROMPT_TOKENS,
@@ -75,7 +77,9 @@ def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
     job.refresh_from_db()
 
 
-def work_off(pks: list[int], model: Model, after_each: Callable[[], object]) -> None:
+def work_off(
+    pks: list[int], model: Model, after_each: Callable[[], object], *, workers: int = WORKERS
+) -> None:
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
     for pk in pks:
         waiting.put(pk)
@@ -90,8 +94,8 @@ def work_off(pks: list[int], model: Model, after_each: Callable[[], object]) -> 
         finally:
             connection.close()
 
-    with ThreadPoolExecutor(max_workers=WORKERS) as pool:
-        list(pool.map(work, range(WORKERS)))
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(work, range(workers)))
 
 
 @pytest.mark.parametrize("kind", ["usd", "calls", "tokens"])
@@ -134,6 +138,27 @@ def test_what_eight_workers_ask_at_once_is_paid_once() -> None:
     assert {row.state for row in rows} == {Augmentation.State.DONE}
     assert len(model.requests) == 1
     assert [call.is_cached for call in ModelCall.objects.order_by("pk")] == [False] + 7 * [True]
+
+
+@pytest.mark.sqlite
+def test_no_row_of_forty_workers_fails_by_a_lock() -> None:
+    job = llama_job(scenarios=48)
+    model = Model(looking_on=lambda: turns.limit_waiting(connection, 0.1))
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(hold_now_and_then)
+        work_off(list(job.augmentations.values_list("pk", flat=True)), model, int, workers=40)
+    assert set(job.augmentations.values_list("state", flat=True)) == {Augmentation.State.DONE}
+    assert len(model.requests) == 48
+
+
+def hold_now_and_then() -> None:
+    try:
+        for _ in range(8):
+            with kept_busy():
+                time.sleep(0.3)
+            time.sleep(0.2)
+    finally:
+        connection.close()
 
 
 def check_the_books(job: GenerationJob) -> None:

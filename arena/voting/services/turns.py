@@ -21,8 +21,8 @@ LOOK_EVERY_S = 0.001
 
 _SQLITE_TRANSIENT = {5, 6, 13}
 """Busy, locked, full: the primary result codes."""
-_POSTGRESQL_TRANSIENT = {"55P03", "40P01", "53100"}
-"""Lock not available, deadlock detected, disk full."""
+_POSTGRESQL_TRANSIENT = {"55P03", "40P01", "40001", "53100"}
+"""Lock not available, deadlock detected, not serializable, disk full."""
 
 
 @contextmanager

@@ -12,16 +12,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from datetime import timedelta
+from functools import partial
 from typing import Any, NamedTuple
 
 from django.conf import settings
-from django.db import OperationalError, connection, transaction
+from django.db import connection, transaction
 from django.db.models import Q, QuerySet
 from django.utils import timezone
 
 from augment.errors import (
     BudgetSpent,
-    DatabaseLocked,
     JobCancelled,
     LeaseLost,
     ModelFault,
@@ -35,19 +35,13 @@ from augment.services.endpoints.known_models import price_of
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
-from augment.services.work import Lease
+from augment.services.work import FIRST_WAIT_S, LONGEST_WAIT_S, Lease, wait_out
 from augment.variants.respondents import ModelRole, NoteKind
 
 logger = logging.getLogger(__name__)
 
 IMAGES = "asked"
 """The folder in the media storage of the images that models are shown."""
-
-FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
-"""Between looks at what calls in flight hold: room or an answer; and at a locked database."""
-
-STORE_WITHIN_S = 600.0
-"""How long an answer that was paid for is held until a locked database stores it."""
 
 _COPIED = (
     *("answer", "refusal", "extras", "model_returned", "finish_reason"),
@@ -248,25 +242,11 @@ class CallTranscript(ABC):
         self._settle(call.pk, used, columns)
 
     def _settle(self, call_pk: int, used: budget.Used, answer: dict[str, Any]) -> None:
-        """Store how a call ended. It was paid for, so a locked database is waited out.
-
-        Raises:
-            DatabaseLocked: It never took it.
-        """
-        wait_s, waited_s = FIRST_WAIT_S, 0.0
-        while True:
-            try:
-                budget.settle(call_pk=call_pk, used=used, now=timezone.now(), answer=answer)
-                return
-            except OperationalError as error:
-                if waited_s >= STORE_WITHIN_S:
-                    raise DatabaseLocked(f"the end of a call was not stored ({error})") from error
-                logger.warning("The end of a call is not stored yet, trying again: %s", error)
-                if not connection.in_atomic_block:
-                    connection.close_if_unusable_or_obsolete()
-            self._sleep(wait_s)
-            waited_s += wait_s
-            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+        """Store how a call ended. It was paid for, so a locked database is waited out."""
+        settle = partial(
+            budget.settle, call_pk=call_pk, used=used, now=timezone.now(), answer=answer
+        )
+        wait_out(settle, sleep=self._sleep)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
         """Return what a call's row says about the request, whoever answers it."""

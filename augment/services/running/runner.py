@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from django.conf import settings
-from django.db import Error, OperationalError
+from django.db import Error
 from django.db.models import Max, Q, QuerySet
 
 from augment.baselines.registry import PLACERS, RULE_PLACER
@@ -21,7 +21,6 @@ from augment.errors import (
     BudgetSpent,
     CannotPlace,
     Conflict,
-    DatabaseLocked,
     InvalidModification,
     JobCancelled,
     ModelFault,
@@ -130,9 +129,6 @@ class Augmentations(WorkKind[Augmentation]):
             reason = f"The modification does not fit the scene: {error}"
         except AugmentError as error:
             reason = str(error)
-        except OperationalError as error:
-            # What was answered is in its rows: a second try pays for none of it.
-            reason = str(DatabaseLocked(str(error)))
         return Settlement(state=State.FAILED, reason=reason)
 
     def begun(self, pk: int, worker: str, now: Moment) -> None:
