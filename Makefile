@@ -34,12 +34,13 @@ check: lint ## The quick round: style, floors, types and the tests of the pure p
 fuzz: $(VENV)/.test ## New random examples for every property, ten times as many as in `make test`
 	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz --randomly-seed=default
 
-lint: $(VENV)/.test ## Format, style, floors and types
+lint: $(VENV)/.test ## Format, style, floors, types and kubernetes.yaml
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/djlint templates --check --quiet
 	$(BIN)/lint-imports
 	$(BIN)/mypy
+	$(BIN)/kubernetes-validate --strict --quiet kubernetes.yaml
 	$(BIN)/python manage.py makemigrations --check --dry-run
 
 screenshots: chromium ## Every page, light and dark, into docs/images/pages

@@ -6,6 +6,7 @@ from django.conf import settings
 from django.core.files.uploadhandler import FileUploadHandler, SkipFile
 
 from arena.scenarios.services import FILE_TOO_LARGE
+from arena.serving.web_worker import CUT
 
 
 class BoundedUpload(FileUploadHandler):
@@ -17,9 +18,10 @@ class BoundedUpload(FileUploadHandler):
     _left = 0
 
     def new_file(self, *arguments: Any, **named: Any) -> None:
-        """Begin to count."""
+        """Begin to count; of a body that was cut no file is whole for sure."""
         super().new_file(*arguments, **named)
-        self._left = settings.UPLOAD_MB * 1_000_000
+        is_cut = self.request is not None and f"HTTP_{CUT}" in self.request.META
+        self._left = 0 if is_cut else settings.UPLOAD_MB * 1_000_000
 
     def receive_data_chunk(self, raw_data: bytes, start: int) -> bytes:
         """Hand the piece on, or skip what is left of the file."""

@@ -10,8 +10,11 @@ import os
 import time
 from typing import Any
 
+from django.conf import settings
 from gunicorn.workers.base import Worker
+from waitress.buffers import OverflowableBuffer
 from waitress.channel import HTTPChannel
+from waitress.parser import HTTPRequestParser
 from waitress.server import create_server
 from waitress.wasyncore import loop
 
@@ -27,15 +30,59 @@ IDLE_S = 60
 CONNECTIONS = 250
 """So many a process holds: each takes up to three of the 1024 files that are usual."""
 
-LARGEST_BODY = 64 * 1024 * 1024
+FORM_BYTES = 4_000_000
+"""What a form may hold beside a file of ARENA_UPLOAD_MB."""
+
+CUT = "X_BODY_CUT"
+"""The header that says that a body was larger: all of it came in, its beginning is handed on."""
+
+LARGEST_BODY = 8 * 1024 * 1024 * 1024
+"""A longer one is not even read to its end, so its sender may see no answer."""
+
 LARGEST_HEADER = 64 * 1024
 KEPT_ANSWER = 1024 * 1024 * 1024
 """So many bytes of one answer wait for a slow reader, beyond the first of them on disk."""
 
 
-class Connection(HTTPChannel):  # type: ignore[misc] # Waitress has no types
+class CutBuffer(OverflowableBuffer):  # type: ignore[misc] # Waitress has no types
+    """A buffer that drops what is beyond its most bytes."""
+
+    def __init__(self, overflow: int, most: int) -> None:
+        super().__init__(overflow)
+        self.most, self.is_cut = most, False
+
+    def append(self, data: bytes) -> None:
+        """Keep what there is room for."""
+        room = self.most - len(self)
+        self.is_cut |= len(data) > room
+        super().append(data[:room])
+
+
+class WholeRequest(HTTPRequestParser):  # type: ignore[misc]
+    """A request whose body is read to its end even if it is too large.
+
+    Closing the connection on a sender would reset it before the answer is read.
+    """
+
+    def parse_header(self, header_plus: bytes) -> None:
+        """Read the header; give the body a buffer with a limit."""
+        super().parse_header(header_plus)
+        if self.body_rcv is not None:
+            most = settings.UPLOAD_MB * 1_000_000 + FORM_BYTES
+            self.body_rcv.buf = CutBuffer(self.adj.inbuf_overflow, most)
+
+    def received(self, data: bytes) -> int:
+        """Take what came in; Waitress's own reading."""
+        consumed = int(super().received(data))
+        if self.completed and self.body_rcv is not None and self.body_rcv.buf.is_cut:
+            self.headers |= {CUT: "1", "CONTENT_LENGTH": str(len(self.body_rcv))}
+        return consumed
+
+
+class Connection(HTTPChannel):  # type: ignore[misc]
     """A connection that knows when its request began, and how much of it came in."""
 
+    parser_class = WholeRequest
     began_at = 0.0
     came_in = 0
 

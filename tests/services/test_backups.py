@@ -128,31 +128,40 @@ def a_new_database(folder: Path) -> Iterator[str]:
             cursor.execute(f"DROP DATABASE {name} WITH (FORCE)")
 
 
+def command_on(url: str, folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        env=os.environ
+        | {
+            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
+            "DATABASE_URL": url,
+            "ARENA_VAR_DIR": str(folder / "new"),
+            "ARENA_MEDIA_DIR": str(folder / "new-media"),
+        },
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
 def test_a_restore_that_was_killed_while_it_made_tables_is_repeated(tmp_path: Path) -> None:
     backup = str(tmp_path / "b.zip")
     take_backup(Path(backup), now=NOW, say=quiet)
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, *arguments],
-            cwd=ROOT,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
     with a_new_database(tmp_path) as url:
-        environment = os.environ | {
-            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
-            "DATABASE_URL": url,
-            "ARENA_VAR_DIR": str(tmp_path / "new"),
-            "ARENA_MEDIA_DIR": str(tmp_path / "new-media"),
-        }
-        killed = run("-c", RESTORE_KILLED_WITHIN_A_MIGRATION, backup)
-        assert killed.returncode == -signal.SIGKILL, killed.stderr
-        repeated = run("manage.py", "restore", backup)
-        assert "Restored." in repeated.stdout, repeated.stderr
+        killed = command_on(url, tmp_path, "-c", RESTORE_KILLED_WITHIN_A_MIGRATION, backup)
+        assert (killed.communicate()[1], killed.returncode) == ("", -signal.SIGKILL)
+        said, faults = command_on(url, tmp_path, "manage.py", "restore", backup).communicate()
+        assert "Restored." in said, faults
+
+
+def test_three_prepare_an_empty_database_at_once(tmp_path: Path) -> None:
+    with a_new_database(tmp_path) as url:
+        started = [command_on(url, tmp_path, "manage.py", "prepare") for _ in range(3)]
+        ended = [(process.communicate()[1], process.returncode) for process in started]
+        assert [code for _, code in ended] == [0, 0, 0], [faults for faults, _ in ended]
+        check = command_on(url, tmp_path, "manage.py", "migrate", "--check")
+        assert (*check.communicate(), check.returncode) == ("", "", 0)
 
 
 def test_others_write_on_while_a_backup_reads_one_moment() -> None:

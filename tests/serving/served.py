@@ -12,7 +12,7 @@ Start = Callable[[str, list[tuple[str, str]]], object]
 
 
 def application(environ: dict[str, Any], start_response: Start) -> Iterable[bytes]:
-    """/ says hello, POST / the length of the body, /long is long, /held waits for a file."""
+    """/ says hello, POST / the length of the body and if it was cut, /long is long, /held waits for a file."""
     start_response("200 OK", [("Content-Type", "text/plain")])
     if environ["PATH_INFO"] == "/long":
         return (b"x" * 65_536 for _ in range(LONG // 65_536))
@@ -23,5 +23,6 @@ def application(environ: dict[str, Any], start_response: Start) -> Iterable[byte
             time.sleep(0.01)
         return [b"held"]
     if environ["REQUEST_METHOD"] == "POST":
-        return [str(len(environ["wsgi.input"].read())).encode()]
+        found = (len(environ["wsgi.input"].read()), environ.get("HTTP_X_BODY_CUT"))
+        return [" ".join(map(str, found)).encode()]
     return [environ.get("HTTP_X_FORWARDED_FOR", "hello").encode()]

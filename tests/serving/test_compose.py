@@ -1,5 +1,6 @@
 """compose.yaml and the image hang together; they can't be built everywhere, so they are read."""
 
+import re
 from typing import Any
 
 import pytest
@@ -8,6 +9,7 @@ from django.conf import settings
 
 from arena.config.env import Environment, read_environment
 from arena.serving.stack import Web, background, web_server
+from tests.house.source import PRODUCT
 from tests.processes import ROOT
 from tests.stack import free_port
 
@@ -68,6 +70,19 @@ def test_the_image_runs_as_nobody_special() -> None:
     )
 
 
+def test_the_image_gets_by_name_what_the_product_reads_and_nothing_else() -> None:
+    copied = re.findall(r"^COPY (.+) \S+$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    names = {name for line in copied for name in line.split()}
+    sources = [path.read_text() for package in PRODUCT for path in (ROOT / package).rglob("*.py")]
+    read = set(re.findall(r'BASE_DIR / "([\w.]+)"', "".join(sources))) - {"var", "media"}
+    assert {"templates", "fixtures", "pyproject.toml"} <= read
+    assert names == read | {*PRODUCT, "requirements.txt"}
+    ignored = (ROOT / ".dockerignore").read_text().split()
+    assert ignored[0] == "*"
+    assert {line[1:] for line in ignored if line.startswith("!")} == names
+    assert "**/.env*" in ignored
+
+
 def test_kubernetes_runs_what_compose_runs(services: dict[str, Any]) -> None:
     documents = list(yaml.safe_load_all((ROOT / "kubernetes.yaml").read_text()))
     pods = {
@@ -81,6 +96,15 @@ def test_kubernetes_runs_what_compose_runs(services: dict[str, Any]) -> None:
         assert command.endswith(" ".join(services[name]["command"].split()))
         grace_s = pods[pod]["terminationGracePeriodSeconds"]
         assert grace_s == seconds(services[name]["stop_grace_period"])
+        ready = pods[pod]["containers"][0]
+        assert {"readinessProbe", "livenessProbe"} <= ready.keys()
+        assert "migrate --check" in pods[pod]["initContainers"][0]["command"][-1]
+    for pod in pods.values():
+        assert pod["securityContext"]["runAsNonRoot"]
+        for container in (*pod["containers"], *pod.get("initContainers", ())):
+            assert container["securityContext"]["readOnlyRootFilesystem"]
+            assert not container["securityContext"]["allowPrivilegeEscalation"]
+            assert {"cpu", "memory"} == container["resources"]["limits"].keys()
     assert pods["arena-prepare"]["containers"][0]["command"] == ["python", "manage.py", "prepare"]
     values = [one for one in documents if one["kind"] in ("Secret", "ConfigMap")]
     named = {name for one in values for name in (one.get("stringData") or one["data"])}

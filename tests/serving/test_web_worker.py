@@ -49,7 +49,7 @@ def serving(folder: Path) -> Iterator[Served]:
             *("--bind", f"127.0.0.1:{port}", "--workers", "1", "--threads", "2"),
             *("--worker-tmp-dir", str(folder), "--no-control-socket"),
         ],
-        environment={**os.environ, "HELD": str(folder)},
+        environment={**os.environ, "HELD": str(folder), "ARENA_UPLOAD_MB": "1"},
         log=folder / "web.log",
     )
     try:
@@ -84,6 +84,27 @@ def test_slow_connections_block_nobody(served: Served, count: int, beginning: by
 
 def test_headers_of_proxies_are_left_to_the_settings(served: Served) -> None:
     assert served.get(headers={"X-Forwarded-For": "192.0.2.7"}) == b"192.0.2.7"
+
+
+@pytest.mark.parametrize(
+    ("size", "is_chunked", "answer"),
+    [
+        (5_000_000, False, b"5000000 None"),
+        (5_000_000, True, b"5000000 None"),
+        (5_000_001, False, b"5000000 1"),
+        (90_000_000, False, b"5000000 1"),
+        (90_000_000, True, b"5000000 1"),
+    ],
+)
+def test_a_body_beyond_the_limit_is_answered_and_never_reset(
+    served: Served, size: int, is_chunked: bool, answer: bytes
+) -> None:
+    wire = http.client.HTTPConnection("127.0.0.1", served.port, timeout=GENEROUS_S)
+    body = [b"x" * 1_000_000] * (size // 1_000_000) if is_chunked else b"x" * size
+    with closing(wire):
+        for _ in range(2):  # the connection is as good as before
+            wire.request("POST", "/", body=body, encode_chunked=is_chunked)
+            assert wire.getresponse().read() == answer
 
 
 # --- Which connections are closed ----------------------------------------------------------------

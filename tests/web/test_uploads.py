@@ -89,6 +89,10 @@ def test_a_file_that_is_too_large_is_not_kept(researcher: Client, settings: Lazy
     shown = send(researcher, b" " * 1_000_001)
     assert "files of at most 1 MB" in shown
     assert not SceneUpload.objects.exists()
+    cut = {"file": SimpleUploadedFile("cut.json", STREET)}
+    page = researcher.post(reverse("scene-send"), cut, headers={"X-Body-Cut": "1"}, follow=True)
+    assert "files of at most 1 MB" in page.content.decode(), "the web server dropped the rest"
+    assert not SceneUpload.objects.exists()
     assert "Use this moment" in send(researcher, STREET + b" " * (1_000_000 - len(STREET)))
 
 

@@ -1,14 +1,22 @@
 """`manage.py prepare`: bring tables, files and texts up to date; again, it changes nothing."""
 
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from django.conf import settings
 from django.core.management import call_command
+from django.db import connection
 
 from arena.management.catalogue import compile_catalogue
 from arena.scenarios.services import redraw_pictures
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.terminal import TerminalCommand
+
+ADVISORY_LOCK = 7_264_101
+"""Of PostgreSQL, per database; any number that nothing else on it uses."""
 
 
 class Command(TerminalCommand):
@@ -20,11 +28,28 @@ class Command(TerminalCommand):
     )
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Apply and collect."""
-        call_command("migrate", interactive=False, verbosity=0)
-        ensure_builtin()
-        settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
-        call_command("collectstatic", interactive=False, verbosity=0)
-        compile_catalogue()
-        for slug, drawn in redraw_pictures():
-            self.stdout.write(f"Pictures of {slug} that were drawn anew: {drawn}")
+        """Apply and collect, one process after the other."""
+        with _lock_database():
+            call_command("migrate", interactive=False, verbosity=0)
+            ensure_builtin()
+            settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
+            call_command("collectstatic", interactive=False, verbosity=0)
+            compile_catalogue()
+            for slug, drawn in redraw_pictures():
+                self.stdout.write(f"Pictures of {slug} that were drawn anew: {drawn}")
+
+
+@contextmanager
+def _lock_database() -> Iterator[None]:
+    """Keep out every other `prepare` on this database; a killed one lets the next in."""
+    if connection.vendor == "sqlite":
+        with Path(f"{connection.settings_dict['NAME']}-prepare").open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+        return
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT pg_advisory_lock(%s)", [ADVISORY_LOCK])
+        try:
+            yield
+        finally:
+            cursor.execute("SELECT pg_advisory_unlock(%s)", [ADVISORY_LOCK])

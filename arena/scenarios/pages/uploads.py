@@ -64,7 +64,7 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
             kept.append(row)
     if was_too_large(request.META) or not request.FILES:
         raise Conflict(
-            f"Choose files of at most {uploads.most_megabytes()} MB each; a zip may be smaller."
+            f"Choose files of at most {uploads.most_megabytes()} MB together; a zip may be smaller."
         )
     return redirect("upload", code=kept[0].code) if len(kept) == 1 else None
 
