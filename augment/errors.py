@@ -260,19 +260,15 @@ class KeyMissing(AugmentError):
 
 
 class KeyNotAllowed(AugmentError):
-    """An endpoint names an environment variable that is not meant for keys. Nothing was read.
+    """An endpoint may not be sent the variable that it names. Nothing was read.
 
     Args:
-        variable: Its name.
-        endpoint: The label of the endpoint that names it.
-        rule: Which may be named.
+        endpoint: The label of the endpoint.
+        obstacle: The variable's name, and why.
     """
 
-    def __init__(self, variable: str, endpoint: str, rule: str) -> None:
-        super().__init__(
-            f"Endpoint {endpoint!r} names the environment variable {variable}, which may not be "
-            f"sent to an endpoint: {rule} is needed."
-        )
+    def __init__(self, endpoint: str, obstacle: str) -> None:
+        super().__init__(f"The key of endpoint {endpoint!r} is not sent: {obstacle}.")
 
 
 class DatabaseLocked(AugmentError):

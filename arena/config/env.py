@@ -82,11 +82,13 @@ def read_media(url: str) -> dict[str, Any]:
 Folder = Annotated[Path, AfterValidator(_open_folder)]
 Origin = Annotated[str, _like(r"https?://[^/\s]+", "use https://NAME")]
 Planner = Annotated[str, _like(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", "use PACKAGE.MODULE.CLASS")]
+_HOST = r"(\[[\da-fA-F:]+\]|[^\s/\\@?#|=:\[\]]+)(:\d{1,5})?"
 KeyVariable = Annotated[
     str,
     _like(
-        r"(?!ARENA_|DATABASE_URL$|REDIS_URL$|AWS_)[A-Za-z_]\w*",
-        "use the name of a variable that is no secret of the product itself",
+        r"(?!ARENA_|(DATABASE|REDIS)_URL(=|$)|AWS_)[A-Za-z_]\w*"
+        rf"(={_HOST}(\|{_HOST})*)?",
+        "use NAME=HOST|HOST with the name of a variable that is no secret of the product itself",
     ),
 ]
 Comma = BeforeValidator(_split)

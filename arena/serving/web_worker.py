@@ -45,15 +45,13 @@ KEPT_ANSWER = 1024 * 1024 * 1024
 
 
 class CutBuffer(OverflowableBuffer):  # type: ignore[misc] # Waitress has no types
-    """A buffer that drops what is beyond its most bytes."""
+    """A buffer that drops what is beyond the largest upload and its form."""
 
-    def __init__(self, overflow: int, most: int) -> None:
-        super().__init__(overflow)
-        self.most, self.is_cut = most, False
+    is_cut = False
 
     def append(self, data: bytes) -> None:
         """Keep what there is room for."""
-        room = self.most - len(self)
+        room = settings.UPLOAD_MB * 1_000_000 + FORM_BYTES - len(self)
         self.is_cut |= len(data) > room
         super().append(data[:room])
 
@@ -64,18 +62,13 @@ class WholeRequest(HTTPRequestParser):  # type: ignore[misc]
     Closing the connection on a sender would reset it before the answer is read.
     """
 
-    def parse_header(self, header_plus: bytes) -> None:
-        """Read the header; give the body a buffer with a limit."""
-        super().parse_header(header_plus)
-        if self.body_rcv is not None:
-            most = settings.UPLOAD_MB * 1_000_000 + FORM_BYTES
-            self.body_rcv.buf = CutBuffer(self.adj.inbuf_overflow, most)
-
     def received(self, data: bytes) -> int:
         """Take what came in; Waitress's own reading."""
-        consumed = int(super().received(data))
-        if self.completed and self.body_rcv is not None and self.body_rcv.buf.is_cut:
-            self.headers |= {CUT: "1", "CONTENT_LENGTH": str(len(self.body_rcv))}
+        consumed, body = int(super().received(data)), self.body_rcv
+        if body is not None and not self.body_bytes_received:
+            body.buf = CutBuffer(self.adj.inbuf_overflow)
+        elif self.completed and body is not None and body.buf.is_cut:
+            self.headers |= {CUT: "1", "CONTENT_LENGTH": str(len(body))}
         return consumed
 
 

@@ -202,6 +202,21 @@ class Transport(AbstractContextManager["Transport"]):
         self._pool.close()
 
 
+def server_of(base_url: str) -> str:
+    """Return `host:port` as the wire connects to it, empty for what it can't read.
+
+    Read by the package that connects, so that no spelling means one host here and another there.
+    """
+    import httpx2
+
+    try:
+        url = httpx2.URL(base_url)
+    except httpx2.InvalidURL:
+        return ""
+    host = url.raw_host.decode("ascii").lower().removesuffix(".")
+    return f"{host}:{url.port or (80 if url.scheme == 'http' else 443)}" if host else ""
+
+
 # --- Private -----------------------------------------------------------------------------------
 
 _OF_THE_TRANSFER = (b"content-encoding", b"content-length", b"transfer-encoding")

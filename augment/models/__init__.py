@@ -6,7 +6,14 @@ a URL has a random `code`; primary keys stay inside.
 
 from augment.models.benchmarks import Benchmark, BenchmarkItem
 from augment.models.budgets import Budgeted
-from augment.models.contestants import CallLease, Contestant, Endpoint, EndpointModel, Probe
+from augment.models.contestants import (
+    CallLease,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    KeyBinding,
+    Probe,
+)
 from augment.models.jobs import (
     Attempt,
     Augmentation,

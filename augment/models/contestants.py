@@ -48,6 +48,21 @@ class Endpoint(models.Model):
         return self.label
 
 
+class KeyBinding(models.Model):
+    """A server that a key may go to, written once by the upgrade that began to bind keys."""
+
+    variable = models.CharField(max_length=80)
+    server = models.CharField(max_length=300, help_text="host:port")
+
+    class Meta:
+        constraints = (
+            models.UniqueConstraint(name="a_key_is_bound_once", fields=("variable", "server")),
+        )
+
+    def __str__(self) -> str:
+        return f"{self.variable}={self.server}"
+
+
 class EndpointModel(models.Model):
     """What is known of one model at one endpoint. Unknown is null, never guessed, never zero."""
 

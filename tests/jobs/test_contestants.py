@@ -1,16 +1,19 @@
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from decimal import Decimal
+from importlib import import_module
 from io import StringIO
 from typing import Any
 
 import pytest
+from django.apps import apps
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import ChatClient
 from augment.llm.openai_wire import OpenAIWire
+from augment.llm.wire_transport import server_of
 from augment.models import (
     Augmentation,
     Contestant,
@@ -27,6 +30,7 @@ from augment.services.endpoints.known_endpoints import (
     EndpointRequest,
     change_endpoint,
     ensure_endpoint,
+    find_key_obstacle,
     may_hold_key,
 )
 from augment.services.running import jobs, runner
@@ -158,7 +162,7 @@ def test_a_variable_that_is_not_for_keys_is_never_read(
     row.refresh_from_db()
     assert server.heard == []
     assert row.state == Augmentation.State.FAILED
-    assert f"names the environment variable {variable}, which may not be sent" in row.reason
+    assert f"{variable} may not be sent to an endpoint" in row.reason
     assert "the-crown-jewels" not in row.reason
 
 
@@ -166,27 +170,90 @@ def test_a_variable_that_is_not_for_keys_is_never_read(
 
 
 @pytest.mark.parametrize(
-    ("base_url", "key_variable", "moves"),
+    ("hosts", "base_url", "is_bound"),
     [
-        ("https://thief.example/v1", "MY_API_KEY", True),
-        ("https://thief.example/v1", "OTHER_API_KEY", True),
-        ("http://models.example/v1", "MY_API_KEY", True),
-        ("https://models.example:8443/v1", "MY_API_KEY", True),
-        ("https://models.example.evil/v1", "MY_API_KEY", True),
-        ("https://thief.example/v1", "", False),
-        ("https://models.example/v2", "MY_API_KEY", False),
-        ("https://models.example/v1", "OTHER_API_KEY", False),
+        ("models.example", "https://models.example/v1", True),
+        ("Models.Example.", "https://MODELS.example.:8443/v1", True),
+        ("models.example:443", "https://models.example/v2", True),
+        ("models.example:443", "https://models.example:8443/v1", False),
+        ("models.example:443", "http://models.example/v1", False),
+        ("models.example", "https://models.example.thief/v1", False),
+        ("models.example", "https://thief-models.example/v1", False),
+        ("models.example", "https://thief.models.example/v1", False),
+        ("models.example", "https://models.example@thief.example/v1", False),
+        ("models.example", "https://models.example:443@thief.example/v1", False),
+        ("models.example", "https://thief.example/models.example/v1", False),
+        ("models.example", "https://thief.example?models.example", False),
+        ("models.example", "https://models.example%2ethief.example/v1", False),
+        ("b\u00fccher.example", "https://xn--bcher-kva.example/v1", True),
+        ("xn--bcher-kva.example", "https://b\u00fccher.example/v1", True),
+        ("strasse.example", "https://stra\u00dfe.example/v1", False),
+        ("models.example", "https://\uff4dodels.example/v1", False),
+        ("a.example|b.example:8000", "http://b.example:8000/v1", True),
+        ("a.example|b.example:8000", "http://b.example:8001/v1", False),
+        ("[::1]:8080", "http://[::1]:8080/v1", True),
+        ("127.0.0.1", "http://localhost/v1", False),
+        ("", "https://models.example/v1", False),
     ],
 )
-def test_a_key_never_goes_to_another_server(base_url: str, key_variable: str, moves: bool) -> None:
-    row = Endpoint.objects.create(
-        label="local", base_url="https://models.example/v1", key_variable="MY_API_KEY"
-    )
-    facts = EndpointFacts(base_url=base_url, key_variable=key_variable)
-    with pytest.raises(Conflict, match="must not go") if moves else nullcontext():
-        change_endpoint(row, facts=facts)
+def test_a_key_goes_to_the_hosts_alone_that_it_is_bound_to(
+    settings: Any, hosts: str, base_url: str, is_bound: bool
+) -> None:
+    settings.KEY_VARIABLES = [f"LAB_TOKEN={hosts}".removesuffix("="), "OTHER_TOKEN=other.example"]
+    assert (find_key_obstacle("LAB_TOKEN", base_url) == "") is is_bound
+    assert find_key_obstacle("OTHER_TOKEN", base_url)
+    assert find_key_obstacle("", base_url) == ""
+
+
+def test_a_known_vendor_s_key_is_bound_without_being_told(settings: Any) -> None:
+    vendor = "https://api.openai.com/v1"
+    assert find_key_obstacle("OPENAI_API_KEY", vendor) == ""
+    for other in ("http://api.openai.com/v1", "https://api.groq.com/openai/v1", LOCAL):
+        assert "not bound to" in find_key_obstacle("OPENAI_API_KEY", other)
+    settings.KEY_VARIABLES = ["OPENAI_API_KEY=proxy.example"]
+    assert find_key_obstacle("OPENAI_API_KEY", "https://proxy.example/v1") == ""
+    assert find_key_obstacle("OPENAI_API_KEY", vendor), "the proxy's key is not for the vendor"
+
+
+def test_the_upgrade_binds_a_key_to_where_it_goes_today() -> None:
+    for label, base_url in (
+        ("one", "https://One.example/v1"),
+        ("two", "http://two.example:81/v1"),
+    ):
+        Endpoint.objects.create(label=label, base_url=base_url, key_variable="OLD_API_KEY")
+    import_module("augment.migrations.0038_key_bindings").bind_keys(apps, None)
+    for same in ("https://one.example/v2", "http://two.example:81/v1"):
+        assert find_key_obstacle("OLD_API_KEY", same) == ""
+    for other in ("https://two.example/v1", "https://one.example:81/v1"):
+        wanted = "whoever runs the server and its workers sets ARENA_KEY_VARIABLES=OLD_API_KEY="
+        assert wanted in find_key_obstacle("OLD_API_KEY", other)
+
+
+@pytest.mark.parametrize("variable", ["OPENAI_API_KEY", "LAB_API_KEY", "UNBOUND_API_KEY"])
+@pytest.mark.parametrize("redirects", [False, True])
+def test_another_server_never_receives_a_key(
+    settings: Any, monkeypatch: pytest.MonkeyPatch, variable: str, redirects: bool
+) -> None:
+    monkeypatch.setenv(variable, "sk-very-secret")
+    row = only_row(llama_job())
+    with (
+        recorder() as thief,
+        recorder(307, {}, {"Location": f"{thief.url}/chat/completions"}) as home,
+    ):
+        settings.KEY_VARIABLES = [f"LAB_API_KEY={server_of(home.url)}"]
+        # As if it were written into the table by hand, or changed after the key was entered.
+        address = home.url if redirects else thief.url
+        Endpoint.objects.update(base_url=address, key_variable=variable)
+        runner.AUGMENTATIONS.perform(row.pk)
+        assert thief.heard == []
+        assert bool(home.heard) is (redirects and variable == "LAB_API_KEY")
+        for endpoint in Endpoint.objects.all():
+            facts = EndpointFacts(base_url=thief.url, key_variable=variable)
+            with pytest.raises(InvalidDocument, match=f"{variable} is not bound to 127.0.0.1:"):
+                change_endpoint(endpoint, facts=facts)
     row.refresh_from_db()
-    assert (row.base_url == base_url) is not moves
+    assert row.state == Augmentation.State.FAILED
+    assert "sk-very-secret" not in row.reason
 
 
 @pytest.fixture(scope="module")

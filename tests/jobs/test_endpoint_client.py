@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
+from django.conf import LazySettings
 
 from augment.errors import KeyMissing
 from augment.llm.client import Patience
@@ -86,7 +87,8 @@ def test_a_worker_goes_through_the_limits_and_the_profile() -> None:
     assert row.state == Augmentation.State.UNREADABLE
 
 
-def test_a_missing_key_is_found_before_a_place_is_taken() -> None:
+def test_a_missing_key_is_found_before_a_place_is_taken(settings: LazySettings) -> None:
+    settings.KEY_VARIABLES = ["NOT_SET_API_KEY=127.0.0.1"]
     endpoint = Endpoint.objects.create(
         label="local", base_url="http://127.0.0.1:1/v1", key_variable="NOT_SET_API_KEY"
     )

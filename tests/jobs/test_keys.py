@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from django.apps import apps
+from django.conf import LazySettings
 from django.urls import reverse
 
 from augment.models import Augmentation, Endpoint, ModelCall
@@ -45,9 +46,14 @@ def every_stored_value() -> Iterator[str]:
 
 @pytest.mark.parametrize(("status", "body"), [(200, ECHO), (401, REFUSED)])
 def test_a_planted_key_is_found_nowhere(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, status: int, body: object
+    settings: LazySettings,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    status: int,
+    body: object,
 ) -> None:
     monkeypatch.setenv("PLANTED_API_KEY", KEY)
+    settings.KEY_VARIABLES = ["PLANTED_API_KEY=127.0.0.1"]
     caplog.set_level(logging.DEBUG)
     row = only_row(llama_job())
     with recorder(status, body) as server:

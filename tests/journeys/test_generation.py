@@ -181,6 +181,7 @@ def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
 def test_the_command_waits_for_the_job_and_reports(place: Machine, model: WaitingModel) -> None:
     """What was done by its table; a failure by its reason, and ends with 1."""
     model.gate.set()
+    place.environment["ARENA_KEY_VARIABLES"] = "NO_SUCH_API_KEY=127.0.0.1"
     facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
     address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_API_KEY")
     chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")

@@ -69,7 +69,9 @@ def test_no_worker_is_worse_while_a_job_runs(state: str, level: Level) -> None:
     assert wrong() == {"workers": level}
 
 
-def test_a_key_that_is_not_set_is_named() -> None:
+@pytest.mark.parametrize("hosts", ["", "=api.example.org"])
+def test_a_key_that_is_not_set_or_not_bound_is_named(settings: Settings, hosts: str) -> None:
+    settings.KEY_VARIABLES = [f"NOBODY_API_KEY{hosts}"]
     Endpoint.objects.create(
         label="vendor", base_url="https://api.example.org/v1", key_variable="NOBODY_API_KEY"
     )

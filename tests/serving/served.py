@@ -12,7 +12,7 @@ Start = Callable[[str, list[tuple[str, str]]], object]
 
 
 def application(environ: dict[str, Any], start_response: Start) -> Iterable[bytes]:
-    """/ says hello, POST / the length of the body and if it was cut, /long is long, /held waits for a file."""
+    """/ says hello, POST / how long the body is and if cut, /long is long, /held waits."""
     start_response("200 OK", [("Content-Type", "text/plain")])
     if environ["PATH_INFO"] == "/long":
         return (b"x" * 65_536 for _ in range(LONG // 65_536))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from decimal import Decimal
 
 import pytest
+from django.conf import LazySettings
 from django.test import Client
 from django.urls import reverse
 
@@ -28,7 +29,8 @@ GIVEN = {
 
 
 @pytest.fixture
-def admin() -> Client:
+def admin(settings: LazySettings) -> Client:
+    settings.KEY_VARIABLES = ["HERE_API_KEY=127.0.0.1:9"]
     return signed_in(people()["admin"])
 
 
@@ -75,6 +77,7 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
         ("base_url", "http://169.254.169.254/v1", "no model is served from there"),
         ("base_url", "https://me:secret@x.example/v1", "Keys and passwords don&#x27;t belong"),
         ("key_variable", "DJANGO_SECRET_KEY", "may not be sent to an endpoint"),
+        ("key_variable", "OPENAI_API_KEY", "OPENAI_API_KEY is not bound to 127.0.0.1:9"),
         ("key_variable", "sk-abc", "The name of an environment variable is needed, not the key"),
         ("max_concurrency", "0", "greater than or equal to 1"),
         ("requests_per_minute", "0", "greater than or equal to 1"),
@@ -94,7 +97,7 @@ def test_a_key_goes_to_no_other_server(admin: Client) -> None:
     row = Endpoint.objects.get()
     moved = GIVEN | {"base_url": "https://models.example.org/v1"}
     shown = post(admin, "endpoint", moved, code=row.code)
-    assert "must not go to https://models.example.org." in shown
+    assert "HERE_API_KEY is not bound to models.example.org:443" in shown
     row.refresh_from_db()
     assert row.base_url == "http://127.0.0.1:9/v1"
 

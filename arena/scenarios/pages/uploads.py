@@ -63,9 +63,8 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
             send_later(request, enqueue_upload, row.pk)
             kept.append(row)
     if was_too_large(request.META) or not request.FILES:
-        raise Conflict(
-            f"Choose files of at most {uploads.most_megabytes()} MB together; a zip may be smaller."
-        )
+        most = uploads.most_megabytes()
+        raise Conflict(f"Choose files of at most {most} MB together; a zip may be smaller.")
     return redirect("upload", code=kept[0].code) if len(kept) == 1 else None
 
 

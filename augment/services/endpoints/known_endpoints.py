@@ -2,7 +2,8 @@
 
 A key itself is never stored: an endpoint names a variable and a host, and the variable's value
 goes to that host. So only variables that are meant for keys may be named: `*_API_KEY`, and what
-ARENA_KEY_VARIABLES lists.
+ARENA_KEY_VARIABLES lists. Each goes only to the hosts that it is bound to: by that setting, as a
+known vendor's, or by the upgrade that began to bind keys.
 """
 
 import json
@@ -10,8 +11,9 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
+from importlib import resources
 from typing import Any
-from urllib.parse import urlsplit
 
 from django.conf import settings
 from django.contrib.auth.models import User
@@ -22,7 +24,8 @@ from django.forms import model_to_dict
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed, UnknownName
 from augment.llm.addresses import check_base_url
-from augment.models import Endpoint, EndpointModel
+from augment.llm.wire_transport import server_of
+from augment.models import Endpoint, EndpointModel, KeyBinding
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios.scenes import check_slug
@@ -31,6 +34,9 @@ OPENAI, OPENAI_URL, OPENAI_KEY = "openai", "https://api.openai.com/v1", "OPENAI_
 
 SLUG_RULE = "Lower-case letters, digits, hyphens."
 KEY_RULE = "a variable whose name ends in _API_KEY, or one that ARENA_KEY_VARIABLES lists"
+
+_VENDORS = resources.files(__package__).joinpath("vendor_keys.txt").read_text().split()
+"""Variables of known vendors with the hosts that their keys are for; as ARENA_KEY_VARIABLES."""
 
 _A_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
 _FOR_KEYS = re.compile(r"[A-Za-z_][A-Za-z0-9_]*_API_KEY")
@@ -118,17 +124,10 @@ def change_endpoint(row: Endpoint, *, facts: EndpointFacts, actor: User | None =
     """Change address, key variable or limits; they count for the next call.
 
     Raises:
-        InvalidDocument: Something can't be used.
-        Conflict: Its key would go to another server than it was entered for.
+        InvalidDocument: Something can't be used, or its key is not bound to that host.
     """
     row = Endpoint.objects.select_for_update(no_key=True).get(pk=row.pk)
     wanted = check_facts(facts)
-    before, after = (urlsplit(url)[:2] for url in (row.base_url, wanted["base_url"]))
-    if before != after and row.key_variable and facts.key_variable:
-        raise Conflict(
-            f"{row.key_variable} was entered for {'://'.join(before)}, and its key must not go to "
-            f"{'://'.join(after)}. Add another endpoint, or empty the key's variable first."
-        )
     _change(row, wanted, "endpoint", actor)
     return row
 
@@ -185,7 +184,7 @@ def check_facts(facts: EndpointFacts) -> dict[str, Any]:
     base_url = facts.base_url.strip()
     checks: tuple[tuple[Callable[[Any], object], Any], ...] = (
         (check_base_url, base_url),
-        (check_key_variable, facts.key_variable),
+        (partial(check_key_variable, base_url=base_url), facts.key_variable),
         (check_bounds, facts),
     )
     for check, value in checks:
@@ -202,22 +201,38 @@ def check_facts(facts: EndpointFacts) -> dict[str, Any]:
 
 
 def may_hold_key(variable: str) -> bool:
-    """Return whether an endpoint may be sent what this variable holds."""
-    return bool(_FOR_KEYS.fullmatch(variable)) or variable in settings.KEY_VARIABLES
+    """Return whether a variable is meant for keys at all."""
+    return bool(_FOR_KEYS.fullmatch(variable)) or variable in _read_bindings()
 
 
-def check_key_variable(variable: str) -> None:
-    """Refuse a variable that an endpoint may not name; none is fine.
+def find_key_obstacle(variable: str, base_url: str) -> str:
+    """Return why an endpoint of that address may not be sent a variable; empty where it may."""
+    if variable and not may_hold_key(variable):
+        return f"{variable} may not be sent to an endpoint: {KEY_RULE} is needed"
+    server, hosts = server_of(base_url), _read_bindings().get(variable, "").split("|")
+    # A host without a port stands for all of its ports; with two ports it is no address.
+    anywhere = server[server.rfind(":") :]
+    bound = {server_of(f"https://{host}{port}") for host in hosts for port in ("", anywhere)}
+    if not variable or server in bound - {""}:
+        return ""
+    if server and KeyBinding.objects.filter(variable=variable, server=server).exists():
+        return ""
+    return (
+        f"{variable} is not bound to {server}: whoever runs the server and its workers sets "
+        f"ARENA_KEY_VARIABLES={variable}={server} there"
+    )
+
+
+def check_key_variable(variable: str, base_url: str) -> None:
+    """Refuse a variable that an endpoint of that address may not name; none is fine.
 
     Raises:
-        InvalidDocument: It is no name, or not meant for keys. What is no name is not repeated,
-            because it may be the key itself.
+        InvalidDocument: It is no name, or its key may not go there. What is no name is not
+            repeated, because it may be the key itself.
     """
-    problem = ""
-    if variable and not _A_NAME.fullmatch(variable):
-        problem = "the name of an environment variable is needed, not the key"
-    elif variable and not may_hold_key(variable):
-        problem = f"{variable} may not be sent to an endpoint: {KEY_RULE} is needed"
+    problem = "the name of an environment variable is needed, not the key"
+    if not variable or _A_NAME.fullmatch(variable):
+        problem = find_key_obstacle(variable, base_url)
     if problem:
         raise InvalidDocument("endpoint", [("key_variable", problem)])
 
@@ -231,14 +246,14 @@ def key_of(endpoint: Endpoint) -> str | None:
     """Return the endpoint's key, read from the environment at the moment of the call.
 
     Raises:
-        KeyNotAllowed: The variable is not meant for keys, whoever wrote it into the row.
+        KeyNotAllowed: The key may not go there, whoever wrote variable or address into the row.
         KeyMissing: The variable is not set; the sentence names it.
     """
     variable = endpoint.key_variable
     if not variable:
         return None
-    if not may_hold_key(variable):
-        raise KeyNotAllowed(variable, endpoint.label, KEY_RULE)
+    if obstacle := find_key_obstacle(variable, endpoint.base_url):
+        raise KeyNotAllowed(endpoint.label, obstacle)
     key = os.environ.get(variable, "").strip()
     if not key:
         raise KeyMissing(variable, endpoint.label)
@@ -246,6 +261,15 @@ def key_of(endpoint: Endpoint) -> str | None:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _read_bindings() -> dict[str, str]:
+    """Return the hosts of each variable, `HOST|HOST`; empty for one that is only named."""
+    bindings: dict[str, str] = {}
+    for entry in (*_VENDORS, *settings.KEY_VARIABLES):
+        name, _, hosts = entry.partition("=")
+        bindings[name] = hosts or bindings.get(name, "")
+    return bindings
 
 
 def _change(

@@ -9,7 +9,7 @@ from django.db.models import Q
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
-from augment.services.endpoints.known_endpoints import KEY_RULE, may_hold_key
+from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.services.scenarios.choosing import ALL
 from augment.services.scenarios.submissions import refuse_unanswered
@@ -42,10 +42,10 @@ def find_obstacle(contestant: Contestant) -> str:
         return str(error)
     if contestant.endpoint is None:
         return ""
-    variables = {one.endpoint.key_variable for one in respondents.values()} - {""}
-    forbidden = sorted(name for name in variables if not may_hold_key(name))
-    if forbidden:
-        return f"the variable {', '.join(forbidden)} may not hold a key: {KEY_RULE} is needed"
+    for respondent in respondents.values():
+        endpoint = respondent.endpoint
+        if obstacle := find_key_obstacle(endpoint.key_variable, endpoint.base_url):
+            return obstacle
     modifier, viewer = respondents[ModelRole.MODIFIER], respondents.get(ModelRole.VIEWER)
     is_open = contestant.frozen_options is None
     if (

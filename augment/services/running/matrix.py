@@ -17,7 +17,7 @@ from augment.services.endpoints.contestants import (
     add_contestant,
     free_slug,
 )
-from augment.services.endpoints.known_endpoints import may_hold_key
+from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.variants.options import ContestantOptions, names_for, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
 from augment.variants.respondents import ModelRole
@@ -97,10 +97,9 @@ def add_cells(rows: Sequence[Contestant], *, actor: User | None = None) -> list[
 
 
 def _cell(recipe: Recipe, known: EndpointModel) -> MatrixCell:
-    endpoint, obstacle = known.endpoint, ""
-    if endpoint.key_variable and not may_hold_key(endpoint.key_variable):
-        obstacle = f"{endpoint.key_variable} may not hold a key"
-    elif ModelRole.VIEWER in recipe.roles and not known.vision:
+    endpoint = known.endpoint
+    obstacle = find_key_obstacle(endpoint.key_variable, endpoint.base_url)
+    if not obstacle and ModelRole.VIEWER in recipe.roles and not known.vision:
         obstacle = "needs vision, and it sees text alone"
         if known.vision is None:
             obstacle = "nobody knows whether it sees pictures: probe it"
