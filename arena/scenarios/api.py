@@ -84,6 +84,9 @@ class NewScenarioDocument(ScenarioDocument, WarnedDocument):
         fields = (*ScenarioDocument.Meta.fields, "warnings")
 
 
+_SLUG: Any = {"max_length": SLUG_LENGTH, "required": False, "default": "", "allow_blank": True}
+
+
 class ScenarioBody(StrictSerializer):
     """A new scenario of an existing scene."""
 
@@ -96,12 +99,12 @@ class ScenarioBody(StrictSerializer):
     reference = serializers.DictField(required=False, help_text="A modification that fits.")
     intent = serializers.DictField(required=False, help_text="What the instruction asks for.")
     follows = TextField(
-        max_length=SLUG_LENGTH,
-        required=False,
-        default="",
-        allow_blank=True,
+        **_SLUG,
         help_text="A scenario of the scene whose results it asks to change further; traffic, "
         "density and goal are that one's then.",
+    )
+    variant_of = TextField(
+        **_SLUG, help_text="A scenario that it was made from; benchmarks keep both in one split."
     )
     keep_traffic = FlagField(required=False, default=False)
     density = serializers.ChoiceField(

@@ -10,7 +10,7 @@ from arena.models import BenchmarkFile
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import BaseScene, Benchmark
 from augment.services.judging.scenario_export import Source, list_warnings, source_of
-from augment.services.scenarios.benchmarks import benchmark_set, write_folder
+from augment.services.scenarios.benchmarks import benchmark_set, list_remarks, write_folder
 
 
 def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
@@ -25,22 +25,22 @@ def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
         Conflict: The benchmark's scenarios have changed.
         OSError: It can't be written; nothing is left of it.
     """
-    files, sources = _files_of(row)
+    files, warnings, _ = _files_of(row)
     with new_folder(out) as folder:
         for name, content in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(content)
-    return list_warnings(sources)
+    return warnings
 
 
-def _files_of(row: Benchmark) -> tuple[dict[str, bytes], list[Source]]:
-    """Return the files, with a warning where one is due, and where their scenes come from."""
+def _files_of(row: Benchmark) -> tuple[dict[str, bytes], tuple[str, ...], list[Source]]:
+    """Return the files, with what has to be said as one of them, and where scenes come from."""
     files = write_folder(benchmark_set(row))
     scenes = BaseScene.objects.filter(scenarios__benchmark_items__benchmark=row)
     sources = [source_of(scene) for scene in scenes.defer("document", "recording").distinct()]
-    if warnings := list_warnings(sources):
+    if warnings := (*list_remarks(row), *list_warnings(sources)):
         files[WARNING] = ("\n".join(warnings) + "\n").encode()
-    return files, sources
+    return files, warnings, sources
 
 
 class BenchmarkFiles(FileWork[BenchmarkFile]):
@@ -51,12 +51,12 @@ class BenchmarkFiles(FileWork[BenchmarkFile]):
 
     def make(self, row: BenchmarkFile, folder: Path) -> MadeFile:
         """Return the folder as a zip."""
-        files, sources = _files_of(row.benchmark)
+        files, warnings, sources = _files_of(row.benchmark)
         marked = any(source.is_non_commercial for source in sources)
         return MadeFile(
             name=f"{row.benchmark.slug}-{row.benchmark.version}{'-non-commercial' * marked}.zip",
             content=ContentFile(zip_bytes(files)),
-            warnings=list_warnings(sources),
+            warnings=warnings,
             marked=marked,
         )
 

@@ -1,6 +1,7 @@
 """Scenes and scenarios: what contestants are asked to change."""
 
 import uuid
+from typing import Any
 
 from django.db import models
 from django.db.models import Q
@@ -125,6 +126,13 @@ class Scenario(models.Model):
         related_name="follow_ups",
         help_text="the scenario whose results its instruction asks to change further",
     )
+    origin = models.UUIDField(
+        null=True,
+        editable=False,
+        db_index=True,
+        help_text="code of the scenario that it goes back to: as a variant, a copy, other words "
+        "or a follow-up; its own code for all others",
+    )
     original_image = models.CharField(
         max_length=120, blank=True, help_text="name of the picture before any change"
     )
@@ -160,6 +168,13 @@ class Scenario(models.Model):
 
     def __str__(self) -> str:
         return self.slug
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Store the row; a new one goes back to where the one that it names goes back to."""
+        if self.origin is None:
+            before = self.paraphrase_of or self.follows
+            self.origin = self.code if before is None else before.origin
+        super().save(*args, **kwargs)
 
     @property
     def in_catalogue(self) -> bool:

@@ -64,7 +64,8 @@ def _check_benchmark(row: models.Benchmark) -> None:
 def _check_endpoint(row: models.Endpoint) -> None:
     check_slug(row.label, what="endpoint")
     names = [field.name for field in fields(EndpointFacts)]
-    check_facts(EndpointFacts(**{name: getattr(row, name) for name in names}))
+    facts = EndpointFacts(**{name: getattr(row, name) for name in names})
+    check_facts(facts, is_stored=True)  # a call asks what its key is bound to
 
 
 def _check_contestant(row: models.Contestant) -> None:

@@ -1,16 +1,20 @@
 """Benchmarks as rows: made, found, handed out, and what stays while they are."""
 
+from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
+from django.apps import apps
 from django.core.management import CommandError, call_command
+from django.urls import reverse
 
 from arena.scenarios import services
 from augment.benchmark.folder import read_folder
 from augment.benchmark.values import Split
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.models import BaseScene, Benchmark, Event, Scenario
+from augment.models import BaseScene, Benchmark, BenchmarkItem, Event, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Shape
@@ -19,12 +23,16 @@ from augment.services.scenarios.benchmarks import (
     BenchmarkRequest,
     benchmark_set,
     find_benchmark,
+    list_remarks,
     make_benchmark,
     plan_benchmark,
 )
+from augment.services.scenarios.scenes import add_scenario as add_scenario_row
+from augment.services.scenarios.scenes import add_variant
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone, vehicle
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -89,6 +97,87 @@ def test_wordings_and_alike_wishes_are_in_one_split(streets: list[Scenario]) -> 
     assert both == set(Split)
     tasks = benchmark_set(make_benchmark(asked("street-1", "street-1-p1", "street-2-p1"))).tasks
     assert [task.paraphrase_of for task in tasks] == ["", "street-1", ""]
+
+
+def add_relatives(first: Scenario) -> list[Scenario]:
+    """Add a family, a copy and its variant, and one that says nothing but has a pose of it."""
+
+    def placed(*xs: float) -> Modification:
+        return Modification(added=tuple(cone(f"Agent{x:g}", x, 0.5) for x in xs))
+
+    family = [
+        add_variant(first, difference=f"{n} m", reference=placed(20.0 + n % 3, 40.0), intent=None)
+        for n in range(12)
+    ]
+    asks: dict[str, Any] = {"scene": first.base_scene.slug, "type": first.type}
+    asks |= {"instruction": "Place them nearer.", "keep_traffic": True}
+    copy = add_scenario_row(**asks, variant_of=first.slug, reference=first.reference)
+    second = add_variant(copy, difference="7 m", reference=placed(7.0), intent=None)
+    lone = modification_to_document(placed(21.0, 60.0))
+    return [*family, copy, second, add_scenario_row(**asks, reference=lone)]
+
+
+def poses_of(items: Iterable[BenchmarkItem]) -> set[tuple[object, ...]]:
+    references = [(item.scenario.base_scene_id, item.scenario.reference or {}) for item in items]
+    return {
+        (scene, agent["x_m"], agent["y_m"], agent["heading_rad"])
+        for scene, reference in references
+        for agent in reference["add"]
+    }
+
+
+def test_what_goes_back_to_one_scenario_is_in_one_split(streets: list[Scenario]) -> None:
+    relatives = {row.slug for row in add_relatives(streets[0])} | {"street-1"}
+    both = set()
+    for seed in range(12):
+        planned = plan_benchmark(asked("all", practice=40.0 + seed % 2 * 50.0, seed=seed))
+        practice, test = (
+            [item for item in planned if item.split is split]
+            for split in (Split.PRACTICE, Split.TEST)
+        )
+        assert not poses_of(practice) & poses_of(test)
+        splits = {item.split for item in planned if item.scenario.slug in relatives}
+        assert len(splits) == 1
+        both |= splits
+    assert both == set(Split)
+    make_benchmark(asked("street-1", "street-2", practice=0.0))
+    for seed in range(12):
+        planned = plan_benchmark(asked("all", practice=90.0, seed=seed))
+        later = {item.scenario.slug: item.split for item in planned}
+        assert {later[slug] for slug in (*relatives, "street-2")} == {Split.TEST}
+
+
+def test_the_upgrade_finds_what_scenarios_were_made_from(streets: list[Scenario]) -> None:
+    *_, lone = add_relatives(streets[0])
+    add_scenario("street-2-p1", paraphrase_of=streets[1], reference=None)
+    add_street(6, follows=streets[2])
+    # Nobody said what it was made from, but its pose does.
+    Scenario.objects.filter(pk=lone.pk).update(origin=streets[0].origin)
+    before = dict(Scenario.objects.values_list("slug", "origin"))
+    assert len(set(before.values())) == 5
+    Scenario.objects.update(origin=None)
+    import_module("augment.migrations.0039_origins").find_origins(apps, None)
+    assert dict(Scenario.objects.values_list("slug", "origin")) == before
+
+
+def test_a_benchmark_whose_test_references_can_be_known_says_so(
+    streets: list[Scenario], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row, variant = make_benchmark(asked(practice=0.0)), add_relatives(streets[0])[0]
+    assert list_remarks(row) == list_remarks(None) == ()
+    other = make_benchmark(asked(variant.slug, slug="other"))
+    other.items.update(split=Split.PRACTICE)  # as before a variant had an origin
+    alike = "Variants of 1 of 5 test tasks are handed out with their references."
+    assert list_remarks(row) == (alike,)
+    Scenario.objects.filter(pk=streets[0].pk).update(catalogue_set="hard")
+    public = "Test references are public: 1 of 5 come with the project or vary such."
+    assert list_remarks(row) == (public, alike)
+    call_command("export", "benchmark", "streets", "--out", str(tmp_path / "folder"))
+    assert public in capsys.readouterr().err
+    assert (tmp_path / "folder" / "WARNING.txt").read_text().startswith(f"{public}\n{alike}\n")
+    assert read_folder(tmp_path / "folder").name == "streets"
+    page = signed_in(people()["admin"]).get(reverse("benchmark", args=[row.code]))
+    assert public in page.content.decode()
 
 
 def test_a_follow_up_is_left_out_and_refused_where_it_is_named(streets: list[Scenario]) -> None:

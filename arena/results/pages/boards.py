@@ -25,6 +25,7 @@ from arena.site.forms import RequestForm, offer
 from arena.studies.services.batches import BatchRequest, open_batch, possible_newcomers
 from augment.models import Benchmark
 from augment.services.inputs import inputs_of, read_request
+from augment.services.scenarios.benchmarks import list_remarks
 
 DATA = {"csv": "text/csv; charset=utf-8", "json": "application/json"}
 LOOK = forms.CheckboxSelectMultiple
@@ -177,7 +178,8 @@ def _shown(request: HttpRequest, board: Board) -> dict[str, Any]:
     shown = [one for one in tables if asked in (None, str(one.number))]
     if tables and not shown:
         raise Http404
-    context: dict[str, Any] = {"board": board, "tables": tables}
+    remarks = list_remarks(board.benchmark)
+    context: dict[str, Any] = {"board": board, "tables": tables, "remarks": remarks}
     if not shown:
         return context
     table = shown[0].document

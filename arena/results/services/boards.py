@@ -30,7 +30,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, Scenario
 from augment.services.events import log_change
 from augment.services.judging.realism import REALISM_VERSION
-from augment.services.scenarios.benchmarks import Split
+from augment.services.scenarios.benchmarks import Split, list_remarks
 from augment.services.texts import one_line
 
 LONGEST_NAME = 100
@@ -221,7 +221,7 @@ def make_document(
         votes=len(votes),
         votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
         left_out=dict(sorted(left_out.items())),
-        notes=(*rated.reasons, *rated.warnings, *not_ranked),
+        notes=(*list_remarks(board.benchmark), *rated.reasons, *rated.warnings, *not_ranked),
         versions=_versions(),
         includes_simulated=any(who.is_simulated for who in competitors)
         or any(vote.is_simulated for vote in votes),

@@ -23,6 +23,7 @@ from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services.events import retire
 from augment.services.inputs import inputs_of, read_request
+from augment.services.scenarios import benchmarks
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark, plan_benchmark
 
 
@@ -82,6 +83,7 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "counts": count_tasks((one.split, one.stratum) for one in items),
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
         "file": _file_of(row),
+        "remarks": benchmarks.list_remarks(row),
         "is_staff": role_of(request.user) in STAFF,
     }
     return render(request, "benchmarks/benchmark.html", context)

@@ -102,6 +102,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 **wanted | {"reference": reference},
                 slug=form.cleaned_data["slug"] or None,
                 follows="" if first is None else first.slug,
+                variant_of="" if original is None else original.slug,
                 actor=user_of(request),
             )
             send_later(request, enqueue_scenario, made.pk)

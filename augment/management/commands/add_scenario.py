@@ -46,6 +46,7 @@ class Command(TerminalCommand):
         },
         "--goal": {"choices": list(GOALS), "help": "where the ego's way turns"},
         "--follows": {"help": "a scenario of the scene whose results it asks to change further"},
+        "--variant-of": {"help": "a scenario that it was made from: one split of a benchmark"},
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -58,7 +59,9 @@ class Command(TerminalCommand):
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
         names = ("scene", "type", "instruction", "slug", "keep_traffic")
         given = {name: options[name] for name in names}
-        given |= {name: options[name] or "" for name in ("density", "goal", "follows")}
+        given |= {
+            name: options[name] or "" for name in ("density", "goal", "follows", "variant_of")
+        }
         for name, what in DOCUMENTS.items():
             if (file := options[name]) is not None:
                 given[name] = read_json(file, what=what)

@@ -174,17 +174,18 @@ def change_model(
     return row
 
 
-def check_facts(facts: EndpointFacts) -> dict[str, Any]:
-    """Return the facts as columns.
+def check_facts(facts: EndpointFacts, *, is_stored: bool = False) -> dict[str, Any]:
+    """Return the facts as columns; of a stored row whatever its key is bound to today.
 
     Raises:
         InvalidDocument: With every fault at its place.
     """
     problems: list[tuple[str, str]] = []
     base_url = facts.base_url.strip()
+    key_goes_to = None if is_stored else base_url
     checks: tuple[tuple[Callable[[Any], object], Any], ...] = (
         (check_base_url, base_url),
-        (partial(check_key_variable, base_url=base_url), facts.key_variable),
+        (partial(check_key_variable, base_url=key_goes_to), facts.key_variable),
         (check_bounds, facts),
     )
     for check, value in checks:
@@ -205,15 +206,22 @@ def may_hold_key(variable: str) -> bool:
     return bool(_FOR_KEYS.fullmatch(variable)) or variable in _read_bindings()
 
 
-def find_key_obstacle(variable: str, base_url: str) -> str:
-    """Return why an endpoint of that address may not be sent a variable; empty where it may."""
+def find_key_obstacle(variable: str, base_url: str | None) -> str:
+    """Return why an endpoint may not be sent a variable; empty where it may.
+
+    Args:
+        variable: That the endpoint names; empty for none.
+        base_url: Of the endpoint; None to ask for the variable's name alone.
+    """
     if variable and not may_hold_key(variable):
         return f"{variable} may not be sent to an endpoint: {KEY_RULE} is needed"
+    if not variable or base_url is None:
+        return ""
     server, hosts = server_of(base_url), _read_bindings().get(variable, "").split("|")
     # A host without a port stands for all of its ports; with two ports it is no address.
     anywhere = server[server.rfind(":") :]
     bound = {server_of(f"https://{host}{port}") for host in hosts for port in ("", anywhere)}
-    if not variable or server in bound - {""}:
+    if server in bound - {""}:
         return ""
     if server and KeyBinding.objects.filter(variable=variable, server=server).exists():
         return ""
@@ -223,8 +231,8 @@ def find_key_obstacle(variable: str, base_url: str) -> str:
     )
 
 
-def check_key_variable(variable: str, base_url: str) -> None:
-    """Refuse a variable that an endpoint of that address may not name; none is fine.
+def check_key_variable(variable: str, base_url: str | None) -> None:
+    """Refuse a variable that an endpoint of that address may not name; as `find_key_obstacle`.
 
     Raises:
         InvalidDocument: It is no name, or its key may not go there. What is no name is not

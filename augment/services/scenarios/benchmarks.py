@@ -14,8 +14,7 @@ from uuid import UUID
 import numpy as np
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.db.models import Max, prefetch_related_objects
-from django.db.models.functions import Coalesce
+from django.db.models import F, Max, prefetch_related_objects
 from django.utils import timezone
 
 from augment.benchmark.folder import MOST_TASKS, checksum
@@ -82,6 +81,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
     check_bounds(request)
     slugs = resolve_scenarios(request.scenarios)
     with_others = Scenario.objects.select_related("paraphrase_of", "follows")
+    with_others = with_others.annotate(place=F("base_scene__content_hash"))
     found = with_others.in_bulk(slugs, field_name="slug")
     rows = [found[slug] for slug in slugs]
     rows = [row for row in rows if row.follows is None or row.slug in request.scenarios]
@@ -97,9 +97,8 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
         row.slug: measure_task(scenes.intent_of(row), scenes.reference_of(row)) for row in rows
     }
     strata = choose_strata(sizes)
-    family = Coalesce("scenario__paraphrase_of", "scenario")
-    past = BenchmarkItem.objects.annotate(family=family).order_by("split")  # the test last
-    earlier = {pk: Split(split) for pk, split in past.values_list("family", "split")}
+    past = BenchmarkItem.objects.order_by("split")  # the test last
+    earlier = {key: Split(split) for key, split in past.values_list("scenario__origin", "split")}
     splits = split_tasks(
         [_candidate(row, strata[row.slug], earlier) for row in rows],
         share=request.practice / 100.0,
@@ -113,21 +112,45 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
     ]
 
 
-def _candidate(row: Scenario, stratum: Stratum, earlier: Mapping[int, Split]) -> SplitCandidate:
-    """Return a scenario with all that would give its reference away if another one were known."""
-    shared = [f"original {row.paraphrase_of_id or row.pk}"]
+def list_remarks(row: Benchmark | None) -> tuple[str, ...]:
+    """Return what has to be said with every score: how many test references can be known.
+
+    Those of the catalogue and of what was made from it come with the project. A benchmark from
+    before variants had an origin may hand out a variant of a test task with its reference.
+    """
+    tests = BenchmarkItem.objects.filter(benchmark=row, split=Split.TEST)
+    public = Scenario.objects.exclude(catalogue_set="").values("origin")
+    practice = BenchmarkItem.objects.filter(split=Split.PRACTICE).values("scenario__origin")
+    remarks = {
+        "Test references are public: {} of {} come with the project or vary such.": public,
+        "Variants of {} of {} test tasks are handed out with their references.": practice,
+    }
+    counts = {text: tests.filter(scenario__origin__in=known) for text, known in remarks.items()}
+    return tuple(text.format(len(rows), len(tests)) for text, rows in counts.items() if rows)
+
+
+def _candidate(row: Any, stratum: Stratum, earlier: Mapping[UUID | None, Split]) -> SplitCandidate:
+    """Return a scenario with all that would give its reference away if another one were known.
+
+    Poses count by themselves, since not everybody says what a scenario was made from.
+    """
+    shared = [f"origin {row.origin}"]
     if row.intent is not None:
         shared.append(json.dumps(["intent", row.intent], sort_keys=True))
     reference = scenes.reference_of(row)
     if reference is not None and not reference.is_empty:
-        shared.append(json.dumps([row.base_scene_id, row.reference], sort_keys=True))
+        place = row.place or row.base_scene_id
+        shared.append(json.dumps([place, row.reference], sort_keys=True))
+        for agent in reference.changed:
+            pose = [round(value, 2) for value in (agent.x_m, agent.y_m, agent.heading_rad)]
+            shared.append(json.dumps([place, pose]))
     return SplitCandidate(
         name=row.slug,
         stratum=stratum,
         type=row.type,
         shared=shared,
         has_reference=reference is not None,
-        earlier=earlier.get(row.paraphrase_of_id or row.pk),
+        earlier=earlier.get(row.origin),
     )
 
 

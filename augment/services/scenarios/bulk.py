@@ -19,7 +19,7 @@ WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
 DOCUMENTS = {"reference": "modification", "intent": "intent"}
 """Columns that hold a document: JSON as text, or in YAML as it is."""
-OPTIONAL = ("slug", "keep_traffic", "density", "goal", "follows", *DOCUMENTS)
+OPTIONAL = ("slug", "keep_traffic", "density", "goal", "follows", "variant_of", *DOCUMENTS)
 MOST_ROWS = 10_000
 MOST_ROWS_AT_ONCE = 300
 """On a page: adding them holds the database for some seconds."""

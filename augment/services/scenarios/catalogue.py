@@ -223,8 +223,14 @@ def _store_scenario(
         "keep_traffic": entry.keep_traffic,
         "intent": intent,
     }
-    own = {"catalogue_set": which.value, "language": entry.language, "paraphrase_of": original}
+    own: dict[str, Any] = {
+        "catalogue_set": which.value,
+        "language": entry.language,
+        "paraphrase_of": original,
+    }
     own["type_label"] = scene_rows.label_for(entry.type)
+    if original is not None:
+        own["origin"] = original.origin
     if row is None:
         origin = IntentOrigin.AUTHORED
         row = scene_rows.add_scenario(

@@ -131,6 +131,7 @@ def add_scenario(
     interplan: dict[str, Any] | None = None,
     derives: bool = False,
     follows: str = "",
+    variant_of: str = "",
     actor: User | None = None,
 ) -> Scenario:
     """Keep an instruction for a scene, with its intent and reference if there are any.
@@ -149,8 +150,8 @@ def add_scenario(
         traffic: Who is spawned, where that is known already; None to spawn it.
         interplan: The parts of interPlan's file that it comes from, with a generated instruction.
         derives: Whether the reference says what is asked for, see `derive_intent`.
-        follows: The slug of a scenario of the scene whose results the instruction asks to change
-            further; traffic, density and goal are that one's then.
+        follows: The slug of one on the scene whose results it changes further, in its traffic.
+        variant_of: The slug of a scenario that it was made from: both are in one split.
         actor: Who did it.
 
     Raises:
@@ -161,6 +162,7 @@ def add_scenario(
     """
     scenario = _new_scenario(_find_scene(scene), type, slug, follows)
     scenario.interplan, first = interplan, scenario.follows
+    scenario.origin = scenario_named(variant_of).origin if variant_of else None
     if first is not None:
         scenario.interplan, traffic = first.interplan, _spawned_in(first)
         keep_traffic, density, goal = first.keep_traffic, first.traffic_density, first.goal
@@ -193,7 +195,7 @@ def add_variant(
         actor: Who did it.
     """
     kept = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
-    more = ("spawned", "interplan", "language", "follows")
+    more = ("spawned", "interplan", "language", "follows", "origin")
     variant = Scenario(
         slug=_numbered_slug(scenario.slug),
         instruction=shorten(f"{scenario.instruction} ({difference})", INSTRUCTION_LENGTH),
