@@ -49,6 +49,7 @@ screenshots: chromium ## Every page, light and dark, into docs/images/pages
 bench: $(VENV)/.test ## Votes a second and the rating of many; writes docs/benchmarks.md
 	$(BIN)/python -m bench.voting
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_scale --write
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_scale --resamples --write
 
 figures: $(VENV)/.test ## Write the figures of README, method.md and catalogue.md
 	$(BIN)/python -m bench.figures

@@ -1,6 +1,7 @@
 """The default rating of many contestants, or of many judges: processor time, clock and memory.
 
     python -m bench.rating_scale [--rows N ...] [--write]
+    python -m bench.rating_scale --resamples [--write]   # the paper's mode, beside others
 
 Each row is a process of its own, which makes the votes, rates them with all defaults
 and says what rating took; memory is the most that the process ever held, votes
@@ -12,8 +13,10 @@ the table into docs/benchmarks.md.
 import argparse
 import json
 import resource
+import statistics
 import subprocess
 import sys
+import tarfile
 import tempfile
 import time
 from dataclasses import dataclass
@@ -28,6 +31,10 @@ from bench.report import load, table, write_section
 
 ROOT = Path(__file__).resolve().parents[1]
 HEADING = "Intervals in closed form, with many contestants"
+RESAMPLES_HEADING = "Intervals by resampled votes, beside others"
+EARLIER = "39907c1"
+"""A commit whose resamples were fast; its rating is taken out of the history."""
+REPEATS = 5
 TIES = 0.3
 WINNERS = ("model_a", "tie", "model_b")
 
@@ -67,6 +74,47 @@ CROWDS = (
     Crowd(like="", votes=200_000, contestants=1000, experts=2000, scenarios=500),
     Crowd(like="a public arena", votes=2_000_000, contestants=150, experts=50_000, scenarios=2000),
 )
+
+
+RESAMPLED = (
+    Crowd(like="the paper", votes=5760, contestants=9, experts=9, scenarios=50),
+    Crowd(like="", votes=100_000, contestants=50, experts=1000, scenarios=50),
+    Crowd(like="", votes=2_000_000, contestants=150, experts=1000, scenarios=50),
+)
+RATE = """
+import sys, time
+import numpy as np
+from arena.rating.comparisons import Comparisons
+from arena.rating.leaderboard import Unit, rate
+stored = dict(np.load(sys.argv[1]))
+names = tuple(f"c{one}" for one in range(int(stored["first"].max()) + 1))
+votes = Comparisons(names=names, **stored)
+rate(votes, unit=Unit.VOTE, rounds=100)
+before = time.process_time()
+rate(votes, unit=Unit.VOTE, rounds=1000)
+print(time.process_time() - before)
+"""
+"""By the tree in which it runs; modules are loaded before."""
+CHOIX = """
+import sys, time
+import choix
+import numpy as np
+stored = np.load(sys.argv[1])
+size = int(stored["first"].max()) + 1
+before = time.process_time()
+place = (stored["first"] * size + stored["second"]) * 3 + (2 * stored["score"]).astype(int)
+seen = np.bincount(place, minlength=3 * size**2)
+begin, ratings = None, []
+for drawn in np.random.default_rng(0).multinomial(seen.sum(), seen / seen.sum(), size=1000):
+    lost, tied, won = drawn.reshape(size, size, 3).transpose(2, 0, 1)
+    wins = won + 0.5 * tied
+    losses = lost + 0.5 * tied
+    begin = choix.ilsr_pairwise_dense(wins + losses.T, alpha=1e-12, initial_params=begin)
+    ratings.append(begin)
+np.percentile(ratings, [2.5, 97.5], axis=0)
+print(time.process_time() - before)
+"""
+"""Each resample by its fastest method for all pairs, from the one before."""
 
 
 def drawn(crowd: Crowd, seed: int = 1) -> Comparisons:
@@ -111,6 +159,53 @@ def measure(crowd: Crowd) -> dict[str, float]:
     }
 
 
+def earlier_tree(folder: Path) -> bool:
+    """Put the earlier rating into a folder; return whether the history has it."""
+    paths = ("arena/__init__.py", "arena/rating", "augment/__init__.py", "augment/sentences.py")
+    command = ["git", "archive", "-o", str(folder / "tree.tar"), EARLIER, *paths]
+    if subprocess.run(command, cwd=ROOT, check=False, stderr=subprocess.DEVNULL).returncode:
+        return False
+    with tarfile.open(folder / "tree.tar") as packed:
+        packed.extractall(folder, filter="data")
+    return True
+
+
+def measure_resamples() -> str:
+    """The section on 1,000 vote resamples: rivals take turns, each in a process of its own."""
+    before, rows = load(), []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rivals = {"ours": (RATE, ROOT), "choix": (CHOIX, ROOT)}
+        if earlier_tree(folder):
+            rivals[EARLIER] = (RATE, folder)
+        for crowd in RESAMPLED:
+            votes = drawn(crowd)
+            columns = ("first", "second", "score", "expert", "scenario")
+            np.savez(folder / "votes.npz", **{one: getattr(votes, one) for one in columns})
+            seconds: dict[str, list[float]] = {rival: [] for rival in rivals}
+            for rival in list(rivals) * REPEATS:
+                script, tree = rivals[rival]
+                command = [sys.executable, "-c", script, str(folder / "votes.npz")]
+                ended = subprocess.run(command, cwd=tree, check=True, stdout=subprocess.PIPE)
+                seconds[rival].append(float(ended.stdout))
+            medians = {rival: statistics.median(took) for rival, took in seconds.items()}
+            cells = [
+                f"{1e3 * medians[one]:,.1f} ms ({medians[one] / medians['ours']:.2f})"
+                if one in medians
+                else "not in this history"
+                for one in ("ours", "choix", EARLIER)
+            ]
+            rows.append([f"{crowd.votes:,}", str(crowd.contestants), *cells])
+            print(rows[-1], flush=True)
+    said = (
+        "`python -m bench.rating_scale --resamples [--write]`: the paper's mode, 1,000 resamples "
+        "of single votes with percentile intervals. Processor time without start and imports, "
+        f"median of {REPEATS} turns (and its ratio to ours), one thread; choix warm-started "
+        f"on dense matrices; {before}."
+    )
+    return "\n\n".join([said, table(["votes", "contestants", "ours", "choix", EARLIER], rows)])
+
+
 def save_csv(votes: Comparisons, path: Path) -> None:
     """One line a vote, for rate_csv."""
     outcome = (2.0 - 2.0 * votes.score).astype(int).tolist()
@@ -137,7 +232,13 @@ def main() -> None:
     parser.add_argument("--rows", type=int, nargs="+", default=range(len(CROWDS)))
     parser.add_argument("--write", action="store_true", help="into docs/benchmarks.md")
     parser.add_argument("--one", type=int, help="measure a row in this process, and print JSON")
+    parser.add_argument("--resamples", action="store_true", help="the paper's mode, beside others")
     asked = parser.parse_args()
+    if asked.resamples:
+        text = measure_resamples()
+        if asked.write:
+            write_section(RESAMPLES_HEADING, text)
+        return
     if asked.one is not None:
         print(json.dumps(measure(CROWDS[asked.one])))
         return

@@ -18,6 +18,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 from arena.rating.chains import are_determined, chains_in_sets
 from arena.rating.comparisons import (
@@ -32,9 +33,14 @@ from arena.rating.comparisons import (
 from arena.rating.models import Meetings
 from arena.rating.rules import Unit
 
-_NUMBERS_AT_ONCE = 500_000
+_NUMBERS_AT_ONCE = 1_000_000
 """How many numbers a block of rounds may hold; more only costs memory."""
 _NUMBERS_OF_COMPONENTS = 4_000_000
+_SHORT_SIGMAS, _TAIL_SIGMAS = 2.0, 7.5
+"""How many standard deviations Poisson draws fall short of the votes, so that 2 in 100 rounds get
+too many; and where their distributions end."""
+_CELLS = 4096
+"""Of the table of a distribution, a power of two."""
 FEWEST_ROUNDS = 200
 _WORK = 6_000_000
 
@@ -55,12 +61,19 @@ class Rounds:
 
     @classmethod
     def of_outcomes(cls, drawn: FloatArray) -> Self:
-        """Return those in which low won, neither or high won so often: (3 P, B)."""
+        """Return those in which low won, neither or high won so often: (3 P, B), overwritten."""
         wins, ties, losses = drawn.reshape(3, -1, drawn.shape[1])
-        return cls(games=wins + ties + losses, scores=wins + 0.5 * ties, ties=ties.sum(axis=0))
+        of_all = ties.sum(axis=0)
+        losses += wins
+        losses += ties
+        ties *= 0.5
+        wins += ties
+        return cls(games=losses, scores=wins, ties=of_all)
 
     def chosen(self, rounds: IntArray) -> Self:
         """Some of the rounds, by their numbers."""
+        if len(rounds) == len(self.ties):
+            return self
         return replace(
             self,
             games=self.games[:, rounds],
@@ -82,11 +95,9 @@ def resample(
         seed: The same seed gives the same rounds.
     """
     if unit is Unit.VOTE:  # votes of one pair and outcome are alike: draw counts of them
-        rng = np.random.default_rng(seed)
         seen = counts.outcomes.T.ravel()
-        for size in _blocks(rounds, len(seen)):
-            of_each = rng.multinomial(seen.sum(), seen / seen.sum(), size=size)
-            yield Rounds.of_outcomes(of_each.T.astype(np.float64))
+        draw_votes = _vote_draws(seen, np.random.default_rng(seed))
+        yield from (Rounds.of_outcomes(draw_votes(size)) for size in _blocks(rounds, len(seen)))
         return
     pairs = len(counts.low)
     place = counts.outcome_of * pairs + counts.pair_of
@@ -112,6 +123,58 @@ def _blocks(rounds: int, width: int) -> Iterator[int]:
     size = max(1, _NUMBERS_AT_ONCE // max(width, 1))
     for start in range(0, rounds, size):
         yield min(size, rounds - start)
+
+
+def _vote_draws(seen: IntArray, rng: np.random.Generator) -> Callable[[int], FloatArray]:
+    """Return what draws multinomial counts (K, B) of kinds of votes that were seen (K,) times.
+
+    Independent Poisson counts, given their sum, are multinomial. So a round takes Poisson counts
+    for slightly fewer votes than there are, and draws the missing ones singly; one with too many
+    is drawn again, for how many came the first way says nothing about which. A Poisson count is
+    one lookup in a table of even cells; where a cell holds several, a second number decides.
+    """
+    total = int(seen.sum())
+    different, row = np.unique(seen, return_inverse=True)
+    means = different * (1.0 - min(1.0, _SHORT_SIGMAS / np.sqrt(total)))
+    spread = _TAIL_SIGMAS * np.sqrt(means) + 20.0
+    lowest = np.maximum(means - spread, 0.0).astype(np.int64)
+    sizes = (means + spread).astype(np.int64) - lowest
+    ends = np.cumsum(sizes)
+    values = np.arange(ends[-1]) + np.repeat(lowest - ends + sizes, sizes)
+    mean = np.repeat(np.maximum(means, 1e-300), sizes)
+    chances = np.exp(values * np.log(mean) - mean - gammaln(values + 1.0))
+    # All distributions are one: that of row d goes from d to d + 1.
+    below = np.cumsum(chances / np.repeat(np.add.reduceat(chances, ends - sizes), sizes))
+    end = np.repeat(np.arange(1.0, len(ends) + 1.0), sizes)
+    below = np.clip(below, end - 1.0, end)  # sums are rounded
+    below[ends - 1] = end[ends - 1]
+    last_cell = np.ceil(below * _CELLS).astype(np.int64)
+    value_of_cell = np.repeat(values.astype(np.float64), np.diff(last_cell, prepend=0))
+    value_of_cell[last_cell - 1] = -1.0  # where one value ends and the next may begin
+    row *= _CELLS
+    kind_of = np.repeat(np.arange(len(seen)), seen)
+
+    def draw_poisson(rounds: int) -> FloatArray:
+        size = len(row) * rounds  # 16 bits of chance each, four to a number
+        bits = rng.bit_generator.random_raw(size // 4 + 1).view(np.uint16)[:size]
+        cell = row[:, None] + (bits.reshape(-1, rounds) & (_CELLS - 1))
+        drawn = value_of_cell.take(cell)
+        is_open = np.flatnonzero(drawn < 0.0)
+        exact = (cell.ravel()[is_open] + rng.random(len(is_open))) / _CELLS
+        drawn.ravel()[is_open] = values[np.searchsorted(below, exact, side="right")]
+        return drawn
+
+    def draw(rounds: int) -> FloatArray:
+        drawn = draw_poisson(rounds)
+        while len(over := np.flatnonzero((missing := total - drawn.sum(axis=0)) < 0)):
+            drawn[:, over] = draw_poisson(len(over))
+        missing = missing.astype(np.int64)
+        singly = kind_of[rng.integers(0, total, size=missing.sum())]
+        place = singly * rounds + np.repeat(np.arange(rounds), missing)
+        np.add.at(drawn.reshape(-1), place, 1.0)
+        return drawn
+
+    return draw
 
 
 def _cluster_draws(

@@ -22,7 +22,6 @@ FEWEST_TO_TELL = 6
 comparisons that all went one way show who is above."""
 NAMED = 3
 """A sentence names so many contestants at most."""
-_BITS_AT_ONCE = 32_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,14 +92,25 @@ def chains_in_sets(met: Meetings, games: FloatArray, scores: FloatArray) -> Bool
 
 
 def are_determined(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
-    """(n,) which sets have finite Bradley-Terry strengths for everybody; as `chains_in_sets`."""
-    found = np.empty(games.shape[1], dtype=np.bool_)
-    at_once = max(1, _BITS_AT_ONCE // max(1, met.contestants**2))
-    for first in range(0, len(found), at_once):
-        some = slice(first, first + at_once)
-        scored = _scored(met, games[:, some], scores[:, some])
-        found[some] = _all_from_first(scored) & _all_from_first(scored.transpose(0, 2, 1))
-    return found
+    """(n,) which sets have finite Bradley-Terry strengths for everybody; as `chains_in_sets`.
+
+    Everybody is reached from the first contestant, and reaches it. Eight sets are a byte.
+    """
+    # Sets beyond the last one fill the last byte up: there everybody scores.
+    scored, conceded = ~np.packbits(scores <= 0, axis=1), ~np.packbits(scores >= games, axis=1)
+    is_fine = np.full(scored.shape[1], 255, dtype=np.uint8)
+    for from_low, from_high in ((scored, conceded), (conceded, scored)):
+        reached = np.zeros((met.contestants, len(is_fine)), dtype=np.uint8)
+        further = reached.copy()
+        further[0] = 255
+        while (further != reached).any() and not (further == 255).all():
+            reached = further.copy()
+            arrived = [reached[met.low] & from_low, reached[met.high] & from_high]
+            further[met.present] |= np.bitwise_or.reduceat(
+                np.concatenate(arrived)[met.by_end], met.starts, axis=0
+            )
+        is_fine &= np.bitwise_and.reduce(further, axis=0)
+    return np.unpackbits(is_fine, count=games.shape[1]).view(np.bool_)
 
 
 def closure(edges: BoolArray) -> BoolArray:
@@ -121,17 +131,6 @@ def _scored(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     scored[:, met.high, met.low] = (scores < games).T
     scored[:, everybody, everybody] = True
     return scored
-
-
-def _all_from_first(scored: BoolArray) -> BoolArray:
-    """(n,) whether the first contestant reaches everybody by scores (n, C, C)."""
-    steps = scored.astype(np.float32)
-    reached = scored[:, :1]
-    while True:
-        further = reached.astype(np.float32) @ steps > 0
-        if (further == reached).all():
-            return np.asarray(reached.all(axis=(1, 2)))
-        reached = further
 
 
 def _numbered(together: BoolArray) -> IntArray:

@@ -122,7 +122,9 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
     low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
-    met, pair_of = np.unique(low * contestants + high, return_inverse=True)
+    pair = low * contestants + high
+    has_met = np.bincount(pair, minlength=1) > 0
+    met, pair_of = np.flatnonzero(has_met), (np.cumsum(has_met) - 1)[pair]
     outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
     outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
     place = pair_of * 3 + outcome_of
@@ -143,6 +145,11 @@ def tally(votes: Comparisons) -> IntArray:
     counted = np.bincount(votes.first * 3 + outcome, weights=votes.count, minlength=size)
     counted += np.bincount(votes.second * 3 + 2 - outcome, weights=votes.count, minlength=size)
     return counted.reshape(-1, 3).astype(np.int64)
+
+
+def count_codes(codes: IntArray) -> int:
+    """Count how many different contestants, experts or scenarios occur."""
+    return int(np.count_nonzero(np.bincount(codes)))
 
 
 def count_wins(votes: Comparisons) -> tuple[IntArray, IntArray]:

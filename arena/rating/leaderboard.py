@@ -18,7 +18,14 @@ import numpy as np
 
 from arena.rating import remarks
 from arena.rating.chains import Chains, Status, chains_among, diagnose, ranks_across
-from arena.rating.comparisons import Comparisons, IntArray, count_pairs, restrict_to, tally
+from arena.rating.comparisons import (
+    Comparisons,
+    IntArray,
+    count_codes,
+    count_pairs,
+    restrict_to,
+    tally,
+)
 from arena.rating.lines import Line
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
@@ -171,8 +178,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,
-        experts=len(np.unique(votes.expert)),
-        scenarios=len(np.unique(votes.scenario)),
+        experts=count_codes(votes.expert),
+        scenarios=count_codes(votes.scenario),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength if whole else None,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),

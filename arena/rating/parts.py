@@ -17,7 +17,14 @@ from arena.rating.bootstrap import (
     resample,
     rounds_to_draw,
 )
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    count_pairs,
+)
 from arena.rating.models import Meetings, fit, resample_elo, to_elo
 from arena.rating.ranking import (
     Separation,
@@ -68,11 +75,13 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
         point = _Point(rating=np.median(samples, axis=1))
         rounds = RatedRounds.of_values(samples)
     else:
-        fitted = _fit_votes(votes, rules)
+        counts = count_pairs(votes)
+        met = Meetings(len(votes.names), counts)
+        fitted = _fit_votes(votes, counts, met, rules)
         if fitted is None:
             note = (remarks.NOT_RATED,) * len(votes.names)
             return Rated(note=note, explanation=(remarks.NO_DAVIDSON,))
-        point, rounds = fitted, _rate_rounds(votes, rules, fitted)
+        point, rounds = fitted, _rate_rounds(votes, counts, met, rules, fitted)
     plain = Rated(
         rating=point.rating,
         tie_strength=point.tie_strength,
@@ -135,10 +144,10 @@ class _Point:
     tie_strength: float | None = None
 
 
-def _fit_votes(votes: Comparisons, rules: Rules) -> _Point | None:
+def _fit_votes(
+    votes: Comparisons, counts: PairCounts, met: Meetings, rules: Rules
+) -> _Point | None:
     """None where the votes determine no ratings in Davidson's model."""
-    counts = count_pairs(votes)
-    met = Meetings(len(votes.names), counts)
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
     has_ties = rules.method is Method.DAVIDSON and 0 < ties[0] < votes.votes
     games, scores = counts.games[:, None], counts.scores[:, None]
@@ -148,19 +157,21 @@ def _fit_votes(votes: Comparisons, rules: Rules) -> _Point | None:
     return _Point(
         rating=to_elo(answer[: met.contestants]),
         answer=answer,
-        pulls=pulls_of_model(votes, met, counts.games, answer),
+        pulls=pulls_of_model(votes, met, counts.games, answer)
+        if rules.intervals is Intervals.CLOSED_FORM
+        else None,
         tie_strength=float(np.exp(answer[-1])) if has_ties else None,
     )
 
 
-def _rate_rounds(votes: Comparisons, rules: Rules, point: _Point) -> RatedRounds:
+def _rate_rounds(
+    votes: Comparisons, counts: PairCounts, met: Meetings, rules: Rules, point: _Point
+) -> RatedRounds:
     """Rate resampled votes.
 
     For intervals in closed form the rounds only say who is determined; their ratings are those of
     the data.
     """
-    counts = count_pairs(votes)
-    met = Meetings(len(votes.names), counts)
     is_closed = rules.intervals is Intervals.CLOSED_FORM
 
     def refit(rounds: Rounds, together: BoolArray | None) -> FloatArray:
@@ -212,7 +223,7 @@ def _find_intervals(
     if np.isnan([lower, upper]).all():
         return None
     spread = None
-    if rules.intervals is Intervals.CLOSED_FORM and point.pulls is not None:
+    if point.pulls is not None:
         spread = spread_of(point.pulls, rules.unit, reference)
         half = spread.half_widths()
         # A bound is missing where the rounds leave it open.

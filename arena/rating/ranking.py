@@ -112,8 +112,10 @@ def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
     at_once = max(1, _NUMBERS_AT_ONCE // max(1, samples.shape[1]))
     for first in range(0, len(low), at_once):
         some = slice(first, first + at_once)
-        gaps = np.abs(centred[low[some]] - centred[high[some]]) / error[some, None]
-        np.maximum(largest, gaps.max(axis=0, initial=0.0), out=largest)
+        gaps = centred[low[some]]
+        gaps -= centred[high[some]]
+        gaps /= error[some, None]
+        np.maximum(largest, np.abs(gaps, out=gaps).max(axis=0, initial=0.0), out=largest)
     critical = float(np.quantile(largest, LEVEL)) if len(largest) else np.inf
     apart = _square_of(len(rating), np.abs(rating[low] - rating[high]) / error > critical, False)
     return apart & (rating[:, None] > rating[None, :])

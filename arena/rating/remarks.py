@@ -3,7 +3,7 @@
 import numpy as np
 
 from arena.rating.chains import few_of
-from arena.rating.comparisons import BoolArray, Comparisons
+from arena.rating.comparisons import BoolArray, Comparisons, count_codes
 from arena.rating.rules import Intervals, Rules, Unit
 
 FEWEST = {"expert": 5, "scenario": 10}
@@ -74,7 +74,7 @@ def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) 
     found: list[str] = []
     is_resampled = rules.intervals is Intervals.RESAMPLES
     for kind in Unit.TWO_WAY.kinds:
-        number = len(np.unique(getattr(votes, kind)))
+        number = count_codes(getattr(votes, kind))
         is_drawn = kind in rules.unit.kinds and is_resampled
         limit = FEWEST_DRAWN if is_drawn else FEWEST[kind]
         if number == 1 and kind in rules.unit.kinds:

@@ -45,10 +45,11 @@ def _joined(value: Any) -> Any:
 Kept = Annotated[str, PlainValidator(read_text)]
 
 
-VERSION = 4
-"""3 had not yet what ratings once were adjusted for; 2 is also without adjusted p-values and the
-measures that came with them; 1 also without the order of the board and without notes in the lines
-of types; a rating of version 0 kept its standings alone."""
+VERSION = 5
+"""4 drew other resamples of single votes from a seed; 3 had not yet what ratings once were
+adjusted for; 2 is also without adjusted p-values and the measures that came with them; 1 also
+without the order of the board and without notes in the lines of types; a rating of version 0 kept
+its standings alone."""
 
 _SINCE_2, _SINCE_3, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 5}
 """Of fields that documents of earlier versions do not have, unless they say something."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arena.rating.bootstrap import resample, rounds_to_draw
-from arena.rating.comparisons import Comparisons, count_pairs
+from arena.rating.comparisons import Comparisons, PairCounts, count_pairs
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.rules import Unit
 from tests.rating.votes import by_votes, named, simulated, versus
@@ -31,6 +31,29 @@ def test_two_contestants_have_the_binomial_interval() -> None:
     assert line.rating == pytest.approx(1035.2, abs=0.1)
     assert line.lower == pytest.approx(line.rating - half, abs=3)
     assert line.upper == pytest.approx(line.rating + half, abs=3)
+
+
+@pytest.mark.parametrize("seen", [[0, 1, 3, 40, 200, 1000], [100_000, 4, 0], [2, 1, 0]])
+def test_single_votes_are_drawn_as_by_a_multinomial(seen: list[int]) -> None:
+    counts = PairCounts(
+        low=np.arange(len(seen) // 3),
+        high=np.arange(len(seen) // 3) + 1,
+        outcomes=np.array(seen).reshape(3, -1).T,
+        pair_of=np.empty(0, dtype=np.int64),
+        outcome_of=np.empty(0, dtype=np.int64),
+    )
+    blocks = resample(simulated(TRUTH, 1, 1), counts, unit=Unit.VOTE, rounds=40_000, seed=2)
+    games, scores, ties = zip(*((one.games, one.scores, one.ties) for one in blocks), strict=True)
+    assert (np.hstack(games).sum(axis=0) == sum(seen)).all()
+    shares = np.array(seen).reshape(3, -1) / sum(seen)
+    for drawn, share in ((games, shares.sum(axis=0)), ([ties], shares[1].sum(keepdims=True))):
+        expected, variance = sum(seen) * share, sum(seen) * share * (1.0 - share)
+        error = 4.0 * np.sqrt(variance / 40_000) + 1e-9
+        assert np.abs(np.hstack(drawn).mean(axis=-1) - expected).max(initial=0.0) <= error.max()
+        assert np.hstack(drawn).var(axis=-1) == pytest.approx(variance, rel=0.04)
+    assert np.hstack(scores).mean(axis=1) == pytest.approx(
+        sum(seen) * (shares[0] + 0.5 * shares[1]), rel=0.02
+    )
 
 
 def test_votes_that_agree_within_scenarios_widen_the_scenario_interval() -> None:
