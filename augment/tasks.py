@@ -20,12 +20,14 @@ from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.db import connection
-from django.db.models import Q
+from django.db.models import Q, QuerySet
 from kombu.exceptions import OperationalError
 
 from augment.errors import QueueRefused, QueueUnreachable
+from augment.models import GenerationJob
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
+from augment.services.judging.analyses import count_unmeasured, measure_job
 from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
 from augment.services.running.intent_readings import READINGS
@@ -47,6 +49,9 @@ QUEUE_BEFORE = "celery"
 BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
 
+RECENT_JOBS = 20
+"""A worker that starts measures so many jobs anew; older ones wait until somebody looks."""
+
 REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
 """What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
@@ -67,12 +72,22 @@ def work(self: Any, kind: str, pk: int) -> None:
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
     enqueue(KINDS[kind], KINDS[kind].released_by(pk))
+    if kind == AUGMENTATIONS.name:
+        enqueue_measures(GenerationJob.objects.filter(augmentations=pk))
 
 
 @shared_task(name="augment.draw", acks_late=True, ignore_result=True)
 def draw(what: str, pk: int) -> None:
     """Draw what is missing; a second time nothing is left to do."""
     DRAWN[what](pk)
+
+
+@shared_task(name="augment.measure", acks_late=True, ignore_result=True)
+def measure(pk: int) -> None:
+    """Measure the rows of a finished job as far as they are not measured yet."""
+    job = GenerationJob.objects.filter(pk=pk).first()
+    if job is not None:
+        measure_job(job)
 
 
 # --- Sending messages --------------------------------------------------------------------------
@@ -183,6 +198,16 @@ enqueue_submission = sender(SUBMISSIONS)
 enqueue_upload = sender(UPLOADS)
 enqueue_simulations = partial(enqueue, DRIVES)
 
+
+def enqueue_measures(jobs: QuerySet[GenerationJob]) -> None:
+    """Have those of the jobs measured that are finished and not measured yet; as `enqueue`."""
+    finished = jobs.filter(state=GenerationJob.State.FINISHED).order_by("-pk")
+    for job in finished[:RECENT_JOBS]:
+        if count_unmeasured(job):
+            send(measure, job.pk)
+
+
+enqueue_measure = partial(send, measure)
 enqueue_scenario = partial(send, draw, "scenario")
 enqueue_scene = partial(send, draw, "scene")
 
@@ -211,6 +236,8 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     ages = {queue: timedelta(0) if at_start else _lost_after(queue) for queue in queues}
     for kind in KINDS.values():
         enqueue(kind, kind.find_unsent(now=now, older_than=ages[kind.queue]))
+    if at_start:
+        enqueue_measures(GenerationJob.objects.all())
 
 
 @worker_ready.connect

@@ -24,7 +24,7 @@ from augment.models.jobs import (
     Simulation,
     TranscriptNote,
 )
-from augment.models.judging import JudgeRun, PairJudgement
+from augment.models.judging import JudgeRun, PairJudgement, StoredMeasure
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
 from augment.models.submissions import Submission
 from augment.models.sweeps import Sweep, SweepValue

@@ -1,4 +1,4 @@
-"""What language models that judge pairs are asked, and what they answered."""
+"""What language models that judge pairs are asked and answered; measures of augmentations."""
 
 from django.db import models
 from django.db.models import F, Q
@@ -68,3 +68,19 @@ class PairJudgement(Work):
             ),
         )
         indexes = (models.Index(fields=("state", "sent_at")),)
+
+
+class StoredMeasure(models.Model):
+    """One measure of an augmentation, which holds as long as its key is the same."""
+
+    augmentation = models.ForeignKey(
+        Augmentation, on_delete=models.CASCADE, related_name="measures"
+    )
+    name = models.CharField(max_length=20, help_text="displacement, findings, realism, ...")
+    key = models.CharField(max_length=64, help_text="SHA-256 of all that it depends on")
+    document = models.JSONField(null=True, help_text="null where there is no such measure")
+
+    class Meta:
+        constraints = (
+            models.UniqueConstraint(name="one_measure_of_a_name", fields=("augmentation", "name")),
+        )

@@ -13,7 +13,8 @@ from augment.metrics.realism import REALISM_VERSION
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification
-from augment.services.judging.realism import realism_of_job, realism_of_rows
+from augment.services.judging.realism import REALISM, realism_of_job
+from augment.tasks import measure
 from tests.jobs import rows
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in
@@ -63,7 +64,7 @@ def test_contestants_stand_between_recorded_traffic_and_random_places() -> None:
     assert (bob.changes, bob.left_out, bob.objects) == (1, 1, 1)
     assert ann.recorded == recorded.recorded == recorded.mean
     assert (recorded.objects, table.scenes) == (42, 2)
-    by_row = realism_of_rows(list(job.augmentations.values_list("pk", flat=True)))
+    by_row = REALISM.of(list(job.augmentations.values_list("pk", flat=True)))
     refused = job.augmentations.get(state="refused")
     assert len(by_row) == 3
     assert refused.pk not in by_row
@@ -90,5 +91,6 @@ def test_files_and_page_state_the_version_and_the_answer() -> None:
     assert json.loads(written["json"])["realism_version"] == REALISM_VERSION
     assert parquet.read_table(io.BytesIO(written["parquet"])).num_rows == 5
     assert f"Realism, version {REALISM_VERSION}" in written["latex"].decode()
+    measure(job.pk)
     shown = signed_in(people()["researcher"]).get(f"/jobs/{job.code}/realism/").content.decode()
     assert re.search(r"is ann with 0\.\d\d over 2 changes; recorded traffic has 0\.\d\d", shown)

@@ -95,7 +95,10 @@ def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once
     for slug, start in begins.items():
         ended(job, one, rows.add_kind(slug, Contestant.Kind.RULE), change=starts(start))
         ended(job, still, rows.add_kind(f"{slug}-2"))
-    with django_assert_num_queries(2):
+    # Rows; keys of rows and of scenarios, what is stored; rows, one scene; what is stored then.
+    with django_assert_num_queries(7):
+        of_job(job)
+    with django_assert_num_queries(4):  # read from the store
         found = of_job(job)
     over_time = [line.displacement.over_time for line in found if line.displacement is not None]
     assert over_time[0] is not None

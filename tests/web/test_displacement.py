@@ -4,10 +4,13 @@ import re
 
 import pytest
 from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
 
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
+from augment.services.judging.analyses import count_unmeasured
+from augment.tasks import measure
 from tests.exports.test_displacement import a_job, add_moving
 from tests.jobs import rows
 from tests.scenes import vehicle
@@ -17,6 +20,7 @@ pytestmark = pytest.mark.django_db
 
 
 def page(job: GenerationJob, query: str = "") -> str:
+    measure(job.pk)
     shown = signed_in(people()["researcher"]).get(f"/jobs/{job.code}/displacement/{query}")
     text = re.sub(r"<[^>]+>", " ", shown.content.decode())
     return re.sub(r"\s+", " ", text)
@@ -47,6 +51,26 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
     assert "All five scenario types." in shown
 
 
+def test_what_is_not_measured_yet_is_left_to_a_worker_and_then_kept(
+    django_assert_max_num_queries: DjangoAssertNumQueries,
+) -> None:
+    job = a_job()
+    reader = signed_in(people()["researcher"])
+    address = f"/jobs/{job.code}/displacement/"
+    assert "A worker measures the results: 4 of 4 are left" in reader.get(address).content.decode()
+    for name in ("displacement-by-type", "realism", "augmentations"):
+        file = reader.get(f"/jobs/{job.code}/files/{name}.csv")
+        assert (file.status_code, file["Location"]) == (302, address)
+    measure(job.pk)
+    with django_assert_max_num_queries(40):
+        assert "A worker measures" not in reader.get(address).content.decode()
+    scenario = job.augmentations.earliest("pk").scenario
+    scenario.reference = modification_to_document(Modification(added=(vehicle("c", 9.0, 0.0),)))
+    scenario.save()
+    stale = job.augmentations.filter(scenario=scenario).count()
+    assert count_unmeasured(job) == stale  # another reference: what it was held against is gone
+
+
 def test_what_moves_has_columns_of_its_own() -> None:
     job, reader = a_job(), signed_in(people()["researcher"])
 
@@ -54,8 +78,10 @@ def test_what_moves_has_columns_of_its_own() -> None:
         text = re.sub(r"<[^>]+>", " ", reader.get(path).content.decode())
         return re.sub(r"\s+", " ", text)
 
+    measure(job.pk)
     assert "At t0 (m)" not in read(f"/jobs/{job.code}/displacement/")
     row = add_moving(job)
+    measure(job.pk)
     shown = read(f"/jobs/{job.code}/displacement/")
     assert "Mean (m) At t0 (m) After 6 s (m) Starts apart (s) Matched" in shown
     assert "bea 2.91 2.91 to 2.91 2.91 0.00 5.00 1.00 1 0 0" in shown

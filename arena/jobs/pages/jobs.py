@@ -10,7 +10,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.jobs.exports.realism import shown_realism
-from arena.jobs.pages.measures import displacement_section, driving_section
+from arena.jobs.pages.measures import ask_to_measure, displacement_section, driving_section
 from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
 from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
@@ -68,9 +68,13 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
         **{"counts": counts, "tab": shown, "tab_template": f"jobs/tabs/{shown}.html"},
         "is_live": not counts.is_over,
         "tabs": {name: TABS[name][0] for name in tabs},
-        **TABS[shown][1](request, counts),
     }
-    if counts.is_moving:
+    if shown in MEASURED_TABS and (unmeasured := ask_to_measure(request, job)):
+        template = "jobs/tabs/unmeasured.html"
+        context |= {"is_live": True, "unmeasured": unmeasured, "tab_template": template}
+    else:
+        context |= TABS[shown][1](request, counts)
+    if context["is_live"]:
         context["workforce"] = workforce()
     return render(request, "jobs/job.html", context)
 
@@ -135,6 +139,7 @@ TABS: dict[str, tuple[str, Callable[[HttpRequest, JobCounts], Context]]] = {
     "files": ("Files", _show_files),
 }
 """The parts of a job's page: what they are called, and what their templates show."""
+MEASURED_TABS = ("displacement", "realism")
 
 
 @act_for(ADMIN, back="job")

@@ -28,11 +28,11 @@ from arena.jobs.queries import before_of
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, allow_only, page_for, user_of
-from arena.site.acts import refusals_told, send_later
+from arena.site.acts import looks_again, refusals_told, send_later
 from arena.site.listing import choice_asked, read_page
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.analyses import ANALYSES, SEED, answers_of
+from augment.services.judging.analyses import ANALYSES, SEED, answers_of, count_unmeasured
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import (
     drives_of_job,
@@ -42,7 +42,7 @@ from augment.services.judging.driving_scores import (
 )
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
-from augment.tasks import enqueue_simulations
+from augment.tasks import enqueue_measure, enqueue_simulations
 
 PDM_CLOSED = Options().planner
 OFFSETS = {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
@@ -154,6 +154,9 @@ def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
 
 # --- Displacement, analyses and files -----------------------------------------------------------
 
+UNMEASURED_FILES = ("faults", "tool-calls", "transcripts", *(f"driving-{one}" for one in SCORES))
+"""Files of a job that need no measure of its rows."""
+
 GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
 
 
@@ -163,6 +166,9 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
     job = get_object_or_404(GenerationJob, code=code)
     if name not in JOB_FILES:
         raise Http404
+    if name not in UNMEASURED_FILES and ask_to_measure(request, job):
+        messages.info(request, "Its rows are being measured; the file is offered afterwards.")
+        return redirect("job-tab", code=code, tab="displacement")
     options: dict[str, Any] = {}
     if name.startswith("driving-"):
         known, way = _ways(request, job)
@@ -187,6 +193,8 @@ def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpRe
 def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show all three parts, on a page of their own: the bootstrap may take seconds."""
     job = get_object_or_404(GenerationJob, code=code)
+    if ask_to_measure(request, job):
+        return redirect("job-tab", code=code, tab="displacement")
     answers = answers_of(job)
     parts = {part: analyse(answers) for part, analyse in ANALYSES.items()}
     context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), **parts}
@@ -216,6 +224,14 @@ def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     except FileNotFoundError:
         raise Http404 from None
     return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+
+
+def ask_to_measure(request: HttpRequest, job: GenerationJob) -> int:
+    """Return how many rows are still to be measured, and leave them to a worker."""
+    unmeasured = count_unmeasured(job)
+    if unmeasured and not looks_again(request):
+        send_later(request, enqueue_measure, job.pk)
+    return unmeasured
 
 
 def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:

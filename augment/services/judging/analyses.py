@@ -17,9 +17,10 @@ from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.displacement import KeptSummary, Measured, of_job
-from augment.services.judging.findings import findings_by_row
-from augment.services.judging.realism import realism_of_rows
+from augment.services.judging.displacement import DISTANCES, KeptSummary, Measured, of_job
+from augment.services.judging.findings import FINDINGS
+from augment.services.judging.measures import Measure
+from augment.services.judging.realism import REALISM, realism_of_job
 
 State = Augmentation.State
 Row = dict[str, Any]
@@ -29,6 +30,9 @@ Answers = Mapping[str, Sequence[Measured]]
 SEED = 2026
 """Of the bootstrap."""
 MISSES = (State.UNREADABLE, State.REFUSED)
+_ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, DISTANCES, FINDINGS)
+_AT_ONCE = 50
+"""So many rows are measured before they are stored."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,9 +58,8 @@ class AugmentationLine:
 
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample."""
-    rows = job.augmentations.select_related("scenario__base_scene")
-    scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
-    realism, found = realism_of_rows(list(scenes)), findings_by_row(scenes.values())
+    ids = list(job.augmentations.values_list("pk", flat=True))
+    realism, found = REALISM.of(ids), FINDINGS.of(ids)
     for line in _lines(job):
         if line.row.pk in realism:
             line = replace(line, realism=realism[line.row.pk].mean)
@@ -80,6 +83,21 @@ def repeatability(job: GenerationJob) -> list[Row]:
         if line.row.state in Augmentation.SHOWABLE:
             by_contestant[line.row.contestant.slug].append(line)
     return [_repeat_line(lines) for _, lines in sorted(by_contestant.items())]
+
+
+def count_unmeasured(job: GenerationJob) -> int:
+    """Return how many rows of a job with an outcome lack a measure that still holds."""
+    ids = list(job.augmentations.values_list("pk", flat=True))
+    return max(measure.count_stale(ids) for measure in _ROW_MEASURES)
+
+
+def measure_job(job: GenerationJob) -> None:
+    """Measure what is not measured of a job; a second time nothing is left to do."""
+    realism_of_job(job)  # which measures the scenes as well
+    ids = list(job.augmentations.order_by("scenario").values_list("pk", flat=True))
+    for start in range(0, len(ids), _AT_ONCE):
+        for measure in _ROW_MEASURES:
+            measure.of(ids[start : start + _AT_ONCE])
 
 
 # --- Analyses ----------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
 from itertools import combinations
@@ -21,6 +21,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
+from augment.services.judging.measures import Measure
 from augment.services.scenarios.scenes import ground_of, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
@@ -54,8 +55,8 @@ class Unmeasured(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """One augmentation and how far it is from the reference.
+class Distance:
+    """How far an augmentation is from the reference.
 
     Attributes:
         displacement: None where there is a reason why not; all missing for an answer that was
@@ -64,7 +65,6 @@ class Measured:
         why_not: The reason, None where it was measured.
     """
 
-    row: Augmentation
     displacement: Displacement | None = None
     kept: tuple[KeptObject, ...] = ()
     why_not: Unmeasured | None = None
@@ -73,6 +73,13 @@ class Measured:
     def kept_summary(self) -> KeptSummary | None:
         """How much was to stay and did, None without any."""
         return summarise_kept(self.kept)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured(Distance):
+    """An augmentation with how far it is from the reference."""
+
+    row: Augmentation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +98,7 @@ class Group:
 
 
 def of_job(job: GenerationJob) -> list[Measured]:
-    """Measure every row of a job; one query, and one a scenario in which something moves."""
+    """Measure every row of a job, or take what is stored."""
     return _measure(_rows().filter(job=job))
 
 
@@ -101,7 +108,7 @@ def of_rows(ids: Collection[int]) -> list[Measured]:
 
 
 def of_augmentation(row: Augmentation) -> Measured:
-    """Measure one row whose scenario is loaded, with its scene where something moves."""
+    """Measure one row whose scenario is loaded, or take what is stored."""
     return _measure([row])[0]
 
 
@@ -216,35 +223,48 @@ def _rows() -> QuerySet[Augmentation]:
 
 
 def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
+    listed = list(rows)
+    unfinished = Distance(why_not=Unmeasured.UNFINISHED)
+    distances = DISTANCES.of(row.pk for row in listed)
+    return [_measured(row, distances.get(row.pk, unfinished)) for row in listed]
+
+
+def _measured(row: Augmentation, distance: Distance) -> Measured:
+    return Measured(row=row, **{field.name: getattr(distance, field.name) for field in _FIELDS})
+
+
+def _compute(ids: Collection[int]) -> dict[int, Distance]:
     standards: dict[int, _Standard] = {}
 
     def standard_of(row: Augmentation) -> _Standard:
         return standards.setdefault(row.scenario_id, _Standard(row.scenario))
 
-    return [_measure_row(row, standard_of) for row in rows]
+    return {row.pk: _measure_row(row, standard_of) for row in _rows().filter(pk__in=ids)}
 
 
 def _measure_row(
     row: Augmentation, standard_of: Callable[[Augmentation], "_Standard"]
-) -> Measured:
+) -> Distance:
     reference, answer, before = standard_of(row).reference, _answer_of(row), row.follows
-    if row.state not in Augmentation.SHOWABLE:
-        return Measured(row=row, why_not=Unmeasured.UNFINISHED)
     if reference is None:
-        return Measured(row=row, why_not=Unmeasured.NO_REFERENCE)
+        return Distance(why_not=Unmeasured.NO_REFERENCE)
     if answer is None and row.state == State.DONE:
-        return Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW)
+        return Distance(why_not=Unmeasured.UNREADABLE_ROW)
     moves = answer is not None and (answer.has_motion or reference.has_motion)
     try:
         found = displacement(answer, reference, standard_of(row).ground if moves else None)
     except (InvalidDocument, InvalidModification):
-        return Measured(row=row, why_not=Unmeasured.UNFIT_MOTION)
+        return Distance(why_not=Unmeasured.UNFIT_MOTION)
     own = None if before is None else _answer_of(before)
     earlier = None if before is None else standard_of(before).reference
     kept: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
         kept = kept_objects(own, answer, reference_before=earlier, reference_after=reference)
-    return Measured(row=row, displacement=found, kept=kept)
+    return Distance(displacement=found, kept=kept)
+
+
+DISTANCES = Measure("displacement", Distance, _compute)
+_FIELDS = fields(Distance)
 
 
 class _Standard:

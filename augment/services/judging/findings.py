@@ -4,7 +4,7 @@ The reference and anybody's labels stay out of it.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +20,7 @@ from augment.models import Augmentation, Scenario
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.intent import Intent
+from augment.services.judging.measures import Measure
 from augment.services.scenarios.editing import (
     editable_ground,
     give_preset,
@@ -76,22 +77,27 @@ def findings_of(row: Augmentation) -> tuple[Finding, ...]:
     return _check(row, ground_of(row.scenario), intent_of(row.scenario))
 
 
-def findings_by_row(rows: Iterable[Augmentation]) -> dict[int, tuple[Finding, ...]]:
-    """Return the findings about all rows that can be checked, by key; a scene is read once."""
-    by_scenario: defaultdict[Scenario, list[Augmentation]] = defaultdict(list)
+def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
+    """Check all rows that can be checked; a scene is read once."""
+    rows = Augmentation.objects.filter(pk__in=ids).exclude(modification=None).order_by("pk")
+    by_scenario: defaultdict[int, list[Augmentation]] = defaultdict(list)
     for row in rows:
-        if row.modification is not None:
-            by_scenario[row.scenario].append(row)
+        by_scenario[row.scenario_id].append(row)
+    scenarios = Scenario.objects.filter(pk__in=by_scenario).select_related("base_scene")
     found = {}
-    for scenario, own in by_scenario.items():
+    for scenario in scenarios.order_by("pk").iterator(chunk_size=10):
         try:
             ground, intent = ground_of(scenario), intent_of(scenario)
         except InvalidDocument:
             continue
-        for row in own:
+        for row in by_scenario[scenario.pk]:
             with suppress(InvalidDocument, InvalidModification):
                 found[row.pk] = _check(row, ground, intent)
     return found
+
+
+FINDINGS = Measure("findings", tuple[Finding, ...], _compute)
+"""The findings about rows that can be checked, the worst first."""
 
 
 def check_augmentation(row: Augmentation) -> Checked | None:
@@ -142,7 +148,7 @@ def check_edit(
 
 def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
     """Guess a row's faults by its findings; None without a modification that can be read."""
-    findings = findings_by_row([row]).get(row.pk)
+    findings = FINDINGS.of([row.pk]).get(row.pk)
     return None if findings is None else first_guess(findings)
 
 

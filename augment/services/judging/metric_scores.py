@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from augment.checks import Severity
 from augment.models import Augmentation, Contestant, Simulation
 from augment.services.judging.displacement import of_rows
-from augment.services.judging.findings import findings_by_row
-from augment.services.judging.realism import realism_of_rows
+from augment.services.judging.findings import FINDINGS
+from augment.services.judging.realism import REALISM
 from augment.services.judging.simulations import SCORES, Options
 
 SAME_M = 0.15
@@ -54,21 +54,19 @@ def _displacement(ids: Collection[int]) -> MetricScores:
 def _checks(ids: Collection[int]) -> MetricScores:
     """Fewer wrong findings are better, then fewer doubtful ones; no answer is worst."""
     rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
-    related = rows.select_related("scenario__base_scene")
-    checked = list(related.defer("scenario__base_scene__recording", "scenario__reference"))
-    found, scores = findings_by_row(checked), dict[str, float]()
-    for row in checked:
-        if row.state in UNREADABLE_OR_REFUSED:
-            scores[str(row.code)] = -math.inf
-        elif row.pk in found:
-            counts = Counter(finding.severity for finding in found[row.pk])
+    found, scores = FINDINGS.of(ids), dict[str, float]()
+    for pk, code, state in rows.values_list("pk", "code", "state"):
+        if state in UNREADABLE_OR_REFUSED:
+            scores[str(code)] = -math.inf
+        elif pk in found:
+            counts = Counter(finding.severity for finding in found[pk])
             doubts = min(counts[Severity.DOUBTFUL], 99) / 100
-            scores[str(row.code)] = -counts[Severity.WRONG] - doubts
+            scores[str(code)] = -counts[Severity.WRONG] - doubts
     return MetricScores(name="Checks", by_code=scores)
 
 
 def _realism(ids: Collection[int]) -> MetricScores:
-    found = realism_of_rows(ids)
+    found = REALISM.of(ids)
     codes = Augmentation.objects.filter(pk__in=found).values_list("pk", "code")
     means = {str(code): found[pk].mean for pk, code in codes}
     return MetricScores(

@@ -5,11 +5,11 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
+from itertools import groupby
 from statistics import fmean
 from uuid import UUID
 
 import numpy as np
-from django.db.models import QuerySet
 
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
@@ -29,6 +29,7 @@ from augment.metrics.realism import (
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification
+from augment.services.judging.measures import Measure
 from augment.services.scenarios.scenes import reference_of, scene_of, seed_of
 
 MOST_SCENES = 40
@@ -104,42 +105,32 @@ class RealismTable:
 
 
 def realism_of_job(job: GenerationJob) -> RealismTable:
-    """Return the table of a job; a second for every hundred changes, more for the first time."""
-    learned = _Recorded()
-    found: defaultdict[tuple[Subject, int], list[_Beside]] = defaultdict(list)
-    for scenario, rows in _by_scenario(job.augmentations.all()):
-        judged = _Judged(scenario, learned)
-        answers = {row: _change_of(row) for row in rows if row.state in Augmentation.SHOWABLE}
-        reference = reference_of(scenario)
-        pattern = reference or next(filter(None, answers.values()), Modification())
-        recorded = judged.recording(pattern)
-        here = [
-            (Subject.RECORDING, 0, recorded),
-            *((Subject.REFERENCE, 0, judged.of(one)) for one in [reference] if one is not None),
-            *((Subject.RANDOM, 0, one) for one in judged.random(pattern)),
-            *(
-                (Subject.CONTESTANT, row.contestant_id, judged.of(change))
-                for row, change in answers.items()
-                if row.contestant.kind != Contestant.Kind.REFERENCE
-            ),
-        ]
-        for subject, contestant, realism in here:
-            found[subject, contestant].append((realism, recorded))
-    contestants = Contestant.objects.in_bulk({pk for _, pk in found if pk})
-    lines = [_line(subject, contestants.get(pk), ones) for (subject, pk), ones in found.items()]
-    return RealismTable(
-        job=job.name, lines=tuple(sorted(lines, key=_place)), scenes=len(learned.counts)
+    """Return the table of a job, of what is stored as far as it is."""
+    rows = list(
+        job.augmentations.filter(state__in=Augmentation.SHOWABLE)
+        .order_by("scenario", "pk")
+        .select_related("contestant")
+        .defer("modification", "notes")
     )
-
-
-def realism_of_rows(ids: Collection[int]) -> dict[int, Realism]:
-    """Return the realism of the augmentations with these keys; without what can't be judged."""
-    learned = _Recorded()
-    found: dict[int, Realism | None] = {}
-    for scenario, rows in _by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged = _Judged(scenario, learned)
-        found |= {row.pk: judged.of(_change_of(row)) for row in rows}
-    return {pk: realism for pk, realism in found.items() if realism is not None}
+    by_row = REALISM.of(row.pk for row in rows)
+    answers = {
+        scenario: list(group) for scenario, group in groupby(rows, key=lambda row: row.scenario_id)
+    }
+    patterns = {scenario: _pattern_row(group).pk for scenario, group in answers.items()}
+    surroundings = SURROUNDINGS.of(patterns.values())
+    found: defaultdict[tuple[Subject, int], list[_Beside]] = defaultdict(list)
+    for scenario, pattern in patterns.items():
+        beside = surroundings[pattern]
+        for subject, values in beside.by_subject().items():
+            found[subject, 0] += [(value, beside.recorded) for value in values]
+        for row in answers[scenario]:
+            if row.contestant.kind != Contestant.Kind.REFERENCE:
+                pair = (by_row.get(row.pk), beside.recorded)
+                found[Subject.CONTESTANT, row.contestant_id].append(pair)
+    contestants = {row.contestant_id: row.contestant for row in rows}
+    lines = [_line(subject, contestants.get(pk), pairs) for (subject, pk), pairs in found.items()]
+    scenes = min(BaseScene.objects.count(), MOST_SCENES)
+    return RealismTable(job=job.name, lines=tuple(sorted(lines, key=_place)), scenes=scenes)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -149,13 +140,40 @@ _Beside = tuple[Realism | None, Realism | None]
 """That of a change, and of what was recorded in its scene."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """The realism of what a scenario's answers are held against.
+
+    Attributes:
+        recorded: Of what was recorded in its scene, of the classes that its pattern changes; the
+            pattern is the reference, without one the first answer.
+        reference: Empty without a reference.
+        random: Of the pattern's objects, placed at random.
+    """
+
+    recorded: Realism | None
+    reference: tuple[Realism | None, ...]
+    random: tuple[Realism | None, ...]
+
+    def by_subject(self) -> dict[Subject, tuple[Realism | None, ...]]:
+        """Return the values for a table."""
+        return {
+            Subject.RECORDING: (self.recorded,),
+            Subject.REFERENCE: self.reference,
+            Subject.RANDOM: self.random,
+        }
+
+
+def _pattern_row(rows: Sequence[Augmentation]) -> Augmentation:
+    """Return the first row of a scenario with an answer, else the first."""
+    return next((row for row in rows if row.state == Augmentation.State.DONE), rows[0])
+
+
 class _Recorded:
     """What is learned from the scenes of this installation."""
 
     def __init__(self) -> None:
-        scenes = BaseScene.objects.order_by("content_hash", "slug").only("code", "content_hash")
-        keys = [_key(scene) for scene in scenes[:MOST_SCENES]]
-        self.counts = {key: count_recorded(_objects_of(*key)) for key in keys}
+        self.counts = {key: count_recorded(_objects_of(*key)) for key in _learned_scenes()}
         self._total = sum(self.counts.values(), RecordedCounts())
 
     def without(self, scene: BaseScene) -> RecordedCounts:
@@ -196,6 +214,46 @@ class _Judged:
         return None if realism.mean is None else realism
 
 
+def _learned_scenes() -> list[tuple[UUID, str]]:
+    """Return the keys of the scenes that are learned from, as `_key` has them."""
+    scenes = BaseScene.objects.order_by("content_hash", "slug")
+    return list(scenes.values_list("code", "content_hash")[:MOST_SCENES])
+
+
+def _name_learned_scenes() -> str:
+    return str(_learned_scenes())
+
+
+def _judge_rows(ids: Collection[int]) -> dict[int, Realism]:
+    learned = _Recorded()
+    found: dict[int, Realism] = {}
+    for scenario, rows in _by_scenario(ids):
+        judged = _Judged(scenario, learned)
+        values = {row.pk: judged.of(_change_of(row)) for row in rows}
+        found |= {pk: value for pk, value in values.items() if value is not None}
+    return found
+
+
+def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
+    learned = _Recorded()
+    found = {}
+    for scenario, rows in _by_scenario(ids):
+        judged, reference = _Judged(scenario, learned), reference_of(scenario)
+        for row in rows:
+            pattern = reference or _change_of(row) or Modification()
+            found[row.pk] = Surroundings(
+                recorded=judged.recording(pattern),
+                reference=() if reference is None else (judged.of(reference),),
+                random=tuple(judged.random(pattern)),
+            )
+    return found
+
+
+REALISM = Measure("realism", Realism, _judge_rows, _name_learned_scenes)
+"""The realism of augmentations; none of what can't be judged."""
+SURROUNDINGS = Measure("surroundings", Surroundings, _judge_surroundings, _name_learned_scenes)
+
+
 def _key(scene: BaseScene) -> tuple[UUID, str]:
     """Return what a scene is remembered by: its row and what it holds."""
     return scene.code, scene.content_hash
@@ -208,10 +266,10 @@ def _objects_of(code: UUID, content_hash: str) -> tuple[PlacedObject, ...]:
     return tuple(measure_recorded(Ground.of(scene_from_document(document))))
 
 
-def _by_scenario(rows: QuerySet[Augmentation]) -> Iterator[tuple[Scenario, list[Augmentation]]]:
+def _by_scenario(ids: Collection[int]) -> Iterator[tuple[Scenario, list[Augmentation]]]:
     """Yield each scenario with its rows; scenes are read one at a time."""
     of: defaultdict[int, list[Augmentation]] = defaultdict(list)
-    for row in rows.select_related("contestant").defer("notes").order_by("pk"):
+    for row in Augmentation.objects.filter(pk__in=ids).defer("notes").order_by("pk"):
         of[row.scenario_id].append(row)
     scenarios = Scenario.objects.filter(pk__in=of).select_related("base_scene")
     for scenario in scenarios.defer("base_scene__recording").iterator(chunk_size=10):

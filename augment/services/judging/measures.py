@@ -1,0 +1,120 @@
+"""Measures of augmentations, stored with a key of all that they depend on.
+
+In: primary keys of augmentations. Out: what was measured of each, from the store where its key is
+still the same, else computed and stored. A key covers the code of the measuring packages, the
+outcome of the row and of the one that it follows, the scenario's reference, intent and traffic,
+its scene, and for realism the scenes that were learned from.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from pydantic import TypeAdapter
+
+import augment
+from augment.models import Augmentation, Scenario, StoredMeasure
+
+Value = TypeVar("Value")
+Compute = Callable[[Collection[int]], Mapping[int, Value]]
+
+MEASURING = ("metrics", "checks", "scene", "geometry", "services/judging")
+"""The packages of augment whose code decides what comes out."""
+
+_ROW = ("state", "finished_at", "follows__finished_at", "follows__scenario")
+_SCENARIO = (
+    "reference",
+    "intent",
+    "keep_traffic",
+    "traffic_density",
+    "goal",
+    "spawned",
+    "base_scene__slug",
+    "base_scene__content_hash",
+)
+
+
+class Measure(Generic[Value]):
+    """One measure of augmentations.
+
+    Args:
+        name: What it is called in the store.
+        kind: The type of its values, as pydantic reads and writes it.
+        compute: Measures the augmentations with these keys; it may leave some out.
+        context: Returns what it depends on beside the row and its scenario.
+    """
+
+    def __init__(
+        self, name: str, kind: Any, compute: Compute[Value], context: Callable[[], str] = str
+    ) -> None:
+        self.name = name
+        self._adapter: TypeAdapter[Value | None] = TypeAdapter(kind | None)
+        self._compute = compute
+        self._context = context
+
+    def of(self, ids: Iterable[int]) -> dict[int, Value]:
+        """Return the values of the augmentations with these keys, without those that have none."""
+        keys = self._keys(ids)
+        stored = StoredMeasure.objects.filter(name=self.name, augmentation__in=keys)
+        values = {
+            pk: self._adapter.validate_python(document)
+            for pk, key, document in stored.values_list("augmentation", "key", "document")
+            if keys[pk] == key
+        }
+        if missing := sorted(keys.keys() - values.keys()):
+            fresh = self._compute(missing)
+            values |= {pk: fresh.get(pk) for pk in missing}
+            self._store({pk: (keys[pk], values[pk]) for pk in missing})
+        return {pk: value for pk, value in values.items() if value is not None}
+
+    def count_stale(self, ids: Iterable[int]) -> int:
+        """Return how many of these would have to be computed."""
+        keys = self._keys(ids)
+        stored = StoredMeasure.objects.filter(name=self.name, augmentation__in=keys)
+        return len(keys.items() - set(stored.values_list("augmentation", "key")))
+
+    def _keys(self, ids: Iterable[int]) -> dict[int, str]:
+        """Return the key of each that has an outcome, by its primary key; two queries."""
+        rows = Augmentation.objects.filter(pk__in=list(ids), state__in=Augmentation.SHOWABLE)
+        found = list(rows.order_by("pk").values_list("pk", "scenario", *_ROW))
+        wanted = {scenario for _, scenario, *own in found for scenario in (scenario, own[-1])}
+        scenarios = Scenario.objects.filter(pk__in=wanted).order_by("pk")
+        digests = {pk: _digest(own) for pk, *own in scenarios.values_list("pk", *_SCENARIO)}
+        base = _digest([_code_version(), self._context()])
+        return {
+            pk: _digest([base, pk, digests[scenario], digests.get(own[-1]), *own[:-1]])
+            for pk, scenario, *own in found
+        }
+
+    def _store(self, values: Mapping[int, tuple[str, Value | None]]) -> None:
+        rows = [
+            StoredMeasure(
+                augmentation_id=pk,
+                name=self.name,
+                key=key,
+                document=self._adapter.dump_python(value, mode="json"),
+            )
+            for pk, (key, value) in values.items()
+        ]
+        StoredMeasure.objects.bulk_create(
+            rows,
+            batch_size=500,
+            update_conflicts=True,
+            unique_fields=("augmentation", "name"),
+            update_fields=("key", "document"),
+        )
+
+
+def _digest(parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+@cache
+def _code_version() -> str:
+    """Return a digest of the code that measures: a release that changes it measures anew."""
+    root = Path(augment.__file__).parent
+    files = (path for name in MEASURING for path in sorted((root / name).rglob("*.py")))
+    return _digest([[path.name, path.read_text(encoding="utf-8")] for path in files])
