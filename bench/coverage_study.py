@@ -16,9 +16,8 @@ import numpy as np
 
 from arena.rating import models
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
-from arena.rating.leaderboard import FEWEST_TO_JUDGE
 from arena.rating.models import DidNotConverge, Meetings, to_elo
-from arena.rating.ranking import judge_pairs
+from arena.rating.ranking import FEWEST_TO_JUDGE, judge_pairs
 from arena.rating.rules import Unit
 from arena.rating.sandwich import pulls_of_model, spread_of
 from bench.worlds import World, paper_ratings
@@ -35,22 +34,22 @@ def worlds() -> Iterator[tuple[str, World]]:
     blank = World(ratings=paper_ratings(), scenario_sd=100.0, expert_sd=40.0, votes_per_expert=200)
     for experts, votes, effects in product((3, 5, 9, 20), (40, 480), EFFECTS):
         even = replace(blank, experts=experts, votes_per_expert=votes)
-        yield "even", _differing(even, effects)
+        yield "even", differing(even, effects)
     strong = replace(blank, experts=3, votes_per_expert=480)
-    yield "even", _differing(strong, (0.0, 300.0))
+    yield "even", differing(strong, (0.0, 300.0))
     for scenarios, experts, effects in product((3, 5, 8), (5, 9, 20), EFFECTS[:2]):
         few = replace(blank, scenarios=scenarios, experts=experts, votes_per_expert=100)
-        yield "3, 5 or 8 scenarios", _differing(few, effects)
+        yield "3, 5 or 8 scenarios", differing(few, effects)
     for uneven, experts, effects in product((1.0, 1.5), (5, 9, 20), EFFECTS):
         some = replace(blank, uneven=uneven, experts=experts)
-        yield "uneven experts", _differing(some, effects)
+        yield "uneven experts", differing(some, effects)
     for experts in (5, 9, 20):
         yield "a fifth spammers", replace(blank, experts=experts, spammers=0.2)
     for experts in (5, 9):
         yield "handed over", replace(blank, experts=experts, handed_over=True)
 
 
-def _differing(world: World, effects: tuple[float, float]) -> World:
+def differing(world: World, effects: tuple[float, float]) -> World:
     return replace(world, scenario_sd=effects[0], expert_sd=effects[1])
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from arena.pairing.plan import Entry, PlanRules, plan
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, PairCounts
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit, to_elo
+from arena.rating.side import side_bias
 
 PAPER = Path(__file__).parents[1] / "tests" / "rating" / "paper_table.json"
 SCENARIOS = 50
@@ -43,6 +44,7 @@ class World:
         controversial: Contestants about whom experts differ four times as much.
         spammers: The chance that an expert answers at random.
         uneven: The standard deviation of the logarithm of the votes of an expert.
+        side, side_sd: What being on the left is worth on average, and by how much experts differ.
     """
 
     ratings: FloatArray
@@ -55,6 +57,8 @@ class World:
     spammers: float = 0.0
     uneven: float = 0.0
     handed_over: bool = False
+    side: float = 0.0
+    side_sd: float = 0.0
 
     @property
     def expert_sds(self) -> FloatArray:
@@ -71,6 +75,29 @@ class World:
         scores = 0.5 * (1.0 + (1.0 - self.spammers) * (win - loss).mean(axis=0) @ weights)
         met = Meetings(len(self.ratings), _one_game_a_pair(len(self.ratings)))
         return to_elo(fit(met, np.ones((len(scores), 1)), scores[:, None])[:, 0])
+
+    def truth_of_side(self) -> float:
+        """What the left side would be worth by infinitely many votes."""
+        many, ends = 10.0**7, np.stack(np.triu_indices(len(self.ratings), 1))
+        win, loss, weights = self._chances_of_pairs(THRESHOLDS, self.side)
+        lost, won, _ = self._chances_of_pairs(THRESHOLDS, -self.side)
+        won_left = np.concatenate([win.mean(axis=0) @ weights, won.mean(axis=0) @ weights])
+        lost_left = np.concatenate([loss.mean(axis=0) @ weights, lost.mean(axis=0) @ weights])
+        first, second = np.hstack([ends, ends[::-1]])
+        shares = np.concatenate([won_left, 1.0 - won_left - lost_left, lost_left])
+        nobody = np.zeros(len(shares), dtype=np.int64)
+        votes = Comparisons(
+            names=tuple(f"c{index}" for index in range(len(self.ratings))),
+            first=np.tile(first, 3),
+            second=np.tile(second, 3),
+            score=np.repeat([WIN, TIE, LOSS], len(first)),
+            expert=nobody,
+            scenario=nobody.copy(),
+            count=np.round(many * shares).astype(np.int64),
+        )
+        value = side_bias(votes).advantage.value
+        assert value is not None
+        return value
 
     def tie_share(self) -> float:
         """Of all votes, pairs alike frequent."""
@@ -92,7 +119,7 @@ class World:
         return float(np.hypot(pulled * self.expert_sd, np.sqrt(of_thresholds)))
 
     def _chances_of_pairs(
-        self, thresholds: FloatArray
+        self, thresholds: FloatArray, side: float = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(T, P, N) of T thresholds and N sizes of effects that the first wins, and loses; and
         (N,) how likely these sizes are.
@@ -100,9 +127,10 @@ class World:
         strengths = self.ratings / ELO_PER_LOGIT
         low, high = np.triu_indices(len(strengths), 1)
         variance = self.scenario_sd**2 + self.expert_sds**2
-        spread = np.sqrt(variance[low] + variance[high])[:, None] / ELO_PER_LOGIT
+        variance_of_pairs = variance[low] + variance[high] + self.side_sd**2
+        spread = np.sqrt(variance_of_pairs)[:, None] / ELO_PER_LOGIT
         nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-        gaps = (strengths[low] - strengths[high])[:, None] + spread * nodes
+        gaps = (strengths[low] - strengths[high])[:, None] + side / ELO_PER_LOGIT + spread * nodes
         win, loss = _chances(gaps[None], thresholds[:, None, None])
         return win, loss, weights / weights.sum()
 
@@ -110,6 +138,9 @@ class World:
         """A study: experts and scenarios are new ones each time."""
         panel = _Panel(self, rng)
         expert, scenario, first, second = self._planned(rng)
+        if self.uneven and (self.side or self.side_sd):  # a plan shows pairs either way round
+            is_turned = rng.random(len(first)) < 0.5
+            first, second = np.where(is_turned, second, first), np.where(is_turned, first, second)
         score = panel.scores(expert, scenario, first, second, rng)
         return Comparisons(
             names=tuple(f"c{index}" for index in range(len(self.ratings))),
@@ -155,6 +186,9 @@ class _Panel:
         of_experts = rng.normal(0.0, 1.0, (world.experts, contestants)) * world.expert_sds
         self.seen = world.ratings + of_scenarios[:, None] + of_experts
         self.threshold = THRESHOLDS[rng.integers(0, len(THRESHOLDS), world.experts)]
+        self.side = np.full(world.experts, float(world.side))
+        if world.side_sd:
+            self.side += rng.normal(0.0, world.side_sd, world.experts)
         self.is_spammer = rng.random(world.experts) < world.spammers
 
     def scores(
@@ -168,7 +202,7 @@ class _Panel:
         """(V,) what the first contestants score."""
         seen = self.seen[scenario, expert]
         rows = np.arange(len(expert))
-        gap = (seen[rows, first] - seen[rows, second]) / ELO_PER_LOGIT
+        gap = (seen[rows, first] - seen[rows, second] + self.side[expert]) / ELO_PER_LOGIT
         win, loss = _chances(gap, self.threshold[expert])
         at_random = self.is_spammer[expert]
         win, loss = np.where(at_random, 1 / 3, win), np.where(at_random, 1 / 3, loss)

@@ -7,7 +7,7 @@ import json
 import sys
 from argparse import ArgumentParser
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rat
 from arena.rating.lines import HEADS as PAPERS_HEADS
 from arena.rating.lines import align_cells, caption_text, escape, latex_table, notes_by_reason
 from arena.rating.ranking import Separation
+from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
     FEWEST_DRAWS,
     METHOD_TEXTS,
@@ -147,21 +148,34 @@ def run(
         raise CsvNotRated(f"{file}: {error.strerror}") from error
     except ValueError as error:
         raise CsvNotRated(f"{file}: {error}") from error
-    said = [warning.replace("expert", "judge") for warning in board.warnings]
-    notes = [board.explanation, *(warning.replace("scenario", "item") for warning in said)]
-    if unknown := [name for name in OPTIONAL if name not in there and method != "elo"]:
-        notes.insert(
-            1,
-            f"The file has no column {' and no column '.join(unknown)}: if votes hang together "
-            "by that, the intervals are too narrow.",
-        )
+    unseen = [name for name in there if name not in clusters]
+    if unseen:  # places left hold for a whole table
+        lines = (replace(line, rank_best=None, rank_worst=None) for line in board.lines)
+        board = replace(board, lines=tuple(lines))
+    notes = _notes(board, there, unseen)
     if repeats:
         notes.append(
             f"{repeats} votes repeat an earlier one of the same judge, item and pair; all are "
             "counted."
         )
-    told_apart = board.told_apart if clusters == there else None
+    told_apart = None if unseen else board.told_apart
     return FORMATS[format](RatedCsv(board, tuple(filter(None, notes)), told_apart))
+
+
+def _notes(board: Leaderboard, there: Sequence[str], unseen: Sequence[str]) -> list[str]:
+    """Sentences on the ratings, and on columns that are missing or were not used."""
+    warnings = [warning.replace("expert", "judge") for warning in board.warnings]
+    why = board.explanation.replace("one expert", "one judge").replace("one scenario", "one item")
+    notes = [why, *(warning.replace("scenario", "item") for warning in warnings)]
+    if unknown := [
+        name for name in OPTIONAL if name not in there and board.method is not Method.ELO
+    ]:
+        notes.insert(
+            1,
+            f"The file has no column {' and no column '.join(unknown)}: if votes hang together "
+            "by that, the intervals are too narrow.",
+        )
+    return notes + remark_on_ignored(unseen)
 
 
 def _choose_unit(there: Sequence[str], method: Method, wanted: str | None) -> Unit:
@@ -208,10 +222,16 @@ class RatedCsv:
         return notes_by_reason((line.name, line.note) for line in self.board.standings)
 
     @property
+    def heads(self) -> list[str]:
+        """Of the printed table: without places left where no line has any."""
+        has_places = any(line.rank_best is not None for line in self.board.lines)
+        return [head for head in HEADS if has_places or head != "95% ranks"]
+
+    @property
     def cells(self) -> list[tuple[str, ...]]:
-        """What the lines have under HEADS."""
+        """What the lines have under the heads."""
         return [
-            tuple(str(getattr(line, field)) for field in HEADS.values())
+            tuple(str(getattr(line, HEADS[head])) for head in self.heads)
             for line in self.board.standings
         ]
 
@@ -225,7 +245,7 @@ class RatedCsv:
 
 
 def _write_table(rated: RatedCsv) -> str:
-    rows = [tuple(HEADS), *rated.cells]
+    rows = [tuple(rated.heads), *rated.cells]
     rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
     lines = align_cells(rows)
     lines += ["", *(" ".join(f"{line}.".split()) for line in rated.missing)]
@@ -298,7 +318,7 @@ def _rounded(value: Any) -> Any:
 def _write_latex(rated: RatedCsv) -> str:
     board = rated.board
     in_paper = board.intervals is Intervals.RESAMPLES  # whose table has no rank sets
-    heads = PAPERS_HEADS if in_paper else tuple(HEADS)
+    heads = PAPERS_HEADS if in_paper else rated.heads
     return latex_table(
         ((escape(name), *rest)[: len(heads)] for name, *rest in rated.cells),
         comments=(f"{rated.method}; {board.votes} votes", *rated.notes),

@@ -13,7 +13,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, PairCounts
+from arena.rating.comparisons import (
+    LEVEL,
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    select_votes,
+)
 from arena.rating.models import Meetings
 from arena.rating.rules import Unit
 
@@ -228,19 +236,47 @@ def ranks_across(votes: Comparisons, chains: Chains, unit: Unit, rank: IntArray)
     return np.where(is_ranked[part_of] & (inner > 0), inner + higher[part_of], 0)
 
 
+def judge_across(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
+    """Return (C, C) whether the row's contestant is of a part that is above the column's.
+
+    All votes between the two parts went one way, and a fair coin falls so often alike between any
+    two of the contestants in less than 5 % (Bonferroni).
+
+    Args:
+        votes: Of C contestants who all have votes.
+        chains: Of these votes.
+        unit: What hangs together.
+    """
+    parts, pairs = len(chains.sizes), len(votes.names) * (len(votes.names) - 1)
+    loser = chains.part_of[np.where(votes.score == 1.0, votes.second, votes.first)]
+    number = _independent(votes, _winner_parts(votes, chains) * parts + loser, parts**2, unit)
+    is_told = (number >= np.log2(pairs / (1.0 - LEVEL))).reshape(parts, parts)
+    np.fill_diagonal(is_told, False)
+    return np.asarray(is_told[np.ix_(chains.part_of, chains.part_of)])
+
+
 def _shown_parts(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
-    """(K,) which parts enough independent votes show to be above those that they reach.
+    """(K,) which parts enough independent votes show to be above those that they reach."""
+    is_across = chains.part_of[votes.first] != chains.part_of[votes.second]
+    votes = select_votes(votes, is_across)
+    number = _independent(votes, _winner_parts(votes, chains), len(chains.sizes), unit)
+    return np.asarray(number >= FEWEST_TO_TELL)
+
+
+def _winner_parts(votes: Comparisons, chains: Chains) -> IntArray:
+    """(R,) whose contestant won; any of the two, who are of one part, in a tie."""
+    return chains.part_of[np.where(votes.score == 1.0, votes.first, votes.second)]
+
+
+def _independent(votes: Comparisons, group: IntArray, groups: int, unit: Unit) -> FloatArray:
+    """(G,) how many independent votes each group has, by the group (R,) of each row.
 
     Votes that hang together count as one. What there is only one of is left out.
     """
-    winner = np.where(votes.score == 1.0, votes.first, votes.second)
-    is_across = chains.part_of[votes.first] != chains.part_of[votes.second]
-    part = chains.part_of[winner[is_across]]
-    parts = len(chains.sizes)
-    fewest = np.bincount(part, weights=votes.count[is_across], minlength=parts)
+    fewest = np.bincount(group, weights=votes.count, minlength=groups)
     for kind in unit.kinds:
-        codes, cluster = np.unique(getattr(votes, kind)[is_across], return_inverse=True)
-        met = np.unique(part * len(codes) + cluster)
-        different = np.bincount(met // max(len(codes), 1), minlength=parts)
+        codes, cluster = np.unique(getattr(votes, kind), return_inverse=True)
+        met = np.unique(group * len(codes) + cluster)
+        different = np.bincount(met // max(len(codes), 1), minlength=groups)
         fewest = np.where(different > 1, np.minimum(fewest, different), fewest)
-    return np.asarray(fewest >= FEWEST_TO_TELL)
+    return np.asarray(fewest, dtype=np.float64)

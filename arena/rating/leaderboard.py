@@ -11,13 +11,14 @@ with rating, interval and rank, and what must be said with the numbers.
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from arena.rating import remarks
-from arena.rating.chains import Chains, Status, chains_among, diagnose, ranks_across
+from arena.rating.chains import Chains, Status, chains_among, diagnose, judge_across, ranks_across
 from arena.rating.comparisons import (
     Comparisons,
     IntArray,
@@ -28,7 +29,7 @@ from arena.rating.comparisons import (
 )
 from arena.rating.lines import Line
 from arena.rating.parts import Rated, rate_part
-from arena.rating.ranking import Separation
+from arena.rating.ranking import FEWEST_TO_JUDGE, Separation, join_separations
 from arena.rating.rules import (
     MOST_CONTESTANTS,
     Intervals,
@@ -43,8 +44,6 @@ __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
-FEWEST_TO_JUDGE = 5
-"""With three experts equals were told apart in up to 9 % of simulated studies."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,8 +60,9 @@ class Leaderboard:
         tie_share: Ties among the votes, None without votes.
         tie_strength: v of Davidson's model, None with other methods.
         degenerate_rounds: Bootstrap rounds whose votes did not determine everybody's rating.
-        separation: All pairs judged at once, matrices (C, C), NaN for those without votes. None
-            where there are no intervals, or several parts.
+        separation: All pairs judged at once, matrices (C, C); NaN for those without votes and for
+            pairs of different parts, who are above each other where direct votes show it. None
+            where there are no intervals in closed form.
     """
 
     lines: tuple[Line, ...]
@@ -89,17 +89,24 @@ class Leaderboard:
         return tuple(self.lines[index] for index in self.order)
 
     @property
-    def told_apart(self) -> Separation | None:
-        """The pairs where "at 5 % for the whole table" holds: docs/rating.md.
+    def judged(self) -> Separation | None:
+        """All pairs judged at once, if the intervals know of all by which votes hang together.
 
-        Only intervals in closed form that know of experts or scenarios, at least five of each,
-        hold it: votes that hang together unseen tell equals apart in every second study.
+        Votes that hang together unseen tell equals apart in every second study, and those of one
+        expert, or on one scenario, say nothing of others.
         """
-        numbers = {"expert": self.experts, "scenario": self.scenarios}
-        several = {kind: number for kind, number in numbers.items() if number > 1}
-        is_known = several.keys() <= set(self.unit.kinds)
-        holds = is_known and min(several.values(), default=0) >= FEWEST_TO_JUDGE
-        return self.separation if holds and self.intervals is Intervals.CLOSED_FORM else None
+        several = _several(self.experts, self.scenarios)
+        return self.separation if several and several == set(self.unit.kinds) else None
+
+    @property
+    def is_few(self) -> bool:
+        """Return whether so few experts or scenarios judged that the sentence on pairs hedges."""
+        return 1 < self.experts < FEWEST_TO_JUDGE or 1 < self.scenarios < FEWEST_TO_JUDGE
+
+    @property
+    def told_apart(self) -> Separation | None:
+        """The pairs where "at 5 % for the whole table" holds: docs/rating.md."""
+        return None if self.is_few else self.judged
 
     @property
     def explanation(self) -> str:
@@ -115,6 +122,7 @@ def rate(
     unit: Unit | None = None,
     intervals: Intervals | None = None,
     seed: int = 0,
+    founders: Collection[str] = (),
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
@@ -132,6 +140,8 @@ def rate(
             no other.
         intervals: In closed form by default, but resampled where the unit is single votes.
         seed: Of its draws; the same votes and seed give the same table.
+        founders: Names of those around whose mean intervals in closed form are; by default all
+            that nearly every resample determines. Ratings stay around everybody's mean.
 
     Raises:
         TooManyContestants: More than 2000.
@@ -141,7 +151,8 @@ def rate(
         raise TooManyContestants(
             f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
         )
-    return _rate(votes, choose_rules(method, unit, intervals, rounds=rounds, seed=seed))
+    rules = choose_rules(method, unit, intervals, rounds=rounds, seed=seed)
+    return _rate(votes, replace(rules, founders=frozenset(founders)))
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
@@ -157,14 +168,22 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         (members for members in chains.parts if len(members) > 1),
         key=lambda members: (chains.group_of[members[0]], above[members[0]], members[0]),
     )
+    if len(parts) > 1:  # whose scales have nothing in common
+        rules = replace(rules, founders=frozenset())
     rated = [rate_part(restrict_to(counting, part.tolist()), rules) for part in parts]
     lines = _blank_lines(votes.names, counted.tolist())
+    across = np.zeros((len(lines), len(lines)), dtype=np.bool_)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         _fill(lines, present[part], number, found)
     if chains.reaches.any():
         _rank_across(lines, present, counting, chains, rules)
+        if rules.intervals is Intervals.CLOSED_FORM:
+            across[np.ix_(present, present)] = judge_across(counting, chains, rules.unit)
     order = _standing_order(chains, [lines[index] for index in present])
     absent = sorted(set(range(len(lines))) - set(present.tolist()))
+    numbers = count_codes(votes.expert), count_codes(votes.scenario)
+    if _several(*numbers) != set(rules.unit.kinds):  # places left hold for a whole table
+        lines = [replace(line, rank_best=None, rank_worst=None) for line in lines]
     whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
     return Leaderboard(
         lines=tuple(lines),
@@ -178,15 +197,25 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,
-        experts=count_codes(votes.expert),
-        scenarios=count_codes(votes.scenario),
+        experts=numbers[0],
+        scenarios=numbers[1],
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength if whole else None,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
-        separation=whole.separation.among(present, len(lines))
-        if whole and whole.separation
-        else None,
+        separation=join_separations(
+            [
+                found.separation.among(present[part], len(lines))
+                for part, found in zip(parts, rated, strict=True)
+                if found.separation
+            ],
+            across,
+        ),
     )
+
+
+def _several(experts: int, scenarios: int) -> set[str]:
+    """Return the kinds of clusters of which there are at least two."""
+    return {kind for kind, number in (("expert", experts), ("scenario", scenarios)) if number > 1}
 
 
 def _unique(*sentences: tuple[str, ...]) -> tuple[str, ...]:

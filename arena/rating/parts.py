@@ -92,7 +92,10 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     values, reference = place_on_one_scale(point.rating, rounds)
     found = _find_intervals(point, values, reference, rules)
     if found is None or (votes.score == 0.5).all():
-        return replace(plain, explanation=(remarks.NO_INTERVALS,))
+        why = remarks.why_no_intervals(votes, rules.unit)
+        if why != remarks.NO_INTERVALS:
+            plain = replace(plain, note=(remarks.NOTHING_DIFFERS,) * len(votes.names))
+        return replace(plain, explanation=(why,))
     average = float(point.rating[reference].mean())
     said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
@@ -225,7 +228,10 @@ def _find_intervals(
     spread = None
     if point.pulls is not None:
         spread = spread_of(point.pulls, rules.unit, reference)
-        half = spread.half_widths()
+        founders = reference & np.isin(point.pulls.votes.names, list(rules.founders))
+        is_anchored = founders.sum() > 1
+        around = spread_of(point.pulls, rules.unit, founders) if is_anchored else spread
+        half = around.half_widths()
         # A bound is missing where the rounds leave it open.
         lower = np.where(np.isnan(lower), np.nan, rating - half)
         upper = np.where(np.isnan(upper), np.nan, rating + half)

@@ -25,6 +25,9 @@ SingleArray = NDArray[np.float32]
 CAUTION = 1.8
 """What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
 of equals were told apart up to so much more often than the draws foresee (docs/rating.md)."""
+FEWEST_TO_JUDGE = 5
+"""Experts, and scenarios, of whom "at 5 % for the whole table" is said without a hedge. Of fewer
+equals were told apart up to twice as often again."""
 MOST_DRAWN = 300
 """Contestants above whom pairs go by Holm's step-down alone, without draws."""
 MOST_ROUNDS = 2000
@@ -187,6 +190,26 @@ class Separation:
         return type(self)(above=above, p_value=wide[0], difference=wide[1], half=wide[2])
 
 
+def join_separations(separations: Sequence[Separation], across: BoolArray) -> Separation | None:
+    """Join those of parts that were rated apart; None where nothing was judged.
+
+    Args:
+        separations: With rows for all C contestants, NaN outside of the part; each at 5 %, which
+            they share.
+        across: (C, C) who is shown to be above somebody of another part.
+    """
+    if not separations and not across.any():
+        return None
+    unknown = np.full(across.shape, np.nan)
+    p_value, difference, half = (
+        np.fmax.reduce([unknown, *(getattr(part, name) for part in separations)])
+        for name in ("p_value", "difference", "half")
+    )
+    p_value = np.minimum(len(separations) * p_value, 1.0)
+    above = (p_value <= 1.0 - LEVEL) & (difference > 0.0)
+    return Separation(above=above | across, p_value=p_value, difference=difference, half=half)
+
+
 def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -> Separation:
     """Which pairs of ratings (C,) differ, at 5 % for all of them together.
 
@@ -211,7 +234,8 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
         adjusted = _step_down(size, draw_equals(spread, rounds=number, seed=seed))
     else:
         adjusted = holm(2.0 * t_above(size, degrees))
-    adjusted = np.minimum(CAUTION * adjusted, 1.0)
+    caution = CAUTION if spread.fewest >= FEWEST_TO_JUDGE else 2.0 * CAUTION
+    adjusted = np.minimum(caution * adjusted, 1.0)
     difference = rating[:, None] - rating[None, :]
     apart = _square_of(contestants, adjusted <= 1.0 - LEVEL, False)
     return Separation(

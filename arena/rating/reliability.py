@@ -26,6 +26,7 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     count_pairs,
+    select_votes,
     share,
     wilson,
 )
@@ -68,11 +69,14 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
     """Agreement of all experts on the units that several of them judged.
 
     Args:
-        votes: Without planned repeats: an expert's own second judgement is not another expert's.
+        votes: Of an expert's judgements of one unit the first counts: the second is not another
+            expert's.
         rounds: Of the bootstrap over scenarios.
         seed: Of its draws.
     """
-    table, scenario = unit_table(votes)
+    ends = np.sort([votes.first, votes.second], axis=0)
+    first = np.unique([votes.expert, votes.scenario, *ends], axis=1, return_index=True)[1]
+    table, scenario = unit_table(select_votes(votes, np.sort(first)))
     is_shared = table.sum(axis=1) >= 2
     if not is_shared.any():
         nothing = Estimate(value=None)

@@ -1,5 +1,7 @@
 """What to say with ratings: why something is missing, and what to keep in mind."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from arena.rating.chains import few_of
@@ -27,6 +29,7 @@ NO_INTERVALS = (
 NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
 NOT_RATED = "no rating by this model"
 NO_INTERVAL = "no interval and no rank: too few votes"
+NOTHING_DIFFERS = "no interval and no rank: the votes show nothing that differs"
 NO_RANK = "no rank: too few votes"
 
 
@@ -69,6 +72,14 @@ def who_is_open(votes: Comparisons, is_open: BoolArray) -> str:
     )
 
 
+def why_no_intervals(votes: Comparisons, unit: Unit) -> str:
+    """Say why nobody has an interval."""
+    if unit is Unit.VOTE or any(len(set(getattr(votes, kind))) > 1 for kind in unit.kinds):
+        return NO_INTERVALS
+    alone = " and one ".join(unit.kinds)
+    return f"No intervals can be given: all votes belong to one {alone}, of which none differs."
+
+
 def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) -> list[str]:
     """What to keep in mind with intervals by these rules."""
     found: list[str] = []
@@ -93,3 +104,12 @@ def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) 
             "rating; there it counts as far above or below the others, as the votes say."
         )
     return found
+
+
+def remark_on_ignored(kinds: Sequence[str]) -> list[str]:
+    """Say that votes hang together in ways that the intervals do not know of; or nothing."""
+    sentence = (
+        f"Votes are known by {' and '.join(kinds)}, and intervals that take those of one for "
+        "independent are too narrow: nobody is called better by them."
+    )
+    return [sentence] if kinds else []

@@ -84,6 +84,7 @@ class Rules:
     intervals: Intervals
     rounds: int
     seed: int
+    founders: frozenset[str] = frozenset()
 
 
 def choose_rules(

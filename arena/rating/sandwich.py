@@ -185,6 +185,7 @@ class Spread:
         common: (C, C) the covariance if contestants were disagreed about alike, at least `base`.
         base: (C, C) that of independent cells, or votes.
         components: By kind of cluster; none for votes that count as independent.
+        fewest: Clusters of the kind that has the fewest.
     """
 
     covariance: FloatArray
@@ -192,6 +193,7 @@ class Spread:
     common: FloatArray
     base: FloatArray
     components: tuple[Component, ...]
+    fewest: float = np.inf
 
     def among(self, members: IntArray) -> "Spread":
         """The same for some of the contestants alone."""
@@ -256,6 +258,7 @@ def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> S
         common=sum(added, base),
         base=base,
         components=components,
+        fewest=min(clusters for clusters, _ in kinds),
     )
 
 

@@ -6,7 +6,7 @@ nobody asked for it, or that the version which rated did not know it yet. Keys o
 are no longer computed are passed over.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any
@@ -14,9 +14,11 @@ from typing import Annotated, Any
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from arena.rating.agreement import AgreementLine
+from arena.rating.lines import Line
 from arena.rating.ranking import PairP
 from arena.rating.reliability import Agreement, Rater, Repeats
 from arena.rating.side import SideBias
+from arena.rating.verdict import verdict
 from augment.errors import InvalidDocument
 
 
@@ -68,6 +70,7 @@ class BoardRemarks:
         above: The pairs that differ with all of them judged at once, the higher one first; None
             where votes hang together in ways that the intervals do not know of.
         p_values: Of pairs, adjusted for all of them; None as `above`.
+        seems_above: As `above` where that is None, because it rests on few experts or scenarios.
     """
 
     reasons: tuple[Kept, ...] | None = None
@@ -79,6 +82,20 @@ class BoardRemarks:
     parts: dict[str, int] = field(default_factory=dict)
     above: tuple[tuple[str, str], ...] | None = None
     p_values: tuple[PairP, ...] | None = field(default=None, metadata=_SINCE_3)
+    seems_above: tuple[tuple[str, str], ...] | None = field(default=None, metadata=_SINCE_5)
+
+    def answer(self, lines: Sequence[Line], slugs: Sequence[str], votes: int) -> str:
+        """Say in one sentence who is better than whom.
+
+        Args:
+            lines: Best first.
+            slugs: Theirs.
+            votes: How many were cast.
+        """
+        place = {slug: number for number, slug in enumerate(slugs)}
+        above = self.seems_above if self.above is None else self.above
+        apart = None if above is None else [(place[a], place[b]) for a, b in above]
+        return verdict(lines, votes, apart, is_few=self.above is None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

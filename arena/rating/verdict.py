@@ -4,6 +4,7 @@ In: the lines of a table, best first, and the pairs that it tells apart. Out: pl
 """
 
 from collections.abc import Collection, Sequence
+from functools import partial
 
 from arena.rating.lines import Line
 
@@ -18,14 +19,17 @@ MOST_CLAUSES = 5
 _ALL = ("", "", "both", "all three", "all four", "all five", "all six", "all seven", "all eight")
 
 
-def verdict(lines: Sequence[Line], votes: int, apart: Pairs | None) -> str:
-    """What a table says, in one sentence.
+def verdict(
+    lines: Sequence[Line], votes: int, apart: Pairs | None, *, is_few: bool = False
+) -> str:
+    """Say in one sentence who is better than whom.
 
     Args:
         lines: Best first; who has no votes is passed over.
         votes: How many were counted.
-        apart: Who differs with all pairs judged at once. None where nothing was judged so: then
-            the intervals decide, and for who has none the rank.
+        apart: Who differs with all pairs judged at once: nobody else is called better. None where
+            nothing was judged so.
+        is_few: Whether that rests on few experts or scenarios, so that the sentence hedges.
     """
     judged = [place for place, line in enumerate(lines) if line.votes]
     if not judged:
@@ -33,52 +37,39 @@ def verdict(lines: Sequence[Line], votes: int, apart: Pairs | None) -> str:
     counted = f" with {votes} vote{'' if votes == 1 else 's'}"
     if len(judged) == 1:
         return f"{lines[judged[0]].name} has nobody to be compared with."
-    pairs = by_intervals(lines) if apart is None else apart
-    names = [line.name for line in lines]
+    if apart is None and any(line.has_bound for line in lines):
+        return f"Who is better is not judged{counted}."
+    tell = partial(_compare, [line.name for line in lines], apart=apart or [], is_few=is_few)
     parts = sorted({lines[place].part for place in judged} - {-1})
     if len(parts) < 2:
-        return f"{_compare(names, judged, pairs, counted)}."
+        return f"{tell(judged, counted=counted)}."
     groups = [[place for place in judged if lines[place].part == part] for part in parts]
-    comparisons = "; ".join(_compare(names, group, pairs, "") for group in groups)
+    comparisons = "; ".join(tell(group, counted="") for group in groups)
     return f"{votes} votes leave {len(parts)} groups that can’t be compared: {comparisons}."
-
-
-def by_intervals(lines: Sequence[Line]) -> Pairs:
-    """Who is above whom by the lower bound of the one and the upper bound of the other.
-
-    Who was rated with nobody has no bounds. A rank then says how many are above, and where no more
-    have a smaller rank, it is these.
-    """
-    ranks = [line.rank for line in lines if line.rank is not None]
-
-    def is_above(line: Line, other: Line) -> bool:
-        if line.part == other.part != -1:
-            return None not in (line.lower, other.upper) and (line.lower or 0) > (other.upper or 0)
-        if -1 not in (line.part, other.part) or line.rank is None or other.rank is None:
-            return False
-        return line.rank < other.rank == 1 + sum(rank < other.rank for rank in ranks)
-
-    places = range(len(lines))
-    return [(a, b) for a in places for b in places if is_above(lines[a], lines[b])]
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _compare(names: Sequence[str], places: Sequence[int], apart: Pairs, counted: str) -> str:
+def _compare(
+    names: Sequence[str], places: Sequence[int], *, apart: Pairs, counted: str, is_few: bool
+) -> str:
     """The clauses about contestants that were compared with each other, the best ones first."""
+    one_is, many_are, order_is = (
+        ("seems", "seem", "seems to be") if is_few else ("is", "are", "is")
+    )
     best, *rest = _tiers(places, apart)
     is_chain = len(best) == 1 and len(rest) == len(places) - 1
     if is_chain and all((a, b) in apart for a in places for b in places if a < b) and rest[1:]:
         order = ", then ".join(names[place] for place in places)
-        return f"The order is {order}: all are told apart{counted}"
+        return f"The order {order_is} {order}{'' if is_few else ': all are told apart'}{counted}"
     if len(best) > 1:
         clauses = [f"{_named(names, best, len(places))} can’t be told apart{counted}"]
     else:
         below = [place for place in places if (best[0], place) in apart]
         all_others = f"{_ALL[len(below)]} others" if len(below) < len(_ALL) else "all others"
         worse = all_others if 1 < len(below) == len(places) - 1 else _named(names, below)
-        clauses = [f"{names[best[0]]} is better than {worse}{counted}"]
+        clauses = [f"{names[best[0]]} {one_is} better than {worse}{counted}"]
     before = list(best)
     for tier in rest:
         by_betters: dict[tuple[int, ...], list[int]] = {}
@@ -86,7 +77,7 @@ def _compare(names: Sequence[str], places: Sequence[int], apart: Pairs, counted:
             betters = tuple(better for better in before if (better, place) in apart)
             by_betters.setdefault(betters, []).append(place)
         for betters, members in by_betters.items():
-            verb = "is" if len(members) == 1 else "are"
+            verb = one_is if len(members) == 1 else many_are
             if list(betters) != best or len(best) > 1:
                 whom = _better_ones(names, betters, before)
                 clauses.append(f"{_named(names, members)} {verb} worse than {whom}")

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 import subprocess
 import sys
 from typing import Any
@@ -74,8 +75,25 @@ def test_davidson_rank_sets_and_pairs_are_offered(votes: Any) -> None:
         {"method": "elo"},
     ]
     for blind in blinds:
-        assert "told apart" not in run(file=file, rounds=100, **blind), blind
-        assert document(file, rounds=100, **blind)["pairs"] is None, blind
+        said = run(file=file, rounds=100, **blind)
+        assert "told apart" not in said, blind
+        assert "95% ranks" not in said, blind
+        assert "nobody is called better by them" in said, blind
+        found = document(file, rounds=100, **blind)
+        assert found["pairs"] is None, blind
+        assert {line["rank_best"] for line in found["standings"]} == {None}, blind
+
+
+@pytest.mark.parametrize("alone", ["judge", "item"])
+def test_one_judge_or_item_speaks_for_no_whole_table(votes: Any, alone: str) -> None:
+    one = re.compile({"judge": r"j\d+", "item": r"i\d+"}[alone])
+    file = votes(*[one.sub("x", line) for line in clustered(600)], head=WITH_CLUSTERS)
+    said = run(file=file, rounds=100)
+    assert "told apart" not in said
+    assert "95% ranks" not in said
+    assert f"All votes belong to one {alone}" in said
+    said = run(file=file, rounds=100, resample={"judge": "expert", "item": "scenario"}[alone])
+    assert f"No intervals can be given: all votes belong to one {alone}, of which" in said
 
 
 def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:

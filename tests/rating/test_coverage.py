@@ -7,8 +7,10 @@ import pytest
 
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.rules import Unit
+from bench.claims import board_worlds, measure_boards, measure_claims, write_sentence
 from bench.coverage_study import SINGLE, Found, study
 from bench.worlds import World, paper_ratings
+from tests.rating.votes import Comparison, named
 
 EQUAL = np.full(9, 1000.0)
 
@@ -95,8 +97,42 @@ def test_a_unit_that_takes_hanging_votes_for_independent_marks_no_pair(unit: Uni
 
 
 @pytest.mark.parametrize("unit", Unit)
-def test_a_unit_marks_pairs_where_nothing_else_hangs_together(unit: Unit) -> None:
+@pytest.mark.parametrize("alone", ["expert", "scenario"])
+def test_one_expert_or_scenario_speaks_for_no_whole_table(unit: Unit, alone: str) -> None:
+    """A unit that does not name what there is one of may be of votes that nobody names by it."""
     world = World(ratings=np.linspace(700.0, 1300.0, 5), experts=6, votes_per_expert=60)
-    votes = replace(world.votes(np.random.default_rng(1)), scenario=np.zeros(360, dtype=int))
+    votes = world.votes(np.random.default_rng(1))
+    votes = replace(votes, **{alone: np.zeros(360, dtype=int)})  # type: ignore[arg-type]
     board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=50)
-    assert (board.told_apart is not None) == (unit in (Unit.EXPERT, Unit.TWO_WAY))
+    is_known = len(unit.kinds) == 1 and alone not in unit.kinds
+    assert (board.told_apart is not None) == is_known
+    assert {line.rank_best is not None for line in board.lines} == {is_known}
+
+
+@pytest.mark.parametrize(
+    "world",
+    [
+        World(ratings=EQUAL, experts=3, votes_per_expert=60),
+        World(ratings=EQUAL, experts=2, votes_per_expert=60, uneven=1.5),
+        World(ratings=EQUAL, experts=5, scenarios=2, votes_per_expert=60, scenario_sd=100.0),
+    ],
+    ids=["three experts", "two uneven ones", "two scenarios"],
+)
+def test_the_sentence_calls_no_equal_better(world: World) -> None:
+    """By intervals that do not overlap it did in 13 to 21 %."""
+    assert measure_claims(world, studies=60) <= 0.05
+
+
+def test_who_loses_all_direct_votes_is_worse_where_that_is_no_chance() -> None:
+    wins = [
+        Comparison(first="a", second="b", score=1.0, expert=f"{n}", scenario=f"{n}")
+        for n in range(9)
+    ]
+    assert write_sentence(rate(named(wins))) == "a is better than b with 9 votes."
+    assert write_sentence(rate(named(wins[:4]))) == "a and b can’t be told apart with 4 votes."
+
+
+def test_a_boards_intervals_hold_for_founders_and_newcomers() -> None:
+    held = measure_boards(board_worlds()[0], studies=60)
+    assert 0.92 <= held["founders"] <= 0.98
+    assert 0.92 <= held["newcomers"] <= 0.99

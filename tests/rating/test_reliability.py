@@ -58,6 +58,17 @@ def test_units_with_one_judgement_do_not_count() -> None:
     assert found.percent.lower is None, "one scenario says nothing about the spread"
 
 
+def test_what_one_judge_says_again_is_no_agreement_of_two() -> None:
+    again = judged(("e", "s1", WIN), ("e", "s1", WIN), ("e", "s2", LOSS), ("e", "s2", TIE))
+    assert agreement(again, rounds=100, seed=1).units == 0
+    first = judged(("e", "s1", WIN), ("f", "s1", WIN), ("e", "s2", LOSS), ("f", "s2", WIN))
+    more = judged(
+        *[("e", "s1", WIN), ("f", "s1", WIN), ("e", "s2", LOSS), ("f", "s2", WIN)],
+        *[("e", "s2", WIN), ("f", "s1", LOSS)],
+    )
+    assert agreement(more, rounds=100, seed=1) == agreement(first, rounds=100, seed=1)
+
+
 def test_sides_do_not_count_as_disagreement() -> None:
     same = named(
         [

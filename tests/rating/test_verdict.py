@@ -3,72 +3,85 @@
 import pytest
 
 from arena.rating.lines import Line
-from arena.rating.verdict import by_intervals, verdict
+from arena.rating.verdict import verdict
 
 
-def table(*bounds: tuple[float | None, float | None], **more: list[int]) -> list[Line]:
-    """Lines A, B, C and so on with these bounds."""
+def table(number: int, *, part: str = "", bounds: bool = True) -> list[Line]:
+    """Lines A, B, C and so on."""
     return [
         Line(
             name="ABCDEFGHIJ"[place],
-            lower=lower,
-            upper=upper,
+            lower=0.0 if bounds else None,
             votes=9,
-            **{name: values[place] for name, values in more.items()},  # type: ignore[arg-type]
+            part=int(part.split()[place]) if part else 0,
         )
-        for place, (lower, upper) in enumerate(bounds)
+        for place in range(number)
     ]
 
 
-APART = (30.0, 31.0), (20.0, 21.0), (10.0, 11.0), (0.0, 1.0)
-
-
 @pytest.mark.parametrize(
-    ("lines", "sentence"),
+    ("lines", "apart", "sentence"),
     [
-        ([], "There are no votes to rate."),
-        (table((None, None)), "A has nobody to be compared with."),
-        (table(APART[0], APART[1]), "A is better than B with 20 votes."),
-        (table(APART[0], APART[0]), "A and B can’t be told apart with 20 votes."),
-        (table((None, None), (None, None)), "A and B can’t be told apart with 20 votes."),
+        ([], None, "There are no votes to rate."),
+        (table(1, bounds=False), None, "A has nobody to be compared with."),
+        (table(2), "AB", "A is better than B with 20 votes."),
+        (table(2), "", "A and B can’t be told apart with 20 votes."),
+        (table(2, bounds=False), None, "A and B can’t be told apart with 20 votes."),
+        (table(2), None, "Who is better is not judged with 20 votes."),
         (
-            table(*APART),
+            table(4),
+            "AB AC AD BC BD CD",
             "The order is A, then B, then C, then D: all are told apart with 20 votes.",
         ),
         (
-            table(APART[0], APART[0], APART[0], APART[1]),
+            table(4),
+            "AD BD CD",
             "A, B and C can’t be told apart with 20 votes; D is worse than all three.",
         ),
         (
-            table(APART[0], APART[1], APART[1], APART[3]),
+            table(4),
+            "AB AC AD BD CD",
             "A is better than all three others with 20 votes; B and C can’t be told apart; "
             "D is worse than all three.",
         ),
+        (table(3), "AC", "A and B can’t be told apart with 20 votes; C is worse than A."),
         (
-            table((30.0, 40.0), (20.0, 32.0), (10.0, 25.0)),
-            "A and B can’t be told apart with 20 votes; C is worse than A.",
-        ),
-        (
-            table(*[APART[0]] * 7, APART[1]),
+            table(8),
+            "AH BH CH DH EH FH GH",
             "7 of the 8 contestants can’t be told apart with 20 votes; H is worse than all seven.",
         ),
-        (table(*[APART[0]] * 7), "The 7 contestants can’t be told apart with 20 votes."),
+        (table(7), "", "The 7 contestants can’t be told apart with 20 votes."),
         (
-            table(APART[0], APART[1], APART[0], APART[0], part=[0, 0, 1, 1]),
+            table(4, part="0 0 1 1"),
+            "AB",
             "20 votes leave 2 groups that can’t be compared: A is better than B; "
             "C and D can’t be told apart.",
         ),
-        (  # A won against all and has no bounds; the ranks say who is below
-            table((None, None), APART[1], APART[1], part=[-1, 0, 0], rank=[1, 2, 2]),
+        (  # A won against all and has no bounds
+            table(3, part="-1 0 0"),
+            "AB AC",
             "A is better than both others with 20 votes; B and C can’t be told apart.",
         ),
     ],
 )
-def test_a_table_in_one_sentence(lines: list[Line], sentence: str) -> None:
-    assert verdict(lines, 20, None) == sentence
+def test_a_table_in_one_sentence(lines: list[Line], apart: str | None, sentence: str) -> None:
+    assert verdict(lines, 20, places(apart)) == sentence
 
 
-def test_pairs_that_were_judged_at_once_count_before_intervals() -> None:
-    lines = table(APART[0], APART[1])
-    assert by_intervals(lines) == [(0, 1)]
-    assert verdict(lines, 1, []) == "A and B can’t be told apart with 1 vote."
+@pytest.mark.parametrize(
+    ("apart", "sentence"),
+    [
+        ("AB AC", "A seems better than both others with 1 vote; B and C can’t be told apart."),
+        ("AC", "A and B can’t be told apart with 1 vote; C seems worse than A."),
+        ("AB AC BC", "The order seems to be A, then B, then C with 1 vote."),
+    ],
+)
+def test_what_rests_on_few_only_seems_so(apart: str, sentence: str) -> None:
+    assert verdict(table(3), 1, places(apart), is_few=True) == sentence
+
+
+def places(apart: str | None) -> list[tuple[int, int]] | None:
+    """The pairs of letters as places."""
+    if apart is None:
+        return None
+    return [("ABCDEFGHIJ".index(pair[0]), "ABCDEFGHIJ".index(pair[1])) for pair in apart.split()]

@@ -142,13 +142,6 @@ class LeaderboardTable:
         return list(filter(None, self.snapshot.results.board.warnings))
 
     @property
-    def told_apart(self) -> list[tuple[int, int]] | None:
-        """The pairs that differ with all judged at once, by places; None where none was judged."""
-        place = {row.slug: number for number, row in enumerate(self.rows)}
-        above = self.snapshot.results.board.above
-        return None if above is None else [(place[a], place[b]) for a, b in above]
-
-    @property
     def frozen_text(self) -> str:
         """What was frozen before the first vote, in one line; empty without."""
         return f"preregistered: sha256 {self.preregistration}" if self.preregistration else ""

@@ -13,7 +13,6 @@ from arena.rating.agreement import agreement_sentence
 from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import PairRecord, PanelRater
-from arena.rating.verdict import verdict
 from arena.results.exports.agreement import agreement_by_question
 from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import (
@@ -47,7 +46,7 @@ def describe(snapshot: Snapshot, *, is_staff: bool) -> Context:
     cast = snapshot.votes_counted - settled
     return {
         "table": table,
-        "answer": verdict(table.rows, cast, table.told_apart),
+        "answer": snapshot.results.board.answer(table.rows, [r.slug for r in table.rows], cast),
         "early_look": EARLY_LOOK,
         "settled": settled,
         "cast": cast,

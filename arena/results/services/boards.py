@@ -18,7 +18,6 @@ from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.lines import Line, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
-from arena.rating.verdict import verdict
 from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, last_vote_of, vote_set
 from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import software_versions
@@ -193,13 +192,16 @@ def make_document(
     by_slug = {who.slug: who for one in found for who in one.competitors}
     competitors = [by_slug[slug] for slug in sorted(by_slug)]
     founders = tuple(who.slug for who in found[0].competitors)
-    rated = rate(vote_arrays(competitors, votes).comparisons)
+    arrays = vote_arrays(competitors, votes)
+    rated = rate(arrays.comparisons, founders=founders)
+    remarks = board_remarks(rated, arrays)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
     since = {line.slug: line.since for line in before.lines} if before else {}
     lines = tuple(
         _board_line(line, by_slug[line.name], since.get(line.name, made_at[:10]))
         for line in anchor_lines(_without_equal_ranks(rated.standings), founders)
     )
+    cast = sum(vote.kind != AUTOMATIC for vote in votes)
     left_out = sum((Counter(one.left_out) for one in found), Counter[str]())
     judges = {vote.judge: vote.judge_name for vote in votes}
     not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
@@ -210,9 +212,8 @@ def make_document(
         benchmark=str(board.benchmark or ""),
         benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
         question=str(Question(studies[0].questions[0]).label),
-        method=f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, "
-        f"clustered by {UNIT_TEXTS[rated.unit]}",
-        answer=_answer(lines, rated, sum(vote.kind != AUTOMATIC for vote in votes)),
+        method=_method_text(rated),
+        answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
         studies=tuple(
             _pooled(study, len(one.counted)) for study, one in zip(studies, found, strict=True)
@@ -221,7 +222,7 @@ def make_document(
         votes=len(votes),
         votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
         left_out=dict(sorted(left_out.items())),
-        notes=(*list_remarks(board.benchmark), *rated.reasons, *rated.warnings, *not_ranked),
+        notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
         versions=_versions(),
         includes_simulated=any(who.is_simulated for who in competitors)
         or any(vote.is_simulated for vote in votes),
@@ -229,6 +230,11 @@ def make_document(
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _method_text(rated: Leaderboard) -> str:
+    by = UNIT_TEXTS[rated.unit]
+    return f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, clustered by {by}"
 
 
 _SHOWN = ("slug", "type", "instruction")
@@ -275,14 +281,6 @@ def _without_equal_ranks(lines: Sequence[Line]) -> list[Line]:
     if not says_no_order(lines):
         return list(lines)
     return [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
-
-
-def _answer(lines: Sequence[BoardLine], rated: Leaderboard, cast: int) -> str:
-    """The table in one sentence."""
-    above = board_remarks(rated).above
-    place = {line.slug: number for number, line in enumerate(lines)}
-    apart = None if above is None else [(place[a], place[b]) for a, b in above]
-    return verdict(lines, cast, apart)
 
 
 def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:

@@ -388,7 +388,7 @@ def _results(
     remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
     return Results(
         version=RESULTS_VERSION,
-        board=board_remarks(board, *filter(None, [remark])),
+        board=board_remarks(board, arrays, *filter(None, [remark])),
         trust=trust(arrays, votes, seed=snapshot.seed),
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
         types=analysis.by_type(arrays, board),

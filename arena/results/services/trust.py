@@ -11,6 +11,7 @@ from arena.rating.influence import bradley_terry, rank_changes, without_each_exp
 from arena.rating.leaderboard import Leaderboard
 from arena.rating.models import to_elo
 from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
+from arena.rating.remarks import remark_on_ignored
 from arena.rating.side import side_bias
 from arena.rating.snapshot_document import BoardRemarks, PanelRater, StrengthCheck, Trust
 from arena.results.queries.votes import AUTOMATIC, VoteSet
@@ -44,22 +45,27 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
     )
 
 
-def board_remarks(board: Leaderboard, *more_warnings: str) -> BoardRemarks:
-    """What a rating says beside its lines."""
+def board_remarks(board: Leaderboard, arrays: VoteArrays, *more_warnings: str) -> BoardRemarks:
+    """What a rating says beside its lines; nothing of pairs where votes hang together unseen."""
     names = [line.name for line in board.lines]
-    apart = board.told_apart
+    known = {"expert": {*arrays.judges} - {""}, "scenario": {*arrays.items} - {""}}
+    unseen = [kind for kind in known if known[kind] and kind not in board.unit.kinds]
+    judged = None if unseen else board.judged
+    above = None
+    if judged is not None:
+        above = tuple((names[i], names[j]) for i, j in np.argwhere(judged.above).tolist())
+    ignored = [kind for kind in unseen if len(known[kind]) > 1]
     return BoardRemarks(
         reasons=board.reasons,
-        warnings=(*board.warnings, *more_warnings),
+        warnings=(*board.warnings, *remark_on_ignored(ignored), *more_warnings),
         tie_strength=board.tie_strength,
         experts=board.experts,
         scenarios=board.scenarios,
         order=tuple(line.name for line in board.standings),
         parts={line.name: line.part for line in board.lines if line.part >= 0},
-        above=None
-        if apart is None
-        else tuple((names[i], names[j]) for i, j in np.argwhere(apart.above).tolist()),
-        p_values=None if apart is None else apart.judged(names),
+        above=None if board.is_few else above,
+        p_values=None if judged is None or board.is_few else judged.judged(names),
+        seems_above=above if board.is_few else None,
     )
 
 
