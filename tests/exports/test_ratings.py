@@ -5,6 +5,7 @@ import pytest
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
 from arena.people.services import create_person
+from arena.results.pages.tabs import describe
 from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
@@ -49,6 +50,19 @@ def test_the_same_votes_and_seed_give_the_same_standings() -> None:
     assert lines(one) != lines(other)
     assert one.votes_sha256 == other.votes_sha256
     assert latest_snapshot(study) == other
+
+
+@pytest.mark.parametrize("unit", [None, "vote", "expert"])
+def test_two_experts_only_seem_to_prefer_and_single_votes_say_nothing(unit: str | None) -> None:
+    found = rate(study=voted_study(), unit=unit)
+    board, answer = found.results.board, describe(found, is_staff=True)["answer"]
+    assert (board.above, board.p_values) == (None, None)
+    assert (board.seems_above is None) == (unit is not None)
+    is_said = "nobody is called better" in " ".join(board.warnings)
+    assert is_said == (unit is not None)
+    assert (answer == "Who is better is not judged with 36 votes.") == (unit is not None)
+    has_places = found.standings.filter(rank_best__isnull=False).exists()
+    assert has_places == (unit is None)
 
 
 def test_an_open_study_is_rated_only_on_purpose_and_that_is_logged() -> None:

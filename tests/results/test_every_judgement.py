@@ -94,7 +94,25 @@ def test_what_the_side_is_worth(shown: Shown) -> None:
     )
     side, groups = shown.results.trust.side, len(np.unique(experts))
     assert side is not None
-    value = found.params[-1] * POINTS
-    half = t.ppf(0.975, groups - 1) * found.bse[-1] * POINTS * math.sqrt(groups / (groups - 1))
+    value, error = found.params[-1] * POINTS, found.bse[-1] * POINTS
     assert side.advantage.value == pytest.approx(value, abs=1e-4)
+    assert side.standard_error == pytest.approx(error * math.sqrt(groups / (groups - 1)), rel=1e-5)
+    scale, degrees = _bell_mccaffrey(found, np.eye(groups)[experts])
+    half = t.ppf(0.975, degrees) * error * math.sqrt(scale)
     assert side.advantage.upper == pytest.approx(value + half, rel=1e-5)
+
+
+def _bell_mccaffrey(found: Any, of_expert: np.ndarray) -> tuple[float, float]:
+    """By whole matrices of experts: the factor of the variance, and degrees of freedom."""
+    design, expected = found.model.exog, found.fittedvalues
+    certain = expected * (1.0 - expected)
+    back = design @ np.linalg.inv(design.T @ (design * certain[:, None]))[-1]
+    pulls = (found.model.endog - expected) * back
+    weights, squares = of_expert.T @ (certain * back), of_expert.T @ pulls**2
+    left = np.diag(weights) - np.outer(weights, weights)
+    by_votes = np.trace(left @ np.diag(squares / weights**2) @ left.T)
+    effect = ((of_expert.T @ pulls) ** 2).sum() - by_votes
+    variance = np.diag(max(effect / np.trace(left @ left.T), 0.0) + squares / weights**2)
+    form = left @ variance @ left.T
+    scale = weights @ variance @ weights / np.trace(form)
+    return scale, np.trace(form) ** 2 / np.trace(form @ form)
