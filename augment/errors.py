@@ -21,7 +21,8 @@ class InvalidDocument(AugmentError):
         self.problems = problems
         shown = "; ".join(f"{path or '(document)'}: {text}" for path, text in problems[:8])
         more = f" (and {len(problems) - 8} more)" if len(problems) > 8 else ""
-        super().__init__(f"This {what} can't be read: {shown}{more}")
+        this = "These" if what.endswith("results") else "This"
+        super().__init__(f"{this} {what} can't be read: {shown}{more}")
 
 
 class InvalidModification(AugmentError):

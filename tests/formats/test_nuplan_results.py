@@ -45,14 +45,14 @@ def test_a_contestant_gets_a_filter_and_a_command(tmp_path: Path) -> None:
     assert list(special["special_scenario"]) == ["0", "1", "2"]
     script = files[SCRIPT].decode()
     assert [line for line in script.splitlines() if line.startswith("run ")] == [
-        "run arena-ann   # 2 scenarios",
-        "run arena-bob   # 1 scenarios",
+        'run arena-ann "$@"   # 2 scenarios',
+        'run arena-bob "$@"   # 1 scenarios',
     ]
     (tmp_path / "python").write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n')
     (tmp_path / "python").chmod(0o700)
     (tmp_path / SCRIPT).write_text(script)
     asked = subprocess.run(
-        ["/bin/sh", SCRIPT],
+        ["/bin/sh", SCRIPT, "worker=sequential", "seed=two words"],
         env={"PATH": f"{tmp_path}:/usr/bin:/bin", "INTERPLAN_PLUGIN_ROOT": "/plugin"},
         cwd=tmp_path,
         capture_output=True,
@@ -70,7 +70,8 @@ def test_a_contestant_gets_a_filter_and_a_command(tmp_path: Path) -> None:
     assert first == f"file://{tmp_path}"
     assert second == "pkg://interplan.planning.script.config.common"
     assert last == "pkg://nuplan.planning.script.experiments]"
-    assert len(asked) == 12
+    assert asked[6:8] == ["worker=sequential", "seed=two words"]
+    assert asked[11:12] + asked[14:] == ["scenario_filter=arena-bob", *asked[6:8]]
     assert read_tokens(files[TOKENS])[f"{BASE}-s1"] == "code-of-bob"
 
 

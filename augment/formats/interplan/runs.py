@@ -52,7 +52,7 @@ def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
     rows.writerow(_COLUMNS)
     for slug, found in sorted(by_contestant.items()):
         files[f"scenario_filter/arena-{slug}.yaml"] = _filter(found)
-        commands += f"run arena-{slug}   # {len(found)} scenarios\n"
+        commands += f'run arena-{slug} "$@"   # {len(found)} scenarios\n'
         rows.writerows([getattr(one, column) for column in _COLUMNS] for one in found)
     return files | {SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
 
@@ -105,7 +105,7 @@ def _filter(scenarios: list[NuplanScenario]) -> bytes:
 _SCRIPT = """\
 #!/bin/sh
 # Drives what the contestants made in nuPlan, with interPlan's benchmark; a command a contestant.
-#   INTERPLAN_PLUGIN_ROOT=... PLANNER=pdm_closed_planner sh run_nuplan.sh
+#   INTERPLAN_PLUGIN_ROOT=... PLANNER=pdm_closed_planner sh run_nuplan.sh [OVERRIDE ...]
 # Afterwards: manage.py import nuplan_results EXPERIMENT_FOLDER ... --tokens nuplan_tokens.csv
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -114,12 +114,14 @@ configs=$(for of in interplan tuplan_garage nuplan; do
     printf 'pkg://%s.planning.script.%s,' $of $part; done; done)
 
 run() {
+  filter=$1
+  shift
   python "$INTERPLAN_PLUGIN_ROOT/interplan/planning/script/run_simulation.py" \\
     +simulation=default_interplan_benchmark \\
     planner="${PLANNER:-pdm_closed_planner}" \\
-    scenario_filter="$1" \\
-    experiment_name="$1" \\
-    hydra.searchpath="[file://$here,${configs%,}]"
+    scenario_filter="$filter" \\
+    experiment_name="$filter" \\
+    hydra.searchpath="[file://$here,${configs%,}]" "$@"
 }
 
 """
