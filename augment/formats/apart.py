@@ -22,9 +22,9 @@ from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
-from augment.formats.nuplan_log import tokens_in
+from augment.formats.nuplan_log import vehicles_at
 from augment.formats.readers import READERS, find_input, reader_of, recognise
-from augment.formats.reading import Moment, Reader, Reading
+from augment.formats.reading import LogReader, Moment, Reader, Reading
 from augment.scene.codec import (
     recording_from_document,
     recording_to_document,
@@ -41,6 +41,7 @@ _UNREADABLE = (
 )
 _MOMENT, _MOMENTS = TypeAdapter(Moment), TypeAdapter(list[Moment])
 _TEXTS = TypeAdapter(tuple[str, ...])
+_SIZES = TypeAdapter(dict[str, list[tuple[float, float]]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,10 +51,12 @@ class UntrustedInput:
     Attributes:
         path: A zip is unpacked for as long as it is read.
         format: The name of a reader; None to recognise it.
+        reach_m: How far from the ego the map of a recording goes; None for as far as usual.
     """
 
     path: Path
     format: str | None = None
+    reach_m: float | None = None
 
     def moments(self, *, every_s: float, most: int) -> tuple[str, list[Moment]]:
         """Return the format's name, and the first moments, so many seconds apart.
@@ -80,13 +83,13 @@ class UntrustedInput:
             moment=_MOMENT.validate_python(found["moment"]),
         )
 
-    def tokens(self, wanted: Sequence[str]) -> tuple[str, ...]:
-        """Return those of some tokens that a nuPlan log has a lidar_pc of.
+    def vehicles(self, tokens: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
+        """Return the sizes of vehicles by those tokens that a nuPlan log has; see `vehicles_at`.
 
         Raises:
             UnknownName, InvalidDocument: As above.
         """
-        return _TEXTS.validate_python(self._ask("tokens", wanted=list(wanted))[1])
+        return _SIZES.validate_python(self._ask("vehicles", tokens=list(tokens))[1])
 
     def _ask(self, what: str, **more: Any) -> tuple[str, Any]:
         if self.format is not None:
@@ -96,7 +99,8 @@ class UntrustedInput:
             raise InvalidDocument("input", [(str(self.path), "is not there")])
         with tempfile.TemporaryDirectory(prefix="arena-reading-") as folder:
             request = {"what": what, "path": str(path), "format": self.format, "folder": folder}
-            source, found = sandbox.run(__name__, request | {"more": more}, name=path.name)
+            more_still = {"reach_m": self.reach_m, "more": more}
+            source, found = sandbox.run(__name__, request | more_still, name=path.name)
         return reader_of(source).name, found
 
 
@@ -116,6 +120,8 @@ def _answer(request: dict[str, Any]) -> tuple[str, Any]:
         os.chdir(path.parent)
         path = Path(path.name)
         reader = reader_of(name) if name else recognise(path)
+    if request["reach_m"] and isinstance(reader, LogReader):
+        reader.reach_m = request["reach_m"]  # in this process alone
     return reader.name, _ask_reader(reader, path, request["what"], request["more"])
 
 
@@ -124,8 +130,8 @@ def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> 
     if what == "moments":
         moments = reader.moments(path, every_s=more["every_s"])
         return [asdict(moment) for moment in islice(moments, more["most"])]
-    if what == "tokens":
-        return tokens_in(path, more["wanted"])
+    if what == "vehicles":
+        return vehicles_at(path, more["tokens"])
     found = reader.read(path, **more)
     return {
         "scene": scene_to_document(found.scene),

@@ -39,6 +39,7 @@ TYPE_OF = {
     "czone_sign": AgentType.CONSTRUCTION_SIGN,
     "generic_object": AgentType.GENERIC_OBJECT,
 }
+_FRAME = "SELECT timestamp FROM lidar_pc WHERE token = ?"
 LIGHT_OF = {"green": TrafficLight.GREEN, "yellow": TrafficLight.YELLOW, "red": TrafficLight.RED}
 
 
@@ -86,17 +87,28 @@ class NuPlan(LogReader):
         )
 
 
-def tokens_in(path: Path, tokens: Sequence[str]) -> tuple[str, ...]:
-    """Return those of some tokens that a log has a lidar_pc of.
+def vehicles_at(path: Path, tokens: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
+    """Return length and width of all vehicles, as listed, by those tokens that are in a log.
 
     Raises:
-        InvalidDocument: The file is no log.
+        InvalidDocument: The file is no log, or a size is no number.
     """
-    text = "SELECT 1 FROM lidar_pc WHERE token = ? LIMIT 1"
+    text = (
+        "SELECT length, width FROM lidar_box WHERE lidar_pc_token = ? AND track_token IN "
+        "(SELECT t.token FROM track t JOIN category c ON c.token = t.category_token "
+        "WHERE c.name = 'vehicle') ORDER BY rowid"
+    )
     with open_tables(path) as base:
-        return tuple(
-            token for token in tokens if base.execute(text, (bytes.fromhex(token),)).fetchone()
-        )
+        known = [one for one in tokens if base.execute(_FRAME, (bytes.fromhex(one),)).fetchone()]
+        return {
+            one: [
+                (round(length_m, 3), round(width_m, 3))
+                for length_m, width_m in _finite(
+                    base.execute(text, (bytes.fromhex(one),)).fetchall(), "lidar_box"
+                )
+            ]
+            for one in known
+        }
 
 
 # Private
@@ -148,9 +160,7 @@ def _motion(
     base: sqlite3.Connection, token: str
 ) -> tuple[FloatArray, FloatArray, dict[str, LoggedTrack]]:
     """Times, the ego's states and all tracks from a lidar_pc on, which is the first step."""
-    start = base.execute(
-        "SELECT timestamp FROM lidar_pc WHERE token = ?", (bytes.fromhex(token),)
-    ).fetchone()
+    start = base.execute(_FRAME, (bytes.fromhex(token),)).fetchone()
     if start is None:
         raise fault_at("item", f"there is no lidar_pc {token}")
     first = _whole(start[0], "lidar_pc.timestamp")

@@ -19,7 +19,6 @@ import numpy as np
 import shapely
 
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.roads import RADIUS_M
 from augment.formats.values import FloatArray, fault_at
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 
@@ -33,6 +32,8 @@ AREA_OF = {
     "road_segments": AreaKind.DRIVABLE,
 }
 LEFT_HAND = "sg-"
+REACH_M = 500.0
+"""What is read, whatever of it a scene keeps: 30 s at the 16.7 m/s that cities allow."""
 BESIDE_M = 50.0
 """Edges of a lane and what names it lie no further from its centreline than this."""
 GEOGRAPHIC = 4326
@@ -140,10 +141,10 @@ class _Layers:
         rows = self._base.execute(text).fetchall()
         lines = self._lines([row[-1] for row in rows], system, layer)
         for row, points in zip(rows, lines, strict=True):
-            if self.is_near(points, RADIUS_M + BESIDE_M):
+            if self.is_near(points, REACH_M + BESIDE_M):
                 yield row[:-1], points
 
-    def is_near(self, points: FloatArray, reach_m: float = RADIUS_M) -> bool:
+    def is_near(self, points: FloatArray, reach_m: float = REACH_M) -> bool:
         """Return whether the box around points lies within reach."""
         local = points - self._center
         gap = np.maximum(np.maximum(local.min(axis=0), -local.max(axis=0)), 0.0)

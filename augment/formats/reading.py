@@ -135,12 +135,13 @@ class Log:
             time_s = times_s[index] - times_s[0] if len(times_s) > 1 else None
             yield Moment(item=self.item, frame=frames[index], time_s=time_s)
 
-    def reading_at(self, frame: int, name: str) -> Reading:
+    def reading_at(self, frame: int, name: str, reach_m: float = RADIUS_M) -> Reading:
         """Return the scene at a frame, what was recorded from there on, and what is left open.
 
         Args:
             frame: What becomes t0.
             name: The scene's slug.
+            reach_m: How far from the ego the map goes.
 
         Raises:
             InvalidDocument: No such frame, no ego in it, a number that is none, or a part of the
@@ -148,7 +149,7 @@ class Log:
         """
         origin = self._ego_pose(frame)
         city, map_notes = complete_map(self.map_at(frame))
-        road = road_around(city, origin)
+        road = road_around(city, origin, reach_m)
         tracks, names = _tracks(self, frame, origin)
         scene = Scene(
             name=name,
@@ -170,9 +171,9 @@ class Log:
             notes.append(f"{sizes} got the usual size of their class.")
         here = self.ego[frame, :2]
         away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in self.tracks]
-        far = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
+        far = road.far + sum(bool(distance_m > reach_m) for distance_m in away_m)
         if far:
-            notes.append(f"{far} things more than {RADIUS_M:g} m from the ego were left out.")
+            notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
         if road.side_is_assumed:
             notes.append(f"That people drive on the {road.traffic_side} is assumed.")
         if not self.is_free:
@@ -248,9 +249,10 @@ class LogReader(Reader):
 
     Attributes:
         has_items: Whether a path can hold several parts.
+        reach_m: How far from the ego the map of a scene goes.
     """
 
-    has_items = True
+    has_items, reach_m = True, RADIUS_M
 
     @abstractmethod
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
@@ -272,7 +274,7 @@ class LogReader(Reader):
         log = next(self.logs(path, item), None)
         if log is None:
             raise fault_at("item", f"{str(item or 'a first part')[:60]!r} is not there")
-        return log.reading_at(log.frame if frame is None else frame, name)
+        return log.reading_at(log.frame if frame is None else frame, name, self.reach_m)
 
 
 def frames_every(times_s: Sequence[float], every_s: float) -> Iterator[int]:

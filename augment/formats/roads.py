@@ -22,7 +22,7 @@ from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight, Traf
 from augment.scene.lane_graph import traffic_side_of, turn_type_of
 
 RADIUS_M = 150.0
-"""Map and agents further from the ego than this are left out."""
+"""Map and agents further from the ego than this are left out, but for a reader's own reach."""
 SPACING_M = 2.0
 SAME_POINT_M = 0.05
 
@@ -56,8 +56,8 @@ class Strip:
     distance_m: float
 
 
-def road_around(city: RoadMap, ego: Pose) -> MapExtract:
-    """Return the map around the ego's centre, which is given in the world frame.
+def road_around(city: RoadMap, ego: Pose, reach_m: float = RADIUS_M) -> MapExtract:
+    """Return the map within reach of the ego's centre, which is given in the world frame.
 
     Raises:
         InvalidDocument: A part has no shape.
@@ -65,7 +65,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     strips = dict[Name, Strip]()
     for segment in city.segments:
         try:
-            strip = _strip(segment, ego)
+            strip = _strip(segment, ego, reach_m)
         except ValueError as fault:
             raise fault_at(f"{city.place}.{segment.name}", str(fault)) from None
         strips |= {} if strip is None else {segment.name: strip}
@@ -77,7 +77,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     following = following_of({name: strip.segment for name, strip in strips.items()})
     lanes = tuple(_lane(name, strips, lane_ids, following) for name in lane_ids)
     side = city.side if city.is_side_told else traffic_side_of(lanes)
-    areas = _areas(city, ego)
+    areas = _areas(city, ego, reach_m)
     return MapExtract(
         traffic_side=side or city.side,
         side_is_assumed=side is None,
@@ -111,7 +111,7 @@ def width_between(line: Polyline, left: Polyline, right: Polyline) -> float:
 # Private
 
 
-def _strip(segment: Segment, ego: Pose) -> Strip | None:
+def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
     """The segment in the ego frame, None if it lies far away.
 
     Raises:
@@ -119,7 +119,7 @@ def _strip(segment: Segment, ego: Pose) -> Strip | None:
     """
     given = (segment.centerline, segment.left, segment.right)
     local = [None if line is None else _local(line, ego) for line in given]
-    if all(points is None or _is_far(points) for points in local):
+    if all(points is None or _is_far(points, reach_m) for points in local):
         return None
     line, left, right = (None if points is None else Polyline(points) for points in local)
     if left is None or right is None:
@@ -132,7 +132,7 @@ def _strip(segment: Segment, ego: Pose) -> Strip | None:
     if line is None or width_m is None:
         raise ValueError("has neither boundaries nor a width")
     distance_m = line.project(0.0, 0.0).distance_m
-    if distance_m > RADIUS_M:
+    if distance_m > reach_m:
         return None
     return Strip(
         segment=segment,
@@ -149,15 +149,15 @@ def _local(points: FloatArray, ego: Pose) -> FloatArray:
     return np.round(ego.to_local(np.where(np.abs(points) <= FURTHEST, points, np.nan)), 3)
 
 
-def _is_far(points: FloatArray) -> bool:
+def _is_far(points: FloatArray, reach_m: float) -> bool:
     """Whether the box around the points lies away from the ego; NaN does not."""
     if len(points) == 0:
         return True
     gap = np.maximum(np.maximum(points.min(axis=0), -points.max(axis=0)), 0.0)
-    return bool(np.hypot(*gap) > RADIUS_M)
+    return bool(np.hypot(*gap) > reach_m)
 
 
-def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:
+def _areas(city: RoadMap, ego: Pose, reach_m: float) -> tuple[Area, ...]:
     """The areas within reach of the ego, the nearest first."""
     near = []
     for kind, points in city.areas:
@@ -167,10 +167,10 @@ def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:
         if not np.isfinite(ring).all() or len(np.unique(ring, axis=0)) < 3:
             problem = f"has a {kind} area without an inside, or that is not finite"
             raise fault_at(city.place, problem)
-        if _is_far(ring):
+        if _is_far(ring, reach_m):
             continue
         distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m
-        if distance_m <= RADIUS_M:
+        if distance_m <= reach_m:
             near.append((round(distance_m, 3), kind, ring.tolist()))
     return tuple(
         Area(id=f"Area{number}", kind=kind, boundary_m=tuple((x, y) for x, y in boundary))

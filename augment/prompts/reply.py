@@ -24,6 +24,7 @@ from augment.prompts.vectors import (
     with_short_ids,
 )
 from augment.scene.codec import intent_from_parts
+from augment.scene.density import fit_boxes
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import PlannedMotion, PointPath
@@ -182,7 +183,7 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
             problems.append(f"{agent.id}: nobody else is an EGO_VEHICLE")
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
-    modification = _modification(block, scene, names)
+    modification = fit_boxes(scene, _modification(block, scene, names))
     return ReadReply(modification=modification, notes=notes_of(answer), mended=mended)
 
 

@@ -35,6 +35,7 @@ from augment.scene.planned_motion import AtPlace, LanePath, PlannedMotion
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0
+_MOST_BOXES = 6
 
 Vector = list[object]
 Renamed = TypeVar("Renamed")
@@ -227,6 +228,16 @@ def scene_text(
     if goal is not None:
         way = "goes straight on" if goal is entities.TurnType.STRAIGHT else f"turns {goal}"
         parts.append(f"The ego's goal: its way {way} where the lanes first part.")
+    rules = scene.options.interplan
+    if rules is not None and rules.boxes_m is not None:
+        boxes_m = [
+            f"{wide:g} x {long:g}"
+            for long, wide in (*rules.boxes_m, scene.ego.size_m)[:_MOST_BOXES]
+        ]
+        order = (
+            f"in their order {', '.join(boxes_m)} m (width x length), whatever is said elsewhere"
+        )
+        parts.append(f"New agents of type VEHICLE are {order}.")
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
 

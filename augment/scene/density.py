@@ -1,14 +1,17 @@
-"""Traffic spawned at a density in place of the recorded one, after interPlan's rules.
+"""Traffic spawned at a density in place of the recorded one, and boxes, after interPlan's rules.
 
-Each lane of the ego's roadblock (its lanes of one direction), 50 m longer both ways but not past
-a traffic light, is filled from its far end backwards, at gaps drawn from 10 m up to the density's
-widest; so are the roadblocks under further places that a scenario names. Frame: ego frame.
+Each lane of the ego's roadblock (its lanes of one direction, from left to right), with what leads
+to it and follows it until 50 m behind the ego and ahead of it are there, but not past a traffic
+light, is filled from its far end backwards, at gaps drawn from 10 m up to the density's widest;
+so are the roadblocks under further places that a scenario names. The same draws from the same
+random numbers in the same order as interPlan give the same vehicles. Frame: ego frame.
 """
 
 import math
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, repeat
 
 from augment.geometry.frames import Pose, overlap
 from augment.geometry.polyline import Polyline
@@ -18,6 +21,7 @@ from augment.scene.entities import (
     AgentType,
     Lane,
     LaneConnector,
+    Modification,
     Point,
     Scene,
     TrafficAgent,
@@ -30,77 +34,124 @@ FIRST_ID = 101
 """Spawned agents are numbered from here, so that the ids of a change stay clear of them."""
 NARROWEST_M = 10
 WIDEST_M = {TrafficDensity.HIGH: 33, TrafficDensity.MEDIUM: 50, TrafficDensity.LOW: 100}
+"""No gap is as wide as this."""
 BEYOND_M = 50.0
-DECEL_MPS2 = 2.0
+ACCEL_MPS2, DECEL_MPS2 = 1.0, 2.0
 CLEAR_S = 2.0
 """Who would reach something of the change at a constant speed in this time is not spawned."""
+BUS_LENGTH_M = 7.0
+"""For interPlan, a vehicle from here on is a bus: clearly longer than any car."""
 _FALLBACK_MPS = 10.0
-_ROLLS_MPS = 1.0
+_ROLLS_MPS, _CREEPS_MPS = 1.0, 0.01
+"""Traffic around a slower ego has its own speed but in interPlan, and who has none is parked."""
 _LIGHTS = (TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN)
+_USUAL_M = repeat(LENGTH_WIDTH_M[AgentType.VEHICLE])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExtraAgent:
-    """One vehicle that a scenario names by itself; it is put on the nearest lane."""
+class SpawnedTraffic:
+    """The vehicles, the nearest first, and the ego's speed among them; None where it keeps its."""
 
-    x_m: float
-    y_m: float
-    speed_mps: float
+    agents: tuple[TrafficAgent, ...] = ()
+    ego_mps: float | None = None
 
 
 def spawn_traffic(
     scene: Scene,
     density: TrafficDensity,
     *,
-    seed: str,
+    rng: random.Random,
+    boxes_m: Iterator[tuple[float, float]] = _USUAL_M,
     roadblocks_m: Sequence[Point] = (),
-    extras: Sequence[ExtraAgent] = (),
-    clear_of: Sequence[TrafficAgent] = (),
-) -> tuple[TrafficAgent, ...]:
-    """Return the vehicles of that density, the nearest first; the same for the same seed.
+    extras: Sequence[tuple[float, float, float]] = (),
+) -> SpawnedTraffic:
+    """Return the vehicles of that density; the same for the same random numbers.
 
     Args:
         scene: Cleared of the recorded traffic.
         density: None of it spawns nothing.
-        seed: A text; interPlan takes the base token.
+        rng: interPlan seeds it with the base token.
+        boxes_m: Length and width of one vehicle after the other; also who is not kept takes one.
         roadblocks_m: Places on further roadblocks to fill.
-        extras: Vehicles that stand in the scenario one by one.
-        clear_of: Who is spawned has 2 s at its speed to all of these.
+        extras: Place and speed of vehicles that a scenario names one by one; each is put on the
+            nearest lane.
     """
     if density is TrafficDensity.NONE:
-        return ()
+        return SpawnedTraffic()
     graph = LaneGraph(scene)
     blocks = [find_ego_lane(scene, graph), *(graph.under(*place) for place in roadblocks_m)]
-    lanes = dict.fromkeys(
-        name for block in blocks if block is not None for name in _roadblock(graph, block)
-    )
-    rng = random.Random(seed)
-    wished = [
-        agent for name in lanes for agent in _on_lane(scene, graph, name, WIDEST_M[density], rng)
-    ]
-    for extra in extras:
-        nearest = graph.nearest(extra.x_m, extra.y_m)
-        if nearest is not None:
-            pose = graph.place(nearest[0], nearest[1].s_m).pose
-            wished.append(_vehicle(graph, pose, extra.speed_mps))
+    own, *others = [() if name is None else _roadblock(graph, name) for name in blocks]
+    after = {_roadblock(graph, end) for name in own for end in graph.successors(name)}
+    ego_mps, places = None, list[tuple[Pose, float]]()
+    for name in chain(own, *others):
+        widest_m, has_one_exit = WIDEST_M[density], len(after) == 1
+        for pose, mps in _fill(scene, graph, name, widest_m, rng, has_one_exit=has_one_exit):
+            ego_mps = mps if pose is None else ego_mps
+            places += [] if pose is None else [(pose, mps)]
+    for x_m, y_m, mps in extras:
+        nearest = graph.nearest(x_m, y_m)
+        places += [] if nearest is None else [(graph.place(nearest[0], nearest[1].s_m).pose, mps)]
+    rolls = scene.ego.speed_mps >= _ROLLS_MPS or scene.options.interplan is not None
     kept: list[TrafficAgent] = []
-    for agent in wished:
-        ahead_m = CLEAR_S * agent.speed_mps
-        way = replace(
-            agent,
-            x_m=agent.x_m + ahead_m / 2.0 * math.cos(agent.heading_rad),
-            y_m=agent.y_m + ahead_m / 2.0 * math.sin(agent.heading_rad),
-            length_m=agent.length_m + ahead_m,
-        )
-        if not _meets(agent, scene.everyone + tuple(kept)) and not _meets(way, clear_of):
+    for pose, mps in places:
+        # Whoever has a speed gets the ego's recorded one, as interPlan's released code has it.
+        speed_mps = max(scene.ego.speed_mps if mps and rolls else mps, _CREEPS_MPS)
+        agent = _vehicle(graph, pose, speed_mps, next(boxes_m))
+        strips = [] if agent.lane_id in own else list(map(_strip, kept))
+        if not _meets(agent, [scene.ego, *kept]) and not _meets(_strip(agent), strips):
             kept.append(agent)
+    return SpawnedTraffic(agents=keep_clear(kept), ego_mps=ego_mps)
+
+
+def keep_clear(
+    agents: Sequence[TrafficAgent], clear_of: Sequence[TrafficAgent] = ()
+) -> tuple[TrafficAgent, ...]:
+    """Return spawned vehicles that have 2 s at their speed to all of these, numbered anew."""
+    kept = [agent for agent in agents if not _meets(_strip(agent), clear_of)]
     kept.sort(key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.x_m))
     return tuple(
         replace(agent, id=f"Agent{number}") for number, agent in enumerate(kept, start=FIRST_ID)
     )
 
 
+def is_bus(agent: TrafficAgent, scene: Scene) -> bool:
+    """Return whether interPlan has an agent as its bus; a long box that it gives makes none."""
+    rules = scene.options.interplan
+    if agent.type is not AgentType.VEHICLE or (rules and agent.size_m in (rules.boxes_m or ())):
+        return agent.type is AgentType.BUS
+    return agent.length_m >= BUS_LENGTH_M
+
+
+def fit_boxes(scene: Scene, modification: Modification) -> Modification:
+    """Return the change with the boxes that interPlan will use, where they are known."""
+    rules, fitted = scene.options.interplan, []
+    if rules is None or rules.boxes_m is None:
+        return modification
+    left = iter(rules.boxes_m)
+    for agent in modification.added:
+        size_m = agent.size_m
+        if is_bus(agent, scene):
+            size_m = LENGTH_WIDTH_M[AgentType.BUS]
+        elif agent.type is AgentType.VEHICLE:
+            size_m = next(left, scene.ego.size_m)
+        elif agent.type in (AgentType.PEDESTRIAN, AgentType.TRAFFIC_CONE):
+            size_m = LENGTH_WIDTH_M[agent.type]
+        fitted.append(replace(agent, length_m=size_m[0], width_m=size_m[1]))
+    return replace(modification, added=tuple(fitted))
+
+
 # Private
+
+
+def _strip(agent: TrafficAgent) -> TrafficAgent:
+    """The agent as long as what it covers in 2 s at its speed."""
+    ahead_m = CLEAR_S * agent.speed_mps
+    return replace(
+        agent,
+        x_m=agent.x_m + ahead_m / 2.0 * math.cos(agent.heading_rad),
+        y_m=agent.y_m + ahead_m / 2.0 * math.sin(agent.heading_rad),
+        length_m=agent.length_m + ahead_m,
+    )
 
 
 def _meets(agent: TrafficAgent, others: Sequence[TrafficAgent]) -> bool:
@@ -108,10 +159,18 @@ def _meets(agent: TrafficAgent, others: Sequence[TrafficAgent]) -> bool:
 
 
 def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
-    """The lane and its neighbours of the same direction; connectors that join such lanes alike."""
+    """The lane and its neighbours of the same direction; connectors that join such lanes alike.
+
+    Lanes from left to right, in which order nuPlan numbers them.
+    """
     way = graph.lane(lane_id)
     if isinstance(way, Lane):
-        return graph.abreast(lane_id)
+        # The middle of the way, seen from a lane to its left, lies to the right.
+        middle = way.centerline.position(way.centerline.length_m / 2.0)
+        offsets = {
+            n: graph.lane(n).centerline.project(*middle).d_m for n in graph.abreast(lane_id)
+        }
+        return tuple(sorted(offsets, key=lambda name: offsets[name]))
     begins, ends = (
         graph.abreast(name) if isinstance(graph.lanes.get(name or ""), Lane) and name else ()
         for name in (way.from_lane, way.to_lane)
@@ -124,63 +183,78 @@ def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
     )
 
 
-def _extended(graph: LaneGraph, lane_id: str) -> list[str]:
-    """The lane with what leads to it and follows it, 50 m each way or to a traffic light."""
-    names = [lane_id]
-    for forwards in (False, True):
-        missing_m, here = BEYOND_M, lane_id
-        while missing_m > 0.0:
+def _extended(scene: Scene, graph: LaneGraph, lane_id: str) -> list[str]:
+    """The lane with what leads to it and follows it, 50 m from the ego or to a traffic light."""
+    # interPlan's map says which connectors have no light at all; another map may not know.
+    is_told = scene.options.interplan is not None
+    lights = (*_LIGHTS, TrafficLight.UNKNOWN) if is_told else _LIGHTS
+    names, line = [lane_id], graph.lane(lane_id).centerline
+    ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
+    for forwards, reach_m in ((False, ego_m), (True, line.length_m - ego_m)):
+        here = lane_id
+        while reach_m < BEYOND_M:
             options = graph.successors(here) if forwards else graph.predecessors(here)
             here = next((name for name in options if name not in names), "")
             way = graph.lanes.get(here)
-            if way is None or (isinstance(way, LaneConnector) and way.traffic_light in _LIGHTS):
+            if way is None or (isinstance(way, LaneConnector) and way.traffic_light in lights):
                 break
             names.insert(len(names) if forwards else 0, here)
-            missing_m -= way.centerline.length_m
+            reach_m += way.centerline.length_m
     return names
 
 
-def _on_lane(
-    scene: Scene, graph: LaneGraph, lane_id: str, widest_m: int, rng: random.Random
-) -> Iterator[TrafficAgent]:
-    """Vehicles as fast as the ego, as interPlan's released code has it.
+def _fill(
+    scene: Scene,
+    graph: LaneGraph,
+    lane_id: str,
+    widest_m: int,
+    rng: random.Random,
+    *,
+    has_one_exit: bool,
+) -> Iterator[tuple[Pose | None, float]]:
+    """Yield places from the front to the back with a speed each; None is where the ego is.
 
-    Behind a gap, where the ego stands.
+    The first is as fast as the limit, or slow enough to stop at the end; each further one slow
+    enough to stop behind the one before it.
     """
-    names = _extended(graph, lane_id)
-    lines = [graph.lane(name).centerline for name in names]
+    lines = [graph.lane(name).centerline for name in _extended(scene, graph, lane_id)]
     line = Polyline([point for one in lines for point in one.points_m.tolist()])
-    first = names.index(lane_id)
-    begins_m = sum(one.length_m for one in lines[:first])
-    from_m = max(0.0, begins_m - BEYOND_M)
-    here_m = min(line.length_m, begins_m + lines[first].length_m + BEYOND_M)
-    ego = line.project(scene.ego.x_m, scene.ego.y_m)
+    ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
     is_egos = lane_id == find_ego_lane(scene, graph)
-    limit_mps = graph.lane(lane_id).speed_limit_mps or _FALLBACK_MPS
+    limit_mps = graph.lane(lane_id).speed_limit_mps
+    share, speed_mps, here_m = 3.0 / (2.0 * DECEL_MPS2), -1.0, line.length_m
     while True:
-        gap_m = rng.randint(NARROWEST_M, widest_m)
+        gap_m = float(rng.randrange(NARROWEST_M, widest_m))
         here_m -= gap_m
-        if here_m < from_m:
+        if here_m < 0.0:
             return
-        if is_egos and abs(here_m - ego.s_m) < NARROWEST_M:
-            here_m = ego.s_m  # the slot is the ego's
-            continue
-        speed_mps = scene.ego.speed_mps
-        if speed_mps < _ROLLS_MPS:
-            speed_mps = math.sqrt(2.0 * DECEL_MPS2 * gap_m)
-        yield _vehicle(graph, line.pose_at(here_m), min(limit_mps, speed_mps))
+        is_ego = is_egos and abs(here_m - ego_m) < NARROWEST_M
+        if is_ego:
+            gap_m, here_m = gap_m + here_m - ego_m, ego_m
+        if speed_mps >= 0.0:
+            delay_s = max(rng.gauss(0.25, 0.05), 0.1)
+            way_m = share * speed_mps**2 + gap_m
+            root = math.sqrt(delay_s**2 + 4.0 * share * way_m)
+            speed_mps = min(gap_m / 2.0, (root - delay_s) / (2.0 * share))
+        elif has_one_exit:
+            speed_mps = limit_mps or _FALLBACK_MPS
+        else:
+            speed_mps = math.sqrt(2.0 / 3.0 * (line.length_m - here_m) * ACCEL_MPS2)
+        speed_mps = max(min(speed_mps + rng.gauss(0.0, 1.0), limit_mps or math.inf), 0.0)
+        yield None if is_ego else line.pose_at(here_m), speed_mps
 
 
-def _vehicle(graph: LaneGraph, pose: Pose, speed_mps: float) -> TrafficAgent:
-    length_m, width_m = LENGTH_WIDTH_M[AgentType.VEHICLE]
+def _vehicle(
+    graph: LaneGraph, pose: Pose, speed_mps: float, size_m: tuple[float, float]
+) -> TrafficAgent:
     return TrafficAgent(
         id="",
         type=AgentType.VEHICLE,
         x_m=round(pose.x_m, 3),
         y_m=round(pose.y_m, 3),
         heading_rad=round(pose.heading_rad, 5),
-        length_m=length_m,
-        width_m=width_m,
-        speed_mps=round(max(speed_mps, 0.0), 2),
+        length_m=size_m[0],
+        width_m=size_m[1],
+        speed_mps=round(speed_mps, 2),
         lane_id=graph.under(pose.x_m, pose.y_m, pose.heading_rad),
     )

@@ -131,6 +131,11 @@ class TrafficAgent:
         """The ground that it takes up."""
         return Box(pose=self.pose, length_m=self.length_m, width_m=self.width_m)
 
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Length and width."""
+        return self.length_m, self.width_m
+
 
 Agents = Annotated[tuple[TrafficAgent, ...], Field(fail_fast=True, max_length=MOST_AGENTS)]
 _Centerline = Annotated[Line, Field(alias="centerline_m")]
@@ -216,6 +221,18 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class InterplanRules:
+    """What interPlan does to a scenario of its file: it lasts 30 s, and boxes are interPlan's.
+
+    Attributes:
+        boxes_m: Length and width of the vehicles put there, one after the other; those after the
+            last get the ego's. None where nobody knows them.
+    """
+
+    boxes_m: tuple[tuple[Size, Size], ...] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SceneOptions:
     """What a scenario sets besides its change.
 
@@ -223,11 +240,13 @@ class SceneOptions:
         density: Of the spawned traffic, which is among the scene's agents.
         goal: Where the ego's way turns: left, right or straight; None where nobody says.
         goal_m: A place in the ego frame that the way leads to, None where the turn alone is said.
+        interplan: None for a scene that is not driven by interPlan's rules.
     """
 
     density: TrafficDensity = TrafficDensity.NONE
     goal: TurnType | None = None
     goal_m: PointPair | None = None
+    interplan: InterplanRules | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,6 @@
 """The drive itself: plan, track, let traffic answer, 150 times; and who it is measured by."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -11,11 +12,15 @@ from augment.scene.entities import Modification
 from augment.scene.recording import Recording
 from augment.simulation.planning import IdmPlanner, Plan, Planner, Situation
 from augment.simulation.road import Road
+from augment.simulation.shapes import moved_ahead
 from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, start_state
 from augment.simulation.tracker import drive_steps
 from augment.simulation.traffic import DriveSetting, Traffic
 
-DURATION_STEPS = 150
+STEPS = {False: 150, True: 300}
+"""How long a drive lasts, by whether it goes by interPlan's rules."""
+NEAR_GOAL_M = 0.1
+"""interPlan's goal is the rear axle of the recorded ego at the end; this near, it is reached."""
 _PACE_S = 1.0
 
 
@@ -60,7 +65,7 @@ def run(
     planner: Planner,
     *,
     road: Road | None = None,
-    steps: int = DURATION_STEPS,
+    steps: int | None = None,
     after_step: Callable[[int], None] | None = None,
 ) -> Drive:
     """Drive a setting with a planner.
@@ -69,7 +74,8 @@ def run(
         setting: The scene and its change.
         planner: Replanned every 0.1 s.
         road: The scene's map where it is laid out already.
-        steps: How many at most; fewer where the map ends.
+        steps: How many at most, None for as many as the scene's rules say; fewer where the map
+            or interPlan's goal is.
         after_step: Told the number of steps done, for heartbeats; it may raise to stop.
 
     Raises:
@@ -81,10 +87,11 @@ def run(
     traffic = Traffic(setting, road, body, states[0])
     planner.start(road, body)
     objects, plans, at_end = [traffic.objects()], list[Plan](), False
-    for step in range(steps):
+    goal_m = _goal_m(setting, road, body)
+    for step in range(steps or STEPS[setting.scene.options.interplan is not None]):
         if road.end_m < road.centreline.length_m:
             at_end = road.centreline.station_of(states[-1]) + body.front_m >= road.end_m
-        if at_end:
+        if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
             break
         plans.append(planner.plan(Situation(step=step, ego=states[-1], objects=objects[-1])))
         following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
@@ -102,6 +109,15 @@ def run(
         at_map_end=at_end,
         recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
     )
+
+
+def _goal_m(setting: DriveSetting, road: Road, body: EgoBody) -> float:
+    """Where on the centreline interPlan ends a drive; a goal that it names ends none here."""
+    recording, options = setting.recording, setting.scene.options
+    if options.interplan is None or options.goal or not (recording and recording.shows_ego):
+        return math.inf
+    axle = moved_ahead(recording.ego[recording.ego_is_seen][-1, :3], -body.centre_m)
+    return road.centreline.station_of(axle) - NEAR_GOAL_M
 
 
 def _poses(plan: Plan) -> FloatArray:
@@ -135,12 +151,13 @@ class Expert:
         return self.end_m - self.start_m
 
 
-def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS) -> Expert:
+def expert_of(setting: DriveSetting, road: Road, *, steps: int | None = None) -> Expert:
     """Return the recorded ego, or an IDM drive at the speed limit without the change.
 
     Either goes as long as the drive lasts and as far as the map goes. Where the recording ends
     before, the recorded one holds the pace of its last second.
     """
+    steps = steps or STEPS[setting.scene.options.interplan is not None]
     # A recorded ego is no expert on the way to a goal, which may be another.
     has_goal = setting.scene.options.goal is not None
     if setting.recording is not None and setting.recording.shows_ego and not has_goal:

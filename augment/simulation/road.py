@@ -127,6 +127,7 @@ class Road:
         beside: These, their neighbours of the same direction, and what joins them.
         centreline: Their centrelines in one, with the run-out.
         end_m: Where on it the map ends; beyond reach where it goes on.
+        route_ends_m: Where on it each way of the route ends.
         red: Ids of the connectors whose light is red; nobody knows when it will change.
         limits_mps: The speed limit of each way (W,), NaN where the map does not say.
     """
@@ -156,7 +157,7 @@ class Road:
             self.centreline = self.path_over(self.route, run_out=_straight_on(last))
         ends = [self.graph.lanes[name].centerline.points_m[-1] for name in self.route]
         stations, _ = self.centreline.beside(np.array(ends))
-        self._route_ends = np.maximum.accumulate(stations)
+        self.route_ends_m = np.maximum.accumulate(stations)
         self._paths: dict[int, Path] = {}
 
     @cached_property
@@ -187,13 +188,13 @@ class Road:
     @cached_property
     def red_stations_m(self) -> FloatArray:
         """Where on the centreline the route enters connectors whose light is red (R,)."""
-        starts = np.concatenate([[0.0], self._route_ends[:-1]])
+        starts = np.concatenate([[0.0], self.route_ends_m[:-1]])
         return starts[np.array([name in self.red for name in self.route], dtype=np.bool_)]
 
     def limit_at(self, s_m: float) -> float:
         """Return the speed limit of the route's way there, NaN where the map does not say."""
         last = len(self.route) - 1
-        number = min(int(np.searchsorted(self._route_ends, s_m, side="right")), last)
+        number = min(int(np.searchsorted(self.route_ends_m, s_m, side="right")), last)
         return float(self.limits_mps[self.index[self.route[number]]])
 
     def covering(self, points_m: FloatArray) -> BoolArray:

@@ -34,8 +34,9 @@ TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
 """nuPlan's reactive traffic."""
 ACTIVE_WITHIN_M = 50.0
 """A walker appears once the ego has no further to go than this along its centreline."""
-WALK_STEPS = 150
-"""A walk takes this long, however far it leads: 15 s."""
+WALK_STEPS, LAST_STEP = 150, 301
+"""A walk takes 15 s, however far it leads; in interPlan's own scenarios as much longer as it took
+to set out, but no longer than they last."""
 FALLBACK_MPS = 10.0
 """The wished speed where the map has no limit: nuPlan's."""
 SWEEP_S = 1.5
@@ -96,26 +97,38 @@ class Walkers:
     They are not there until the ego has come within `ACTIVE_WITHIN_M` of their start along the
     centreline; then they go from start to end in 15 s, however far that is, and report a speed of
     0, so that a planner takes them for standing.
+
+    Args:
+        agents: Each with a walk.
+        road: With the ego's route.
+        ego_box: The ego (5,) at t0.
+        by_rules: Whether, as in interPlan's own scenarios, a walk lasts longer the later it
+            begins, who is as far behind the ego stays away, and nearness is measured straight on
+            from the end of the ego's lane.
     """
 
     def __init__(
-        self, agents: Sequence[TrafficAgent], centreline: Path, ego_box: FloatArray
+        self, agents: Sequence[TrafficAgent], road: Road, ego_box: FloatArray, by_rules: bool
     ) -> None:
+        self._road, self._by_rules = road, by_rules
         base = objects_of(agents)
         ends = np.array([agent.walk_to_m for agent in agents], dtype=np.float64).reshape(-1, 2)
         self._walks = ends - base.boxes[:, :2]
         far = np.hypot(*self._walks.T) > 1e-6
         base.boxes[far, 2] = np.arctan2(self._walks[far, 1], self._walks[far, 0])
         self._base = replace(base, speeds_mps=np.zeros(len(base)))
-        self._centreline = centreline
-        self._stations = centreline.beside(base.boxes[:, :2])[0]
+        self._stations = road.centreline.beside(base.boxes[:, :2])[0]
         self._since = np.full(len(base), -1, dtype=np.int64)
         self._step = 0
         self._wake(ego_box)
 
     def objects(self) -> Objects:
         """Return those who have set out."""
-        gone = np.clip((self._step - self._since) / WALK_STEPS, 0.0, 1.0)
+        since, lasts = self._since, np.full(len(self._since), WALK_STEPS)
+        if self._by_rules:  # step 0 is for interPlan no step at all
+            since = np.where(since == 0, 1, since)
+            lasts = np.minimum(since + WALK_STEPS, LAST_STEP)
+        gone = np.clip((self._step - since) / lasts, 0.0, 1.0)
         boxes = self._base.boxes.copy()
         boxes[:, :2] += gone[:, None] * self._walks
         return replace(self._base, boxes=boxes).chosen(self._since >= 0)
@@ -126,8 +139,16 @@ class Walkers:
         self._wake(ego_box)
 
     def _wake(self, ego_box: FloatArray) -> None:
-        ego_m = self._centreline.station_of(ego_box)
-        near = (self._stations - ego_m <= ACTIVE_WITHIN_M) & (self._since < 0)
+        line, stations = self._road.centreline, self._stations
+        ego_m = line.station_of(ego_box)
+        near = stations - ego_m <= ACTIVE_WITHIN_M
+        if self._by_rules:
+            ends = self._road.route_ends_m
+            end_m = ends[min(int(np.searchsorted(ends, ego_m, side="right")), len(ends) - 1)]
+            onwards = self._base.boxes[:, :2] - line.poses(end_m)[:2]
+            away_m = np.where(stations > end_m - 0.1, end_m + np.hypot(*onwards.T), stations)
+            near = np.abs(away_m - ego_m) <= ACTIVE_WITHIN_M
+        near &= self._since < 0
         self._since[near] = self._step
 
 
@@ -364,7 +385,7 @@ class Traffic:
         walking = [agent for agent in own if agent.walk_to_m is not None]
         self._movers: list[StraightOn | LaneDrivers | Walkers | PlannedMovers | Replay] = [
             *_set_moving(moving, road, ego_box),
-            Walkers(walking, road.centreline, ego_box),
+            Walkers(walking, road, ego_box, setting.scene.options.interplan is not None),
             PlannedMovers(planned, road),
         ]
         self._replay = Replay(setting.recording, replayed) if setting.recording else None

@@ -1,7 +1,11 @@
+import json
 import zipfile
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 import yaml
 from django.core.management import call_command
@@ -11,9 +15,36 @@ from augment.baselines.rule_placer import place
 from augment.checks.ground import Ground
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
+from augment.formats.interplan.file import InterplanSource
+from augment.formats.interplan.writer import write
+from augment.formats.writing import Cell
+from augment.geometry.frames import wrap
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
-from augment.scene.entities import AgentType
-from augment.services.scenarios.scenes import intent_of, reference_of, scene_of
+from augment.prompts.vectors import scene_text
+from augment.scene.codec import recording_from_document
+from augment.scene.entities import (
+    AgentType,
+    InterplanRules,
+    Modification,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    apply,
+)
+from augment.scene.recording import Recording
+from augment.services.scenarios.scenes import (
+    change_surroundings,
+    intent_of,
+    reference_of,
+    scene_of,
+)
+from augment.simulation.drive import STEPS, expert_of
+from augment.simulation.drive import run as drive_setting
+from augment.simulation.planners import planner_named
+from augment.simulation.road import Road
+from augment.simulation.score import ScoreKind, score_drive
+from augment.simulation.states import EgoBody
+from augment.simulation.traffic import DriveSetting, Walkers
 from tests.formats.interplan_files import ELSEWHERE, HERE, fifty_entries, write_folder
 from tests.jobs import rows
 
@@ -109,7 +140,153 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
         for token, one in wanted["modification_details_dictionary"].items()
         for index in one["special_scenario"]
     )
-    assert "Lost" not in said.getvalue()
+    lost = [line for line in said.getvalue().splitlines() if "Lost" in line]
+    assert all("turned at random there, which may change the outcome" in line for line in lost)
+    assert len({line.split(":")[0] for line in lost}) <= 10, "of those with cones alone"
+
+
+def test_what_was_imported_before_keeps_its_rules_and_its_export_says_so(folder: Path) -> None:
+    run(folder)
+    row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
+    new = scene_of(row)
+    assert row.interplan is not None
+    del row.interplan["built"]
+    row.save()
+    assert scene_of(row).options.interplan is None
+    source = InterplanSource(token=HERE, **row.interplan)
+    reference = reference_of(row)
+    assert reference is not None
+    given = Cell(name="r", scene=scene_of(row), type=None, modification=reference, source=source)
+    cell = replace(given, type=ScenarioType(row.type))
+    texts = [loss.text for loss in write([cell]).losses]
+    assert [text.partition(", ")[0] for text in texts] == [
+        "lasts 30 s by interPlan's rules",
+        f"{reference.added[0].id} has a box of 4.6 x 1.9 m",
+    ]
+    assert all("may change the outcome" in text for text in texts)
+    assert write([replace(cell, scene=new)]).losses == ()
+    BaseScene.objects.filter(pk=row.base_scene_id).update(content_hash="less of the map")
+    assert run(folder)[-1].startswith("3 scenarios imported, 0 were there already")
+    assert Scenario.objects.filter(slug=f"interplan-{HERE}-2-s0").exists()
+    assert run(folder)[-1].startswith("0 scenarios imported, 3 were there already")
+
+
+def test_other_traffic_takes_other_boxes(folder: Path) -> None:
+    run(folder)
+    row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
+    assert "New agents of type VEHICLE are in their order" in scene_text(scene_of(row))
+    change_surroundings(row, keep_traffic=False, density="high", goal="")
+    assert scene_of(row).options.interplan == InterplanRules()
+    assert "New agents of type VEHICLE" not in scene_text(scene_of(row))
+
+
+class World(NamedTuple):
+    """A scenario in the frame of interPlan's own numbers."""
+
+    scene: Scene
+    reference: Modification
+    recording: Recording
+
+    def objects(self) -> list[tuple[float, ...]]:
+        """Kind, place, heading, box and speed of all that stands there, as interPlan lists it."""
+        origin = self.scene.origin.pose
+        listed = []
+        for one in apply(self.scene, self.reference).agents:
+            if one.walk_to_m is None and one.type is not AgentType.PEDESTRIAN:
+                is_cone = one.type is AgentType.TRAFFIC_CONE
+                place = origin.to_parent(np.array([[one.x_m, one.y_m]]))[0]
+                # interPlan turns cones at random.
+                heading_rad = 0.0 if is_cone else wrap(one.heading_rad + origin.heading_rad)
+                listed.append((is_cone, *place, heading_rad, *one.size_m, one.speed_mps))
+        return sorted(listed)
+
+    def walk(self, ego: list[list[float]]) -> list[list[tuple[float, ...]]]:
+        """Who walks where at each step, for an ego whose rear axle is at these poses."""
+        origin, body = self.scene.origin.pose, EgoBody.of(self.scene.ego)
+        poses = np.array(ego)
+        poses[:, :2] = origin.to_local(poses[:, :2])
+        poses[:, 2] -= origin.heading_rad
+        boxes, road = body.boxes(poses), Road(self.scene, self.recording)
+        people = [one for one in self.reference.added if one.type is AgentType.PEDESTRIAN]
+        people = [one if one.walk_to_m else replace(one, walk_to_m=step_of(one)) for one in people]
+        walkers = Walkers(people, road, boxes[0], by_rules=True)
+        seen: list[list[tuple[float, ...]]] = []
+        for box in boxes:
+            if seen:
+                walkers.step(box, walkers.objects())
+            seen.append(sorted(map(tuple, origin.to_parent(walkers.objects().boxes[:, :2]))))
+        return seen
+
+
+def step_of(worker: TrafficAgent) -> tuple[float, float]:
+    return worker.x_m + np.cos(worker.heading_rad), worker.y_m + np.sin(worker.heading_rad)
+
+
+@pytest.fixture
+def worlds(realdata: Path) -> dict[str, World]:
+    root = realdata / "nuplan_synthetic"
+    run(root / "interPlan_modifications.yaml", "--nuplan", root)
+    return {
+        row.slug.removeprefix("interplan-"): World(
+            scene_of(row),
+            reference_of(row) or Modification(),
+            recording_from_document(row.base_scene.recording),
+        )
+        for row in Scenario.objects.select_related("base_scene")
+    }
+
+
+DRIVEN = {
+    "71f182558ee95100-s8": (99.9, None),
+    "6dd2064204c654b7-s0": (99.9, None),
+    "81f400b414215325-s0": (0.0, 0.097),
+    "6dd2064204c654b7-s1": (0.0, 0.101),
+}
+"""Score (%) and progress of PDM-Closed in nuPlan's own closed loop, by interPlan's score."""
+
+
+@pytest.mark.realdata
+@pytest.mark.slow
+def test_scenarios_are_what_interplans_own_code_builds_and_score_as_in_nuplan(
+    realdata: Path, worlds: dict[str, World]
+) -> None:
+    told = json.loads((realdata / "nuplan_synthetic" / "built_by_interplan.json").read_text())
+    assert set(worlds) == set(told)
+    for name, built in told.items():
+        world, (*_, heading_rad, speed_mps, x_m, y_m) = worlds[name], built["ego"]
+        origin = world.scene.origin
+        here = origin.x_m, origin.y_m, origin.heading_rad, world.scene.ego.speed_mps
+        assert here == pytest.approx((x_m, y_m, heading_rad, speed_mps), abs=1e-3), name
+        there = sorted(
+            (kind == "TRAFFIC_CONE", *place, 0.0 if kind == "TRAFFIC_CONE" else turn_rad, *rest)
+            for kind, *place, turn_rad, length_m, width_m, mps, _ in built["objects"]
+            for rest in [(length_m, width_m, mps)]
+        )
+        assert np.array(world.objects()) == pytest.approx(np.array(there), abs=2e-3), name
+        steps = built["walk"]
+        assert len(steps) == built["n"] == STEPS[True] + 1
+        wanted = [sorted((x, y) for _, x, y, _ in people) for _, *people in steps]
+        got = world.walk([ego for ego, *_ in steps])
+        assert [len(people) for people in got] == [len(people) for people in wanted], name
+        for mine, theirs in zip(got, wanted, strict=True):
+            assert mine == [pytest.approx(place, abs=2e-3) for place in theirs], name
+    for name, (score, progress) in DRIVEN.items():
+        scene, reference, recording = worlds[name]
+        setting = DriveSetting(
+            scene=scene, modification=reference, recording=recording, replay=False
+        )
+        road = Road(scene, recording)
+        drive = drive_setting(setting, planner_named("pdm-closed", offsets="original"), road=road)
+        scored = score_drive(
+            drive,
+            expert_of(setting, road),
+            kind=ScoreKind.INTERPLAN,
+            scenario_type=ScenarioType(told[name]["type"]),
+            modification=reference,
+        )
+        assert 100.0 * scored.value == pytest.approx(score, abs=0.1), name
+        ratio = next(one.value for one in scored.metrics if "expert_route" in one.name)
+        assert ratio == pytest.approx(progress or 1.0, abs=0.01), name
 
 
 def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None:

@@ -1,14 +1,24 @@
 """Who is where after t0: what was recorded, walked, held or stood."""
 
+import random
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
+from typing import Any
 
 import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.density import ExtraAgent, spawn_traffic
-from augment.scene.entities import Lane, Scene, TrafficDensity
+from augment.scene.density import fit_boxes, keep_clear, spawn_traffic
+from augment.scene.entities import (
+    InterplanRules,
+    Lane,
+    Modification,
+    Scene,
+    SceneOptions,
+    TrafficAgent,
+    TrafficDensity,
+)
 from augment.scene.motion import MotionSource, motion_of
 from tests.formats.cells import recorded_street
 from tests.scenes import EGO, curve, junction, pedestrian, scene, vehicle
@@ -96,6 +106,13 @@ def two_way(speed_mps: float = 8.0) -> Scene:
     )
 
 
+def spawned(
+    density: TrafficDensity, seed: str, before: Scene | None = None, **more: Any
+) -> tuple[TrafficAgent, ...]:
+    rng = random.Random(seed)
+    return spawn_traffic(before or two_way(), density, rng=rng, **more).agents
+
+
 @pytest.mark.parametrize(
     ("density", "widest_m"),
     [(TrafficDensity.HIGH, 33), (TrafficDensity.MEDIUM, 50), (TrafficDensity.LOW, 100)],
@@ -104,41 +121,77 @@ def test_gaps_on_each_lane_of_the_roadblock_are_as_wide_as_the_density_says(
     density: TrafficDensity, widest_m: int
 ) -> None:
     for seed in range(20):
-        spawned = spawn_traffic(two_way(), density, seed=str(seed))
-        assert {one.lane_id for one in spawned} <= {"Lane1", "Lane2"}, "the other way is no part"
-        beside = sorted(one.x_m for one in spawned if one.lane_id == "Lane2")
-        ahead = [0.0, *sorted(one.x_m for one in spawned if one.lane_id == "Lane1")]
+        agents = spawned(density, str(seed))
+        assert {one.lane_id for one in agents} <= {"Lane1", "Lane2"}, "the other way is no part"
+        beside = sorted(one.x_m for one in agents if one.lane_id == "Lane2")
+        ahead = [0.0, *sorted(one.x_m for one in agents if one.lane_id == "Lane1")]
         gaps = [b - a for xs in (beside, sorted(ahead)) for a, b in pairwise(xs)]
         assert all(10.0 <= gap <= widest_m + 10.0 for gap in gaps)
 
 
 def test_nothing_is_spawned_without_a_density_and_the_same_for_the_same_seed() -> None:
-    high = TrafficDensity.HIGH
-    assert spawn_traffic(two_way(), TrafficDensity.NONE, seed="a") == ()
-    first, again, other = (spawn_traffic(two_way(), high, seed=seed) for seed in "aab")
+    assert spawned(TrafficDensity.NONE, "a") == ()
+    first, again, other = (spawned(TrafficDensity.HIGH, seed) for seed in "aab")
     assert first == again != other
     assert [one.id for one in first] == [f"Agent{101 + n}" for n in range(len(first))]
 
 
 def test_further_roadblocks_and_extra_agents_are_filled_as_named() -> None:
-    spawned = spawn_traffic(two_way(), TrafficDensity.HIGH, seed="a", roadblocks_m=[(50.0, 7.2)])
-    assert {one.lane_id for one in spawned} == {"Lane1", "Lane2", "Lane3"}
-    extra = ExtraAgent(x_m=-80.0, y_m=1.0, speed_mps=3.0)
-    low = spawn_traffic(two_way(), TrafficDensity.LOW, seed="a", extras=[extra])
-    assert any((one.x_m, one.y_m, one.speed_mps) == (-80.0, 0.0, 3.0) for one in low)
+    high = spawned(TrafficDensity.HIGH, "a", roadblocks_m=[(50.0, 7.2)])
+    assert {one.lane_id for one in high} == {"Lane1", "Lane2", "Lane3"}
+    low = spawned(TrafficDensity.LOW, "a", extras=[(-80.0, 1.0, 3.0)])
+    assert any((one.x_m, one.y_m, one.speed_mps) == (-80.0, 0.0, 8.0) for one in low)
 
 
-def test_spawned_traffic_drives_as_fast_as_the_ego_up_to_the_limit() -> None:
-    for ego_mps, wanted_mps in ((8.0, 8.0), (14.0, 10.0)):
-        spawned = spawn_traffic(two_way(ego_mps), TrafficDensity.HIGH, seed="a")
-        assert {one.speed_mps for one in spawned} == {wanted_mps}
-    standing = spawn_traffic(two_way(0.0), TrafficDensity.HIGH, seed="a")
-    assert all(0.0 < one.speed_mps <= 10.0 for one in standing)
+def test_spawned_traffic_drives_as_fast_as_the_ego_was_and_a_standing_ego_gets_a_speed() -> None:
+    for ego_mps, wanted_mps in ((8.0, 8.0), (14.0, 14.0)):
+        agents = spawned(TrafficDensity.HIGH, "a", two_way(ego_mps))
+        assert {one.speed_mps for one in agents} == {wanted_mps}
+    assert all(
+        0.0 < one.speed_mps <= 10.0 for one in spawned(TrafficDensity.HIGH, "a", two_way(0))
+    )
+    rng = random.Random("a")
+    given_mps = spawn_traffic(two_way(0.0), TrafficDensity.HIGH, rng=rng).ego_mps
+    assert given_mps is not None
+    assert 0.0 < given_mps <= 10.0
+
+
+def test_lanes_are_lengthened_while_less_than_50_m_remain_from_the_ego() -> None:
+    """Lane1 ends 40 m ahead of the ego, Lane2 follows it: filled to its end, but not beyond."""
+    lines = [(-100.0, 40.0), (40.0, 90.0), (90.0, 300.0)]
+    chained = tuple(
+        Lane(
+            id=f"Lane{n}",
+            centerline=Polyline([(begin, 0.0), (end, 0.0)]),
+            width_m=3.5,
+            successors=() if n == 3 else (f"Lane{n + 1}",),
+        )
+        for n, (begin, end) in enumerate(lines, start=1)
+    )
+    for seed in range(20):
+        agents = spawned(TrafficDensity.HIGH, str(seed), scene(areas=(), lanes=chained))
+        assert all(one.x_m <= 80.0 for one in agents)
+    assert any(one.lane_id == "Lane2" for one in agents)
+
+
+def test_boxes_are_taken_one_after_the_other_and_a_change_gets_what_is_left() -> None:
+    boxes = iter([(5.4, 2.1), (4.2, 1.8), (9.0, 2.5)])
+    agents = spawned(TrafficDensity.HIGH, "a", boxes_m=chain(boxes, repeat((5.176, 2.297))))
+    assert {(5.4, 2.1), (4.2, 1.8), (5.176, 2.297)} <= {one.size_m for one in agents}
+    options = SceneOptions(interplan=InterplanRules(boxes_m=((9.0, 2.5), (4.2, 1.8))))
+    before = replace(two_way(), options=options)
+    added = (vehicle("Agent2", 9.0, 0.0), vehicle("Agent3", 20.0, 0.0), vehicle("Agent4", 30.0, 0))
+    long = replace(vehicle("Agent5", 40.0, 0.0), length_m=12.0)
+    fitted = fit_boxes(before, Modification(added=(long, *added)))
+    wanted = [(7.456, 2.079), (9.0, 2.5), (4.2, 1.8), before.ego.size_m]
+    assert [one.size_m for one in fitted.added] == wanted
+    assert fit_boxes(before, fitted) == fitted
+    assert fit_boxes(two_way(), Modification(added=added)).added == added
 
 
 def test_nobody_is_spawned_who_would_run_into_the_change_within_two_seconds() -> None:
     parked = vehicle("Agent2", 40.0, 0.0)
     for seed in range(20):
-        spawned = spawn_traffic(two_way(), TrafficDensity.HIGH, seed=str(seed), clear_of=[parked])
+        agents = keep_clear(spawned(TrafficDensity.HIGH, str(seed)), [parked])
         reach_m = 40.0 - 4.8 - 2.0 * 8.0
-        assert not [o for o in spawned if o.lane_id == "Lane1" and reach_m < o.x_m < 44.8]
+        assert not [o for o in agents if o.lane_id == "Lane1" and reach_m < o.x_m < 44.8]

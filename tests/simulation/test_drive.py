@@ -17,6 +17,7 @@ from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     AgentType,
+    InterplanRules,
     Lane,
     Modification,
     Point,
@@ -172,6 +173,25 @@ def test_half_the_experts_speed_scores_alike_however_long_was_recorded() -> None
     assert ratios == pytest.approx([ratios[-1]] * 4, abs=1e-6)
     assert 0.5 < ratios[-1] < 0.55
     assert scores == pytest.approx([scores[-1]] * 4)
+
+
+def test_by_interplans_rules_a_drive_lasts_30_s_or_until_the_recorded_ego_s_rear_axle() -> None:
+    scene, recording = recorded_street(30.0)
+    by_rules = replace(scene, options=SceneOptions(interplan=InterplanRules()))
+    lasts_s = {}
+    for name, before, speed_mps in (
+        ("as ever", scene, 4.0),
+        ("slow", by_rules, 4.0),
+        ("fast", by_rules, 12.0),
+    ):
+        setting = DriveSetting(scene=before, recording=recording, replay=False)
+        drive = run(setting, ConstantSpeed(speed_mps))
+        lasts_s[name] = drive.duration_s
+        duration_s = 15.0 if before is scene else 30.0
+        assert expert_of(setting, drive.road).progress_m == pytest.approx(8.0 * duration_s)
+    assert (lasts_s["as ever"], lasts_s["slow"]) == pytest.approx((15.0, 30.0))
+    # Its centre reaches 240 m less 1.461 m and 0.1 m, at 12 m/s after it got there from 8 m/s.
+    assert drive.boxes[-2, 0] < 240.0 - 1.561 < drive.boxes[-1, 0]
 
 
 @pytest.mark.parametrize("reactive", [False, True])

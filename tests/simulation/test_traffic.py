@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import LaneConnector, Modification, TrafficAgent, TrafficLight
+from augment.scene.entities import (
+    InterplanRules,
+    LaneConnector,
+    Modification,
+    SceneOptions,
+    TrafficAgent,
+    TrafficLight,
+)
 from augment.scene.motion import motion_of
 from augment.scene.planned_motion import NearEgo, PlannedMotion, PointPath
 from augment.scene.recording import Recording
@@ -59,6 +66,23 @@ def test_a_walker_appears_when_the_ego_is_50_m_before_it(x_m: float, since: int)
     # The ego that a step is made for is the one before it moved.
     first = since if since == 0 else since + 1
     assert seen.index(True) == first
+
+
+@pytest.mark.parametrize(
+    ("x_m", "since", "lasts"), [(30.0, 1, 151), (60.0, 11, 161), (250.0, 201, 301)]
+)
+def test_by_interplans_rules_a_walk_lasts_longer_the_later_it_begins(
+    x_m: float, since: int, lasts: int
+) -> None:
+    given = with_agents(
+        pedestrian("P", x_m, -6.0, (x_m, 6.0)), pedestrian("Q", -55.0, -6.0, (-55.0, 6.0))
+    )
+    options = SceneOptions(interplan=InterplanRules())
+    setting = replace(given, scene=replace(given.scene, options=options))
+    made = after(setting, since + 60, ego_speed_mps=10.0)
+    assert place(made[since], "P") == (x_m, -6.0)
+    assert place(made[since + 60], "P") == pytest.approx((x_m, -6.0 + 12.0 * 60 / lasts))
+    assert all("Q" not in row.ids for row in made), "it is more than 50 m behind the ego"
 
 
 def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego() -> None:

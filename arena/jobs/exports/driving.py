@@ -24,9 +24,9 @@ def driving_notes(table: DrivingScores) -> list[str]:
     how = table.options
     traffic = "reactive" if how.is_reactive else "replayed"
     notes = {
-        f"Mean of {SCORE_LABELS[table.score]}'s score over 15 s drives of the planner "
-        f"{how.planner} (offsets: {how.offsets}; recorded traffic {traffic}); contestants by "
-        "how much they lower it.": True,
+        f"Mean of {SCORE_LABELS[table.score]}'s score over {table.longest_s} s drives of the "
+        f"planner {how.planner} (offsets: {how.offsets}; recorded traffic {traffic}); contestants "
+        "by how much they lower it.": True,
         DIFFERENCE: True,
         f"Recordings that end before the drive: {table.outlasting} of {table.total}; from "
         "there on who stands stays, and who moves goes on.": table.outlasting,

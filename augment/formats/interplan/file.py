@@ -7,9 +7,11 @@ that nobody knows are kept aside, so that a reader can say that they say nothing
 
 import hashlib
 import math
+import random
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import chain, repeat
 from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
@@ -20,10 +22,11 @@ from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
 from augment.geometry.frames import wrap
-from augment.scene.density import ExtraAgent, spawn_traffic
+from augment.scene.density import SpawnedTraffic, fit_boxes, spawn_traffic
 from augment.scene.entities import (
     LENGTH_WIDTH_M,
     AgentType,
+    InterplanRules,
     Modification,
     Point,
     ScenarioType,
@@ -33,7 +36,7 @@ from augment.scene.entities import (
     TrafficDensity,
     TurnType,
 )
-from augment.scene.schema import path, problems_of
+from augment.scene.schema import Size, Speed, path, problems_of
 
 WHAT = "interPlan file"
 OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
@@ -104,6 +107,18 @@ class File(_Part):
     modification_details_dictionary: dict[_Token, Details]
 
 
+class Built(_Part):
+    """What interPlan's code makes of a special scenario beyond what the file says.
+
+    Attributes:
+        boxes_m: As `InterplanRules`.
+        ego_mps: The ego's speed among spawned traffic, None for the recorded one.
+    """
+
+    boxes_m: tuple[tuple[Size, Size], ...] | None = None
+    ego_mps: Speed | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InterplanSource:
     """Where a scenario comes from in nuPlan and in interPlan's file, whose parts stay verbatim.
@@ -114,6 +129,7 @@ class InterplanSource:
         entry: The special scenario.
         details: What stands beside the special scenarios under the token.
         file: What stands beside the tokens.
+        built: Of `Built`; empty for what was imported before there was one.
     """
 
     token: str
@@ -121,6 +137,7 @@ class InterplanSource:
     entry: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     file: Mapping[str, Any] = field(default_factory=dict)
+    built: Mapping[str, Any] = field(default_factory=dict)
 
 
 # Reading
@@ -156,7 +173,7 @@ def read_entry(
 ) -> tuple[Modification, list[str]]:
     """Return a special scenario as a change: vehicles, buses, cones, pedestrians.
 
-    Boxes get our own usual sizes, cones the direction of the ego's way.
+    Boxes are interPlan's if known, else our usual ones; cones get the direction of the ego's way.
 
     Args:
         token: The base token.
@@ -210,7 +227,7 @@ def read_entry(
         if iteration is not None:
             left_out.append(f"pedestrian {number} starts at iteration {iteration}")
     left_out += [f"key {key}" for key in entry.model_extra or {}]
-    return Modification(added=tuple(added)), left_out
+    return fit_boxes(scene, Modification(added=tuple(added))), left_out
 
 
 def _agent(
@@ -234,22 +251,22 @@ def _agent(
     )
 
 
-def traffic_of(
+def surround(
     entry: SpecialScenario,
     details: Details,
     scene: Scene,
     *,
-    seed: str,
-    clear_of: Sequence[TrafficAgent] = (),
-) -> tuple[TrafficAgent, ...]:
-    """Return the traffic of a special scenario's density; none without one.
+    token: str,
+    vehicles_m: Sequence[tuple[float, float]],
+) -> tuple[SpawnedTraffic, Built]:
+    """Return what interPlan spawns around the ego, and what else its code makes of a scenario.
 
     Args:
         entry: Its roadblocks come before those of the token, an empty list too.
         details: Of its base token.
         scene: Cleared of the recorded traffic.
-        seed: interPlan takes the base token.
-        clear_of: Who is spawned keeps away from these.
+        token: The base token, which seeds interPlan's random numbers.
+        vehicles_m: Length and width of the vehicles of t0 as the log lists them.
 
     Raises:
         InvalidDocument: An extra agent has no place or speed.
@@ -263,16 +280,37 @@ def traffic_of(
         if not all(isinstance(one, (int, float)) and math.isfinite(one) for one in values):
             problem = f"{values!r} must be x, y and a speed in metres and metres per second"
             raise InvalidDocument(WHAT, [("extra_agents_to_spawn", problem)])
-        x_m, y_m = _to_local(scene, values[0], values[1])
-        extras.append(ExtraAgent(x_m=x_m, y_m=y_m, speed_mps=abs(float(values[2]))))
-    return spawn_traffic(
+        extras.append((*_to_local(scene, values[0], values[1]), float(values[2])))
+    rng = random.Random(token)
+    is_known = all(0.001 <= metres <= 100.0 for size_m in vehicles_m for metres in size_m)
+    # Told to remove all vehicles, interPlan does so twice and forgets the boxes of the first time.
+    pool = vehicles_m if is_known and "a0" not in (entry.config or "") else ()
+    removed = iter(rng.sample(pool, len(pool)))
+    spawned = spawn_traffic(
         scene,
         density,
-        seed=seed,
+        rng=rng,
+        boxes_m=chain(removed, repeat(scene.ego.size_m)),
         roadblocks_m=[_to_local(scene, *place) for place in roadblocks],
         extras=extras,
-        clear_of=clear_of,
     )
+    boxes_m = tuple(removed) if is_known else None
+    return spawned, Built(boxes_m=boxes_m, ego_mps=spawned.ego_mps)
+
+
+def follow_rules(scene: Scene, source: Mapping[str, Any] | None) -> Scene:
+    """Return the scene as interPlan begins it: its rules, the ego at the speed that it gets.
+
+    Args:
+        scene: Of the scenario.
+        source: As `goal_place`; without `built` the scene stays as it is.
+    """
+    if source is None or "built" not in source:
+        return scene
+    built = Built.model_validate(source["built"], strict=False)
+    speed_mps = scene.ego.speed_mps if built.ego_mps is None else built.ego_mps
+    options = replace(scene.options, interplan=InterplanRules(boxes_m=built.boxes_m))
+    return replace(scene, ego=replace(scene.ego, speed_mps=speed_mps), options=options)
 
 
 def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Point | None:

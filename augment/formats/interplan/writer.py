@@ -17,21 +17,23 @@ from augment.formats.interplan.file import InterplanSource
 from augment.formats.interplan.runs import MODIFICATIONS, NuplanScenario, run_files
 from augment.formats.writing import Cell, Loss, LossReport, Written
 from augment.geometry.frames import difference, wrap
+from augment.scene.density import is_bus
 from augment.scene.entities import (
     AgentType,
     Modification,
     Point,
     ScenarioType,
+    Scene,
     TrafficAgent,
+    TrafficDensity,
     without_traffic,
 )
 
-BUS_LENGTH_M = 7.0
-"""A vehicle from here on is written as a bus: clearly longer than any car."""
 WORKER_STEP_M = 1.0
 USUAL_WALK_M = 12.0
 """Walks of people placed by hand for interPlan are 7.0 to 28.8 m long."""
 _SAME_SIZE_M, _SAME_PACE_MPS, _SAME_WAY_DEG, _NO_WALK_M = 0.01, 0.02, 0.06, 0.01
+_OUTCOME = ", which may change the outcome"
 _MADE_UP = (
     "These base tokens are made from the scenes' names and are none of nuPlan's; places are in "
     "the frame of each scene's origin:"
@@ -145,11 +147,14 @@ class _Entry:
         given = dict(self.source.entry)
         config = interplan.config_of(self.cell.scene.options, given.pop("config", None) or "")
         head = {"type": self.kind.value} | ({"config": config} if config else {})
+        self._lose_unknown()
         if self.is_unchanged:
             return head | {key: value for key, value in given.items() if key != "type"}
         change, by_key = self.cell.modification, defaultdict[str, list[TrafficAgent]](list)
         for agent in change.added:
-            by_key[_key_of(agent)].append(agent)
+            by_key[_key_of(agent, self.cell.scene)].append(agent)
+        if self.cell.scene.options.density is not TrafficDensity.NONE:
+            self._lose(f"traffic that would meet a vehicle of this change is left out{_OUTCOME}")
         if self.cell.keeps_traffic:
             # Also with interPlan's "a1": without density traffic it deletes all vehicles twice.
             self._lose(
@@ -174,6 +179,20 @@ class _Entry:
             key: value for key, value in given.items() if key not in ("type", *interplan.OBJECTS)
         }
         return {**head, **objects, **rest}
+
+    def _lose_unknown(self) -> None:
+        """Say what is not known until interPlan builds the scenario, a reference's too."""
+        scene, added = self.cell.scene, self.cell.modification.added
+        rules = scene.options.interplan
+        if self.cell.source is not None and rules is None:
+            self._lose(f"lasts 30 s by interPlan's rules, 15 s in drives here{_OUTCOME}")
+        for agent in added if rules is None or rules.boxes_m is None else ():
+            if agent.type is AgentType.VEHICLE and not is_bus(agent, scene):
+                box = f"{agent.id} has a box of {agent.length_m:g} x {agent.width_m:g} m"
+                text = "is not kept: it gets that of a removed vehicle, or the ego's"
+                self._lose(f"{box}, which {text}{_OUTCOME}", changes_scene=False)
+        cones = [agent.id for agent in added if agent.type is AgentType.TRAFFIC_CONE]
+        self.report.lose_of(cones, f"turned at random there{_OUTCOME}")
 
     def _lose(self, text: str, *, changes_scene: bool = True) -> None:
         self.report.lose(text, changes_scene=changes_scene)
@@ -204,15 +223,14 @@ class _Entry:
         return round(float(x_m), 4), round(float(y_m), 4)
 
 
-def _key_of(agent: TrafficAgent) -> str:
+def _key_of(agent: TrafficAgent, scene: Scene) -> str:
     """The key under which interPlan has such a thing, empty where it has none."""
     if math.hypot(agent.x_m, agent.y_m) > interplan.FURTHEST_FROM_EGO_M:
         return ""
-    if agent.type is AgentType.VEHICLE and agent.length_m >= BUS_LENGTH_M:
+    if is_bus(agent, scene):
         return "stopped_bus"
     return {
         AgentType.VEHICLE: "stopped_vehicle",
-        AgentType.BUS: "stopped_bus",
         AgentType.TRAFFIC_CONE: "cones",
         AgentType.PEDESTRIAN: "pedestrian",
     }.get(agent.type, "")
@@ -224,9 +242,7 @@ def _changes(agent: TrafficAgent, found: TrafficAgent) -> Iterator[tuple[str, bo
         yield f"is {agent.length_m:g} m long and becomes a {found.type}", True
     sizes = (agent.length_m, agent.width_m), (found.length_m, found.width_m)
     box = f"has a box of {agent.length_m:g} x {agent.width_m:g} m"
-    if found.type is AgentType.VEHICLE:
-        yield f"{box}, which is not kept: it gets that of a removed vehicle, or the ego's", False
-    elif np.abs(np.subtract(*sizes)).max() > _SAME_SIZE_M:
+    if found.type is not AgentType.VEHICLE and np.abs(np.subtract(*sizes)).max() > _SAME_SIZE_M:
         yield f"{box}, which becomes {found.length_m:g} x {found.width_m:g} m", False
     turned_deg = math.degrees(abs(difference(agent.heading_rad, found.heading_rad)))
     if turned_deg > _SAME_WAY_DEG:

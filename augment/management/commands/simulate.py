@@ -20,7 +20,8 @@ class Command(TerminalCommand):
 
     help = (
         "Let a planner drive every result of a job, with the scenes before the change and with "
-        "the reference, for 15 s each; or one scenario. What was driven so before stays."
+        "the reference, for 15 s each (interPlan's own for 30 s); or one scenario. What was "
+        "driven so before stays."
     )
 
     arguments = {

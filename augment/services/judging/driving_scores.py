@@ -83,6 +83,7 @@ class DrivingScores:
         under_way: How many drives wait or run.
         failures: Why drives failed, with how often.
         outlasting: How many drives went on after the end of their recording.
+        longest_s: How long one is let last: 30 s where scenarios go by interPlan's rules.
     """
 
     title: str
@@ -93,6 +94,7 @@ class DrivingScores:
     under_way: int
     failures: tuple[tuple[str, int], ...]
     outlasting: int
+    longest_s: int
 
     @property
     def done(self) -> int:
@@ -198,6 +200,7 @@ def _scores(
         under_way=sum(row.state in Simulation.UNDER_WAY for row in rows),
         failures=tuple(sorted(failures.items(), key=lambda item: (-item[1], item[0]))),
         outlasting=sum(bool(_document(row).get("outlasts_recording")) for row in rows),
+        longest_s=30 if any(_document(row).get("duration_s", 0.0) > 15.0 for row in rows) else 15,
     )
 
 

@@ -13,6 +13,7 @@ from django.db.models import QuerySet
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document, recording_from_document
+from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.judging.thresholds import conclude, conclude_all
@@ -211,7 +212,7 @@ def _plan(
 
 def _setting_of(row: Simulation) -> DriveSetting:
     """Return what a row drives; without a modification the scene stays as it was."""
-    scenario, modification = row.scenario, None
+    scenario, modification, scene = row.scenario, None, scene_of(row.scenario)
     changed = row.augmentation or row.swept
     if row.subject == Subject.REFERENCE:
         modification = reference_of(scenario)
@@ -219,8 +220,8 @@ def _setting_of(row: Simulation) -> DriveSetting:
         modification = modification_from_document(changed.modification)
     recording = scenario.base_scene.recording
     return DriveSetting(
-        scene=scene_of(scenario),
-        modification=modification or Modification(),
+        scene=scene,
+        modification=fit_boxes(scene, modification or Modification()),
         recording=None if recording is None else recording_from_document(recording),
         replay=scenario.keep_traffic,
         reactive=row.is_reactive,

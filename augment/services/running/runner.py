@@ -31,6 +31,7 @@ from augment.llm.messages import shorten
 from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
 from augment.prompts.fill import Messages, follow_up_messages
 from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.density import fit_boxes
 from augment.scene.entities import Scene
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
@@ -112,12 +113,13 @@ class Augmentations(WorkKind[Augmentation]):
                 return Settlement(
                     state=outcome.status.value, reason=outcome.reason, columns=columns
                 )
-            document = modification_to_document(outcome.modification)
+            modification = fit_boxes(scene, outcome.modification)
+            document = modification_to_document(modification)
             columns = {"modification": make_document_storable(document)}
             if outcome.notes:
                 columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
             held.note(**columns)  # a second try only has to draw
-            image = picture_of(row.scenario, outcome.modification, camera_of(row.scenario))
+            image = picture_of(row.scenario, modification, camera_of(row.scenario))
             return Settlement(state=State.DONE, columns=columns | {"image": image})
         except JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))

@@ -21,6 +21,7 @@ from augment.geometry.frames import difference, wrap
 from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene import codec
+from augment.scene.density import fit_boxes
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent, apply
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_parts import Amount
@@ -118,6 +119,7 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
         added=tuple(_on_its_lane(agent, ground.graph) for agent in given.added),
         moved=tuple(_on_its_lane(agent, ground.graph) for agent in given.moved),
     )
+    placed = fit_boxes(ground.scene, placed)
     scenes.check_reference(ground.scene, placed)
     return placed
 

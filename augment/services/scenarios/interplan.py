@@ -6,7 +6,7 @@ stored already stays.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -16,19 +16,23 @@ from django.contrib.auth.models import User
 from pydantic import BaseModel
 
 from augment.checks.derived import describe_change
-from augment.errors import AugmentError, InvalidDocument
+from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.documents import MAX_CHARACTERS, read_yaml_file
 from augment.formats.interplan import file as interplan_file
 from augment.formats.nuplan_log import NuPlan
+from augment.formats.nuplan_map import REACH_M
 from augment.models import BaseScene, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
-from augment.scene.entities import Scene, SceneOptions, without_traffic
+from augment.scene.density import keep_clear
+from augment.scene.entities import AgentType, InterplanRules, Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.services.scenarios.scene_imports import keep_reading
+from augment.services.scenarios.scene_imports import free_slug, keep_reading
 from augment.services.scenarios.scenes import add_scenario
 
 _KEY = "modification_details_dictionary"
+_VEHICLE, _BUS = AgentType.VEHICLE, AgentType.BUS
+_Sizes = Sequence[tuple[float, float]]
 
 
 class StepKind(StrEnum):
@@ -77,19 +81,19 @@ def import_interplan(
     ]
     for text in left_out:
         yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
-    logs: dict[str, Path] = {}
+    logs: dict[str, tuple[Path, _Sizes]] = {}
     paths = sorted((data or folder).rglob("*.db"))
     for number, path in enumerate(paths, start=1):
         try:
-            tokens = UntrustedInput(path=path, format=NuPlan.name).tokens(list(wanted))
-            found = f"{len(tokens)} base tokens"
-            logs = dict.fromkeys(tokens, path) | logs
+            by_token_m = UntrustedInput(path=path, format=NuPlan.name).vehicles(list(wanted))
+            found = f"{len(by_token_m)} base tokens"
+            logs = {token: (path, sizes_m) for token, sizes_m in by_token_m.items()} | logs
         except InvalidDocument as fault:
             found = str(fault)
         yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
     for token, details in wanted.items():
         if token in logs:
-            yield from _keep_token(token, file, logs[token], actor)
+            yield from _keep_token(token, file, *logs[token], actor)
         else:
             yield from _skip_all(token, details, "none of the logs has a frame of its base token")
 
@@ -115,20 +119,27 @@ def _skip_all(token: str, details: interplan_file.Details, reason: str) -> Itera
 
 
 def _keep_token(
-    token: str, file: interplan_file.File, log: Path, actor: User | None
+    token: str, file: interplan_file.File, log: Path, vehicles_m: _Sizes, actor: User | None
 ) -> Iterator[ImportStep]:
     details = file.modification_details_dictionary[token]
     try:
-        recorded = UntrustedInput(path=log, format=NuPlan.name)
+        recorded = UntrustedInput(path=log, format=NuPlan.name, reach_m=REACH_M)
         source, reading = recorded.read(item=token, frame=None, name=f"interplan-{token}")
-        row, _ = keep_reading(reading, source=source, path=log, actor=actor)
+        try:
+            row, _ = keep_reading(reading, source=source, path=log, actor=actor)
+        except Conflict:  # an earlier release kept less of the map under this name
+            scene = replace(reading.scene, name=free_slug(reading.scene.name))
+            reading = replace(reading, scene=scene)
+            row, _ = keep_reading(reading, source=source, path=log, actor=actor)
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))
         return
-    scene = without_traffic(reading.scene)
+    rules = SceneOptions(interplan=InterplanRules())
+    scene = replace(without_traffic(reading.scene), options=rules)
     for index, entry in (details.special_scenario or {}).items():
         try:
-            yield _keep_entry(row, scene, entry, _verbatim(file, token, index, entry), actor)
+            kept = _verbatim(file, token, index, entry)
+            yield _keep_entry(row, scene, entry, kept, vehicles_m, actor)
         except AugmentError as fault:
             yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {fault}")
 
@@ -159,21 +170,29 @@ def _keep_entry(
     scene: Scene,
     entry: interplan_file.SpecialScenario,
     kept: dict[str, Any],
+    vehicles_m: _Sizes,
     actor: User | None,
 ) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
     name = f"{token}-s{kept['index']}"
+    details = interplan_file.Details.model_validate(kept["details"])
+    spawned, built = interplan_file.surround(
+        entry, details, scene, token=token, vehicles_m=vehicles_m
+    )
+    kept["built"] = built.model_dump(mode="json", exclude_none=True)
+    scene = interplan_file.follow_rules(scene, kept)
     reference, losses = interplan_file.read_entry(token, kept["index"], entry, scene)
+    if built.boxes_m is None:
+        losses.append("the boxes of vehicles, since a recorded one has no size")
     left_out = f"; left out: {', '.join(losses)}" if losses else ""
     if Scenario.objects.filter(slug=slug, base_scene=row, type=entry.type.value).exists():
         return ImportStep(StepKind.OLD, f"{name}: {slug} was there already{left_out}")
     density, goal = interplan_file.options_of(entry.config)
-    details = interplan_file.Details.model_validate(kept["details"])
-    traffic = interplan_file.traffic_of(
-        entry, details, scene, seed=token, clear_of=reference.added
-    )
+    # Walkers and cones are put there by interPlan whoever may meet them.
+    stopped = [agent for agent in reference.added if agent.type in (_VEHICLE, _BUS)]
+    traffic = keep_clear(spawned.agents, stopped)
     goal_m = interplan_file.goal_place(kept, goal or "", scene)
-    options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
+    options = replace(scene.options, density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
     instruction, intent = describe_change(entry.type, reference, driven)
     add_scenario(

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import random
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,12 +17,12 @@ from augment.baselines.rule_placer import list_open
 from augment.checks import Ground
 from augment.checks.derived import describe_change, type_of_change
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.formats.interplan.file import goal_place
+from augment.formats.interplan.file import follow_rules, goal_place
 from augment.llm.messages import shorten
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
 from augment.scene import codec, entities
-from augment.scene.density import spawn_traffic
+from augment.scene.density import keep_clear, spawn_traffic
 from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
@@ -315,6 +316,9 @@ def change_surroundings(
         first = scenario.follows.slug
         raise Conflict(f"It follows “{first}”: its traffic and goal are that one's.")
     traffic = (_spawned_in(scenario) or None) if is_same_traffic else None
+    if scenario.interplan and "built" in scenario.interplan and not is_same_traffic:
+        # Other traffic takes other boxes, and nobody knows them.
+        scenario.interplan = {**scenario.interplan, "built": {}}
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, scenario.reference)
     scenario.original_image, scenario.windows = "", {}
 
@@ -349,12 +353,9 @@ def _set_surroundings(
     change = None if reference is None else codec.modification_from_document(reference)
     if traffic is None:
         base = scenario.base_scene
-        traffic = spawn_traffic(
-            entities.without_traffic(codec.scene_from_document(base.document)),
-            spawned,
-            seed=base.slug,
-            clear_of=() if change is None else change.added,
-        )
+        bare = entities.without_traffic(codec.scene_from_document(base.document))
+        traffic = spawn_traffic(bare, spawned, rng=random.Random(base.slug)).agents
+        traffic = keep_clear(traffic, () if change is None else change.added)
     scenario.spawned = None
     if traffic:
         scenario.spawned = codec.modification_to_document(
@@ -380,15 +381,14 @@ def scenario_named(slug: str) -> Scenario:
 def scene_of(scenario: Scenario) -> entities.Scene:
     """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
     scene = codec.scene_from_document(scenario.base_scene.document)
+    scene = follow_rules(scene, scenario.interplan)
     if not scenario.keep_traffic:
         scene = entities.without_traffic(scene)
     if scenario.spawned is not None:
         scene = entities.apply(scene, codec.modification_from_document(scenario.spawned))
-    own = scene.options
-    density = (
-        own.density if scenario.keep_traffic else entities.TrafficDensity(scenario.traffic_density)
-    )
-    options = replace(own, density=density)
+    options = scene.options
+    if not scenario.keep_traffic:
+        options = replace(options, density=entities.TrafficDensity(scenario.traffic_density))
     if scenario.goal:
         place_m = goal_place(scenario.interplan, scenario.goal, scene)
         options = replace(options, goal=entities.TurnType(scenario.goal), goal_m=place_m)
