@@ -30,7 +30,7 @@ from arena.rating.votes_file import OPTIONAL, as_comparisons, read_table
 from augment.escaping import escape_controls
 
 HELP = (
-    "Rate votes from a file (CSV, JSON lines, Parquet): columns model_a, model_b, winner, and "
+    "Rate votes from a file (CSV, JSON, Parquet, Excel): columns model_a, model_b, winner, and "
     "maybe judge and item."
 )
 _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
@@ -152,7 +152,7 @@ def run(
     if unseen:  # places left hold for a whole table
         lines = (replace(line, rank_best=None, rank_worst=None) for line in board.lines)
         board = replace(board, lines=tuple(lines))
-    notes = _notes(board, there, unseen)
+    notes = [*_notes(board, there, unseen), table.note]
     if repeats:
         notes.append(
             f"{repeats} votes repeat an earlier one of the same judge, item and pair; all are "

@@ -1,12 +1,20 @@
 """Votes from a file with the columns model_a, model_b, winner, and maybe judge and item.
 
-The file is CSV with any usual separator, JSON lines or Parquet; what it is follows from its
-content, not from its name.
+The file is CSV with any usual separator, JSON (an array, or an object a line), Parquet or an Excel
+book, as it is or packed by gzip; what it is follows from its content, not from its name.
 """
 
 import csv
-from collections.abc import Sequence
-from dataclasses import dataclass
+import gzip
+import io
+import json
+import re
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +28,24 @@ SIMULATED = "simulated"
 """A column that our own files have; a yes in it marks a vote as made up."""
 WINNERS = {"model_a": WIN, "model_b": LOSS, "tie": TIE, "tie (bothbad)": TIE}
 SEPARATORS = ",;\t|"
-_FIRST_BYTES = 65_536
+MOST_UNPACKED = 2**27
+"""Bytes that a packed file may hold."""
+_KNOWN = (*NEEDED, *OPTIONAL, SIMULATED)
 _MOST_IN_A_LINE = 2**26
+_MOST_ROWS, _MOST_COLUMNS = 2**20, 2**10
+"""Of an Excel sheet; columns beyond are passed over."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_UNSEEN = re.compile(
+    "[\u00ad\u034f\u061c\u180b-\u180f\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufe00-\ufe0f\ufeff"
+    "\U000e0000-\U000e0fff]"
+)
+"""Characters without a picture of their own: zero-width, of direction, variants."""
+_NO_TEXT = re.compile("[\0\ud800-\udfff]")
+NO_VOTES = "there are no votes in it"
+LATIN_1_NOTE = (
+    "The file is not UTF-8; it was read as Latin-1 (Windows-1252). If names look wrong, save it "
+    "as UTF-8."
+)
 
 
 class VotesFileUnreadable(ValueError):
@@ -31,18 +54,22 @@ class VotesFileUnreadable(ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VotesTable:
-    """The columns of a file that matter, as text without spaces around it.
+    """The columns of a file that matter, as text that looks the same where it is the same.
 
     Attributes:
-        first_line: The number of the first vote's line; blank lines are not counted.
+        lines: The number of each vote's line; blank lines of CSV are not counted.
+        word: What a line is called: line, row of a sheet, vote of JSON.
+        note: What was assumed to read it, empty where nothing was.
     """
 
-    columns: dict[str, list[str]]
-    first_line: int
+    columns: dict[str, list[Any]]
+    lines: Sequence[int]
+    word: str = "line"
+    note: str = ""
 
     def refuse(self, place: int, reason: str) -> VotesFileUnreadable:
         """Return the error that a vote, from 0, is wrong."""
-        return VotesFileUnreadable(f"line {place + self.first_line}: {reason}")
+        return VotesFileUnreadable(f"{self.word} {self.lines[place]}: {reason}")
 
     def check_filled(self, names: Sequence[str]) -> None:
         """Refuse columns in which a cell says nothing: empty, or what other programs write."""
@@ -53,39 +80,30 @@ class VotesTable:
 
 
 def read_table(path: Path) -> VotesTable:
-    """Read the known columns that a file has; text is UTF-8, or UTF-16 with its mark.
+    """Read the known columns that a file has.
 
     Raises:
         VotesFileUnreadable: It can't be read, a column is missing, a winner is unknown, a name is
-            missing, or a model meets itself.
+            missing, a model meets itself, or there are no votes.
     """
-    from pyarrow import ArrowException, compute, string
+    from pyarrow import ArrowException
 
     try:
-        table, first_line = _load(path, {*NEEDED, *OPTIONAL, SIMULATED})
-        for name in NEEDED:
-            if name not in table.column_names:
-                raise VotesFileUnreadable(
-                    f"line 1: there is no column {name!r}; needed are {', '.join(NEEDED)}"
-                )
-        columns = {
-            name: compute.utf8_trim_whitespace(table[name].cast(string()).fill_null(""))
-            for name in table.column_names
-        }
-    except (ArrowException, UnicodeError, csv.Error) as error:
+        table = _clean_cells(_load(path))
+    except VotesFileUnreadable:
+        raise
+    except (ArrowException, csv.Error, RecursionError, ValueError, *_BROKEN_ARCHIVE) as error:
         raise VotesFileUnreadable(f"it can't be read: {error}") from error
-    found = VotesTable(
-        columns={name: column.to_pylist() for name, column in columns.items()},
-        first_line=first_line,
-    )
-    found.check_filled(NEEDED)
-    votes = zip(*(found.columns[name] for name in NEEDED), strict=True)
+    if not table.lines:
+        raise VotesFileUnreadable(NO_VOTES)
+    table.check_filled(NEEDED)
+    votes = zip(*(table.columns[name] for name in NEEDED), strict=True)
     for place, (model_a, model_b, winner) in enumerate(votes):
         if winner not in WINNERS:
-            raise found.refuse(place, f"the winner {winner!r} is none of {', '.join(WINNERS)}")
+            raise table.refuse(place, f"the winner {winner!r} is none of {', '.join(WINNERS)}")
         if model_a == model_b:
-            raise found.refuse(place, f"{model_a!r} is compared with itself")
-    return found
+            raise table.refuse(place, f"{model_a!r} is compared with itself")
+    return table
 
 
 def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparisons, int | None]:
@@ -130,52 +148,213 @@ def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparis
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _load(path: Path, wanted: set[str]) -> tuple[Any, int]:
-    """Return an Arrow table with those of the columns that there are, and its first line."""
-    from pyarrow import csv as arrow_csv
-    from pyarrow import json as arrow_json
-    from pyarrow import parquet, string
+_BROKEN_ARCHIVE = (
+    *(gzip.BadGzipFile, zlib.error, EOFError, zipfile.BadZipFile, NotImplementedError),
+    *(KeyError, TypeError, IndexError, AttributeError, SyntaxError, RuntimeError, OverflowError),
+)
+"""What gzip, zip and Excel's XML raise where they are not what they should be."""
 
-    with path.open("rb") as file:
-        start = file.read(_FIRST_BYTES)
-    if start.startswith(b"PAR1"):
-        there = set(parquet.read_schema(path).names)
-        return parquet.read_table(path, columns=sorted(wanted & there)), 2
-    if start.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{"):
-        options = arrow_json.ReadOptions(use_threads=False, block_size=_MOST_IN_A_LINE)
-        table = arrow_json.read_json(path, read_options=options)
-        return table.select([name for name in table.column_names if name in wanted]), 1
-    encoding = "utf-16" if start.startswith(_UTF_16) else "utf-8-sig"
-    with path.open(encoding=encoding, newline="") as lines:
-        separator, header = _read_header(lines.readline(_FIRST_BYTES))
-    known = [name for name in dict.fromkeys(header) if name in wanted]
-    for name in known:
-        if header.count(name) > 1:
-            raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
+
+def _load(path: Path) -> VotesTable:
+    """Return the known columns of a file with their values as they are."""
+    content = path.read_bytes()
+    if content.startswith(b"\x1f\x8b"):
+        with gzip.open(path) as file:
+            content = file.read(MOST_UNPACKED + 1)
+        _check_size(len(content))
+    for mark, read in _BINARY.items():
+        if content.startswith(mark):
+            return read(io.BytesIO(content))
+    text, note = _decode(content)
+    if not text.strip():
+        raise VotesFileUnreadable("it is empty")
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise VotesFileUnreadable(f"line {line}: there is a NUL character, which no text has")
+    read_text = _read_json if text.lstrip().startswith(("{", "[")) else _read_csv
+    return replace(read_text(text), note=note)
+
+
+def _check_size(size: int) -> None:
+    if size > MOST_UNPACKED:
+        most = MOST_UNPACKED // 2**20
+        raise VotesFileUnreadable(f"it unpacks to more than {most} MB, which are allowed")
+
+
+def _decode(content: bytes) -> tuple[str, str]:
+    """Return a text, and a note where its encoding is a guess."""
+    try:
+        return content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig"), ""
+    except UnicodeDecodeError as error:
+        try:
+            return content.decode("cp1252"), LATIN_1_NOTE
+        except UnicodeDecodeError:
+            raise VotesFileUnreadable(
+                "its text is neither UTF-8, UTF-16 with its mark nor Latin-1 (Windows-1252)"
+            ) from error
+
+
+def _read_csv(text: str) -> VotesTable:
+    from pyarrow import csv as arrow_csv
+    from pyarrow import string
+
+    lines, above, separators = io.StringIO(text, newline=""), 1, SEPARATORS
+    while not (line := lines.readline()).strip():
+        above += 1
+    # Excel's word on the separator stands before the head.
+    if stated := re.fullmatch(r"\"?sep=([^\"\w])\"?[,;\t|]*\s*", line, re.ASCII | re.IGNORECASE):
+        line, above, separators = lines.readline(), above + 1, stated[1]
+    separator, header = _read_header(line, separators)
+    _find_columns(header)
+    if not lines.read().strip():
+        raise VotesFileUnreadable(NO_VOTES)
     table = arrow_csv.read_csv(
-        path,
+        io.BytesIO(text.encode()),
         arrow_csv.ReadOptions(
-            use_threads=False,
-            encoding=encoding,
-            block_size=_MOST_IN_A_LINE,
-            column_names=header,
-            skip_rows=1,
+            use_threads=False, block_size=_MOST_IN_A_LINE, column_names=header, skip_rows=above
         ),
         arrow_csv.ParseOptions(delimiter=separator, newlines_in_values=True),
         arrow_csv.ConvertOptions(
-            include_columns=known, column_types={name: string() for name in known}
+            include_columns=[name for name in dict.fromkeys(header) if name in _KNOWN],
+            column_types=dict.fromkeys(_KNOWN, string()),
         ),
     )
-    return table, 2
+    first = above + 1
+    return VotesTable(columns=table.to_pydict(), lines=range(first, first + table.num_rows))
 
 
-def _read_header(line: str) -> tuple[str, list[str]]:
+def _read_header(line: str, separators: str) -> tuple[str, list[str]]:
     """Return the separator that finds most of the known columns, and the columns."""
     headers = [
-        (separator, [name.strip() for name in next(csv.reader([line], delimiter=separator), [])])
-        for separator in SEPARATORS
+        (
+            separator,
+            [_column_name(name) for name in next(csv.reader([line], delimiter=separator), [])],
+        )
+        for separator in separators
     ]
-    return max(headers, key=lambda found: len({*found[1]} & {*NEEDED, *OPTIONAL}))
+    return max(headers, key=lambda header: len({*header[1]} & {*_KNOWN}))
+
+
+def _read_json(text: str) -> VotesTable:
+    """Read objects, and arrays of objects, one after the other."""
+    decoder, votes, end = json.JSONDecoder(), list[Any](), 0
+    while rest := re.compile(r"\S").search(text, end):
+        value, end = decoder.raw_decode(text, rest.start())
+        votes += value if isinstance(value, list) else [value]
+    for number, vote in enumerate(votes, start=1):
+        if not isinstance(vote, dict):
+            raise VotesFileUnreadable(
+                f"vote {number}: an object with {', '.join(NEEDED)} is needed, not {vote!r:.40}"
+            )
+    named = [{_column_name(name): value for name, value in vote.items()} for vote in votes]
+    there = set[str]().union(*named) if named else {*NEEDED}
+    _find_columns(list(there))
+    columns = {name: [vote.get(name) for vote in named] for name in _KNOWN if name in there}
+    return VotesTable(columns=columns, lines=range(1, len(named) + 1), word="vote")
+
+
+def _read_parquet(content: io.BytesIO) -> VotesTable:
+    from pyarrow import parquet
+
+    names = parquet.read_schema(content).names
+    places = _find_columns([_column_name(name) for name in names])
+    table = parquet.read_table(content, columns=[names[place] for place in places.values()])
+    columns = {name: table[names[place]].to_pylist() for name, place in places.items()}
+    return VotesTable(columns=columns, lines=range(2, table.num_rows + 2))
+
+
+def _read_book(content: io.BytesIO) -> VotesTable:
+    """Read the first sheet of an Excel book that has the columns, else name what it lacks."""
+    from openpyxl import load_workbook
+
+    with zipfile.ZipFile(content) as archive:
+        if "xl/workbook.xml" not in archive.namelist():
+            raise VotesFileUnreadable("it is a zip file without an Excel book; unpack it first")
+        # No entry gives more than it declares.
+        _check_size(sum(entry.file_size for entry in archive.infolist()))
+    book = load_workbook(content, read_only=True, data_only=True)
+    sheets = [_sheet_rows(sheet) for sheet in book.worksheets]
+    heads = [(next(rows, (0, ())), rows) for rows in sheets]
+    if not heads:
+        raise VotesFileUnreadable("it has no sheet")
+    names = [[_column_name(str(cell)) for cell in head] for (_, head), _ in heads]
+    best = max(range(len(heads)), key=lambda sheet: len({*names[sheet]} & {*_KNOWN}))
+    places = _find_columns(names[best])
+    rows = list(heads[best][1])
+    columns = {name: [row[at] for _, row in rows] for name, at in places.items()}
+    return VotesTable(columns=columns, lines=[number for number, _ in rows], word="row")
+
+
+def _sheet_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """Yield the numbers and the values of rows that are not blank, all of one length."""
+    rows = sheet.iter_rows(max_row=_MOST_ROWS, max_col=_MOST_COLUMNS, values_only=True)
+    return ((number, row) for number, row in enumerate(rows, start=1) if any(row))
+
+
+def _refuse_old_book(content: io.BytesIO) -> VotesTable:
+    raise VotesFileUnreadable(
+        "it is an Excel book of the old kind or with a password; save it as .xlsx or CSV"
+    )
+
+
+_BINARY: dict[bytes, Callable[[io.BytesIO], VotesTable]] = {
+    b"PAR1": _read_parquet,
+    b"PK": _read_book,
+    b"\xd0\xcf\x11\xe0": _refuse_old_book,
+}
+"""What reads a content that begins so."""
+
+
+def _find_columns(header: Sequence[str]) -> dict[str, int]:
+    """Return the places of the known columns."""
+    for name in _KNOWN:
+        if header.count(name) > 1:
+            raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
+    for name in NEEDED:
+        if name not in header:
+            raise VotesFileUnreadable(
+                f"line 1: there is no column {name!r}; needed are {', '.join(NEEDED)}"
+            )
+    return {name: header.index(name) for name in _KNOWN if name in header}
+
+
+def _clean_cells(table: VotesTable) -> VotesTable:
+    """Return the votes as clean text, without those that have no cell filled."""
+    columns: dict[str, list[str]] = {}
+    for name, cells in table.columns.items():
+        texts = [cell if type(cell) is str else _as_text(cell) for cell in cells]
+        for place, text in enumerate(texts):
+            if text is None or _NO_TEXT.search(text):
+                raise table.refuse(place, f"{name} is no text: {cells[place]!r:.40}")
+        clean = {text: _clean(text or "") for text in set(texts)}
+        columns[name] = [clean[text] for text in texts]
+    filled = [place for place, row in enumerate(zip(*columns.values(), strict=True)) if any(row)]
+    return replace(
+        table,
+        columns={name: [cells[place] for place in filled] for name, cells in columns.items()},
+        lines=[table.lines[place] for place in filled],
+    )
+
+
+def _as_text(value: Any) -> str | None:
+    """Return a value as a CSV file would have it; None for what is no single value."""
+    if value is None:
+        return ""
+    if isinstance(value, list | dict | bytes):
+        return None
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _clean(text: str) -> str:
+    """Return the same text for texts that look the same: composed, unseen signs dropped."""
+    return unicodedata.normalize("NFC", " ".join(_UNSEEN.sub("", text).split()))
+
+
+@lru_cache(maxsize=1024)
+def _column_name(name: str) -> str:
+    return _clean(name).lower().replace(" ", "_")
 
 
 def _number(cells: Sequence[str]) -> tuple[list[str], IntArray]:

@@ -19,6 +19,7 @@ HEAVY = {
     "genai_prices": ("augment.services.endpoints.known_models",),
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
+    "openpyxl": ("arena.rating.votes_file",),
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
     "scipy.interpolate": ("augment.scene",),

@@ -1,15 +1,20 @@
 """Votes from elsewhere: which files are taken, and what is said of the others."""
 
+import gzip
+import io
 import json
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
+import openpyxl
 import pyarrow
 import pytest
 from pyarrow import parquet
 
 from arena.management.rate_csv import CsvNotRated, run
+from arena.rating import votes_file
 from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, document
 
 
@@ -35,12 +40,24 @@ def test_separators_and_utf_16_are_recognised(
     assert document(str(path), rounds=100)["standings"] == plain
 
 
-@pytest.mark.parametrize("kind", ["jsonl", "parquet"])
-def test_json_lines_and_parquet_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("kind", ["jsonl", "array", "pretty", "parquet", "gz", "xlsx", "sep"])
+def test_other_forms_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
     plain = document(votes(*PLAIN), rounds=100)["standings"]
     rows = [dict(zip(HEAD.split(","), line.split(","), strict=True)) for line in PLAIN]
     path = tmp_path / "votes"
-    if kind == "parquet":
+    text = "\n".join([HEAD.upper(), "", *PLAIN])
+    if kind == "xlsx":
+        book = openpyxl.Workbook()
+        for line in ["", HEAD, *PLAIN[:50], ",,", *PLAIN[50:]]:
+            book.create_sheet("first") if not line else book["first"].append(line.split(","))
+        book.save(path)
+    elif kind == "gz":
+        path.write_bytes(gzip.compress(text.encode()))
+    elif kind == "sep":
+        path.write_text("sep=;\r\n" + text.replace(",", ";"))
+    elif kind in ("array", "pretty"):
+        path.write_text(json.dumps(rows, indent=2 if kind == "pretty" else None))
+    elif kind == "parquet":
         parquet.write_table(pyarrow.Table.from_pylist(rows), path)
     else:
         path.write_text("\n".join(json.dumps(row | {"more": 1}) for row in rows))
@@ -51,7 +68,7 @@ def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
     path = tmp_path / "votes.jsonl"
     good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
     path.write_text(f"{good}\n{good}\nnothing\n")
-    with pytest.raises(CsvNotRated, match="in row 2"):
+    with pytest.raises(CsvNotRated, match="line 3 column 1"):
         run(file=str(path))
 
 
@@ -101,3 +118,55 @@ def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None
 def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
     with pytest.raises(CsvNotRated, match="not "):
         run(file=votes(*PLAIN), **options)
+
+
+def _zipped(**entries: bytes) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in entries.items():
+            archive.writestr(name.replace("__", "/").replace("_xml", ".xml"), data)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "it is empty"),
+        (HEAD.encode(), "there are no votes in it"),
+        (b"[]", "there are no votes in it"),
+        (f"{HEAD}\na,b,tie\na\0,b,tie".encode(), "line 3: there is a NUL character"),
+        (b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, 7]', "vote 2: an object"),
+        (b'[{"model_a": ["a"], "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no text"),
+        (b'[{"model_a": "\\u0000", "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no te"),
+        (b'{"votes": []}', "there is no column 'model_a'"),
+        (b"[" * 100_000, "it can't be read: "),
+        (gzip.compress(b"x" * 3_000_000), "it unpacks to more than 1 MB"),
+        (gzip.compress(HEAD.encode())[:-9], "it can't be read: "),
+        (_zipped(xl__workbook_xml=b"x" * 3_000_000), "it unpacks to more than 1 MB"),
+        (_zipped(xl__workbook_xml=b"<no"), "it can't be read: "),
+        (_zipped(votes=b"a,b,tie"), "a zip file without an Excel book"),
+        (b"PK\3\4nothing", "it can't be read: "),
+        (f"{HEAD}\n\x81é,b,tie".encode("latin-1"), "neither UTF-8, UTF-16 with its mark nor Lat"),
+    ],
+)
+def test_what_is_no_file_of_votes_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, sentence: str
+) -> None:
+    monkeypatch.setattr(votes_file, "MOST_UNPACKED", 2**20)
+    path = tmp_path / "votes"
+    path.write_bytes(content)
+    with pytest.raises(CsvNotRated, match=re.escape(sentence)):
+        run(file=str(path))
+
+
+def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(
+    votes: Any, tmp_path: Path
+) -> None:
+    names = ["R\u00f6ver 1", "Ro\u0308ver 1", " R\u00f6ver\u00a0 1", "R\u00f6\u200bver 1"]
+    same = document(votes(*(f"{name},b,tie" for name in names)), rounds=100)
+    assert [line["model"] for line in same["standings"]] == ["Röver 1", "b"]
+    path = tmp_path / "latin1.csv"
+    path.write_bytes(f"{HEAD}\nRöver,b,tie\n".encode("latin-1"))
+    latin = document(str(path), rounds=100)
+    assert [line["model"] for line in latin["standings"]] == ["Röver", "b"]
+    assert votes_file.LATIN_1_NOTE in latin["notes"]

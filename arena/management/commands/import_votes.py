@@ -11,8 +11,8 @@ class Command(TerminalCommand):
     """The door to arena.results.services.vote_files.import_votes."""
 
     help = (
-        "Import votes from a CSV file with the columns model_a, model_b, winner (model_a, "
-        "model_b, tie or tie (bothbad)), and maybe judge and item."
+        "Import votes from a file (CSV, JSON, Parquet, Excel) with the columns model_a, "
+        "model_b, winner (model_a, model_b, tie or tie (bothbad)), and maybe judge and item."
     )
 
     arguments = {
@@ -32,5 +32,5 @@ class Command(TerminalCommand):
         )
         self.stdout.write(
             f"Imported {imported.votes} votes on {imported.contestants} contestants as "
-            f"{imported.study.name!r} ({imported.study.code})."
+            f"{imported.study.name!r} ({imported.study.code}). {imported.note}".rstrip()
         )

@@ -135,6 +135,7 @@ class ImportedVotes:
     study: Study
     votes: int
     contestants: int
+    note: str = ""
 
 
 def import_votes(
@@ -143,8 +144,8 @@ def import_votes(
     """Keep all votes of a file; on any fault nothing is kept.
 
     Args:
-        path: CSV, JSON lines or Parquet with the columns model_a, model_b and winner, and maybe
-            judge and item; others are passed over.
+        path: CSV, JSON, Parquet or an Excel book with the columns model_a, model_b and
+            winner, and maybe judge and item; others are passed over.
         name: Of the study, unique.
         is_simulated: The votes are made up: every page and file of them says so.
         actor: Who imports, for the log.
@@ -183,7 +184,7 @@ def import_votes(
             object_code=study.code,
             after={"file": file.name, "sha256": file.sha256, "votes": votes},
         )
-    return ImportedVotes(study=study, votes=votes, contestants=len(contestants))
+    return ImportedVotes(study=study, votes=votes, contestants=len(contestants), note=table.note)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -211,9 +212,7 @@ def _rows(table: VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
     """One row a vote; a column that the file does not have is empty."""
     nothing = [""] * len(table.columns["winner"])
     cells = (table.columns.get(name, nothing) for name in (*NEEDED, *OPTIONAL))
-    for line, (first, second, winner, judge, item) in enumerate(
-        zip(*cells, strict=True), start=table.first_line
-    ):
+    for line, first, second, winner, judge, item in zip(table.lines, *cells, strict=True):
         yield ImportedVote(
             file=file,
             line=line,

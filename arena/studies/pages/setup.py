@@ -250,7 +250,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
         with refusals_in(form):
             imported = _import(form, user_of(request))
             text = f"Imported: votes {imported.votes}, contestants {imported.contestants}."
-            messages.success(request, text)
+            messages.success(request, f"{text} {imported.note}".rstrip())
             return redirect("results", code=imported.study.code)
     context = {"form": form, "most_mb": MOST_MB}
     return render(request, "studies/votes.html", context, status=422 if form.errors else 200)
