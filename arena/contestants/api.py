@@ -49,7 +49,7 @@ class ContestantDocument(RowDocument[Contestant]):
         model = Contestant
         fields = (
             *("code", "slug", "name", "kind", "variant", "endpoint", "model", "roles"),
-            *("options", "frozen_options", "retired_at"),
+            *("options", "frozen_options", "retired_at", "sends"),
         )
 
 
@@ -111,7 +111,7 @@ class EndpointModelDocument(RowDocument[EndpointModel]):
         fields = (
             *("code", "endpoint", "model", "model_class", "vision", "native_tools"),
             *("temperature", "reasoning_effort", "context_tokens", "max_output_tokens"),
-            *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+            *("price_in_usd", "price_out_usd", "price_as_of", "price_source", "price_cached_usd"),
         )
 
 

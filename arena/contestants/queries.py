@@ -14,7 +14,9 @@ def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any
     `progress` is "asked" once it is known, "asking", "waiting", or "left" where it was not asked.
     """
     report = (model.probe_report or {}).get("findings", ()) if probe is None else probe.findings
-    findings = {finding["ability"]: finding for finding in report}
+    # Of several questions about one ability, the one that was not answered well is shown.
+    by_success = sorted(report, key=lambda finding: finding["has_it"] is not True)
+    findings = {finding["ability"]: finding for finding in by_success}
     if probe is None and not findings:
         return []
     to_come = "waiting" if probe is not None and probe.state in Probe.UNDER_WAY else "left"

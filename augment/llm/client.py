@@ -61,7 +61,9 @@ class Patience:
     Attributes:
         attempts: How often one request is sent at most.
         first_wait_s: The wait after the first fault; it doubles from one to the next.
-        longest_wait_s: No wait is longer; who is asked to wait longer (Retry-After) gives up.
+        longest_wait_s: No wait of the back-off is longer.
+        longest_asked_s: Who is asked to wait longer (Retry-After) gives up. Limits by the minute
+            are over in one.
         sleep: Waits for that many seconds.
         rng: Where the jitter comes from.
     """
@@ -69,6 +71,7 @@ class Patience:
     attempts: int = 3
     first_wait_s: float = 1.0
     longest_wait_s: float = 30.0
+    longest_asked_s: float = 90.0
     sleep: Callable[[float], None] = time.sleep
     rng: random.Random = field(default_factory=random.Random)
 
@@ -81,7 +84,7 @@ class Patience:
         if not fault.retryable or attempt >= self.attempts:
             return None
         asked_s = fault.retry_after_s or 0.0
-        if asked_s > self.longest_wait_s:
+        if asked_s > self.longest_asked_s:
             return None
         backoff_s = min(self.first_wait_s * 2.0 ** (attempt - 1), self.longest_wait_s)
         return max(asked_s, backoff_s * (1.0 - 0.5 * self.rng.random()))

@@ -28,16 +28,29 @@ MESSAGE_TOKENS = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Price:
-    """USD per million tokens, of the prompt and of the answer (reasoning included)."""
+    """USD per million tokens, of the prompt and of the answer (reasoning included).
+
+    Attributes:
+        cached_usd: Of what of the prompt came from a cache, None where it costs the same.
+    """
 
     prompt_usd: Decimal
     completion_usd: Decimal
+    cached_usd: Decimal | None = None
 
-    def nano_usd(self, *, prompt_tokens: int, completion_tokens: int) -> int:
-        """What so many tokens cost, in nano-dollars, rounded up."""
-        return math.ceil(
-            1000 * (self.prompt_usd * prompt_tokens + self.completion_usd * completion_tokens)
-        )
+    def nano_usd(
+        self, *, prompt_tokens: int, completion_tokens: int, cached_tokens: int = 0
+    ) -> int:
+        """What so many tokens cost, in nano-dollars, rounded up.
+
+        Args:
+            prompt_tokens: Those from a cache included.
+            completion_tokens: Of the answer.
+            cached_tokens: So many of the prompt's came from a cache.
+        """
+        cached = min(cached_tokens, prompt_tokens) if self.cached_usd is not None else 0
+        prompt_usd = self.prompt_usd * (prompt_tokens - cached) + (self.cached_usd or 0) * cached
+        return math.ceil(1000 * (prompt_usd + self.completion_usd * completion_tokens))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +59,7 @@ class WorstCase:
 
     prompt_tokens: int
     completion_tokens: int
+    cached_tokens: int = 0
 
     @property
     def tokens(self) -> int:
@@ -57,7 +71,9 @@ class WorstCase:
         if price is None:
             return None
         return price.nano_usd(
-            prompt_tokens=self.prompt_tokens, completion_tokens=self.completion_tokens
+            prompt_tokens=self.prompt_tokens,
+            completion_tokens=self.completion_tokens,
+            cached_tokens=self.cached_tokens,
         )
 
 
@@ -93,7 +109,7 @@ def nano_usd_of(usd: Decimal) -> int:
 _WINDOWS = frozenset({2048, 4096, 8192})
 """What servers that cut silently have as their window unless told otherwise."""
 
-_FAR_BELOW = 0.7
+FAR_BELOW = 0.7
 """So much less than the lower bound is no vocabulary's doing."""
 
 # Words, numbers of up to three digits, and runs of signs, but for one sign before a word; beyond
@@ -113,9 +129,10 @@ def cut_of(
 ) -> ContextTruncated | None:
     """Return the fault of a prompt that the endpoint cut silently, None where nothing shows one.
 
-    A cut shows in the endpoint's own count of prompt tokens: far below what the prompt must have
-    at least; below it at all and exactly at the window; or prompt and unfinished answer together
-    exactly at the window. A count that equals a window proves nothing by itself.
+    A cut shows in the endpoint's own count of prompt tokens: below what the prompt must have at
+    least and exactly at the window; or prompt and unfinished answer together exactly at the
+    window. A count that equals a window proves nothing by itself, and neither does a small one:
+    some endpoints leave out what came from a cache.
 
     Args:
         request: What was sent.
@@ -126,11 +143,6 @@ def cut_of(
     if counted is None:
         return None
     least = sum(least_tokens(message.text) for message in request.messages)
-    if counted < _FAR_BELOW * least:
-        return ContextTruncated(
-            f"the endpoint silently cut the prompt: it counted {counted} tokens, the prompt has "
-            f"at least {least}; give it a larger context window"
-        )
     windows = _WINDOWS if context_tokens is None else {context_tokens}
     # The length of an answer that ended before its own end and its limit.
     written = reply.completion_tokens or 0

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from augment.llm.vendors import says
+
 DEFAULT_MAX_TOKENS = 8192
 
 
@@ -183,9 +185,12 @@ class Reply:
         text: The answer, empty where the model said nothing.
         model: The model id that the server named, empty where it named none.
         finish_reason: Why the model stopped ("stop", "length", ...), empty where unknown.
-        refusal: What the model said when it declined, None where it did not.
+        refusal: What the model, or a filter, said when it declined; None where neither did.
+        cached_tokens: So many of the prompt's came from the endpoint's cache.
         tool_calls: What the model wants called natively.
         calls_left_out: So many more calls than anybody reads came after those.
+        reasoning: What the model thought aloud, apart from its answer.
+        remarks: What of the answer was not understood, or contradicts what was sent.
         latency_s: From sending the request to the whole answer.
     """
 
@@ -198,11 +203,19 @@ class Reply:
     latency_s: float | None = None
     tool_calls: tuple[ToolCall, ...] = ()
     calls_left_out: int = 0
+    cached_tokens: int | None = None
+    reasoning: str = ""
+    remarks: tuple[str, ...] = ()
 
     @property
     def is_cut_off(self) -> bool:
         """Whether the answer stopped at its length limit."""
-        return self.finish_reason == "length"
+        return says("cut_off", self.finish_reason)
+
+    @property
+    def is_withheld(self) -> bool:
+        """Whether the endpoint's filter withheld the answer."""
+        return says("withheld", self.finish_reason)
 
 
 IMAGE_SCHEME = "sha256:"

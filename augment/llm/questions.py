@@ -4,7 +4,7 @@ None of them can be answered well by chance, or by a server that drops what it d
 """
 
 import base64
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -53,8 +53,15 @@ class ProbeQuestion:
     parameter: str = ""
 
 
-def questions_for(model: str) -> tuple[ProbeQuestion, ...]:
-    """Return the questions in order; the first decides about the rest."""
+def questions_for(
+    model: str, chosen: Sequence[Mapping[str, Any]] = ()
+) -> tuple[ProbeQuestion, ...]:
+    """Return the questions in order; the first decides about the rest.
+
+    Args:
+        model: The model id.
+        chosen: Values of temperature, seed and reasoning effort that it will be sent.
+    """
 
     def question(
         ability: Ability,
@@ -76,11 +83,14 @@ def questions_for(model: str) -> tuple[ProbeQuestion, ...]:
     story = "Write a story of five hundred words about a car."
     twice = "Use the function to double the number 21."
     halves = "Name the colour of the left half of the picture, then that of the right half."
-    steadily: dict[str, Any] = {"temperature": 0.0, "seed": 1}
+    steadily: list[Mapping[str, Any]] = [{"temperature": 0.0, "seed": 1}, *chosen]
     return (
         question(Ability.ANSWERS, ready, _says("ready")),
         question(Ability.ANSWER_LIMIT, story, _keeps_limit, max_tokens=LIMIT_TOKENS),
-        question(Ability.TEMPERATURE, steady, _says("steady"), "temperature", **steadily),
+        *(
+            question(Ability.TEMPERATURE, steady, _says("steady"), "temperature", **values)
+            for values in steadily
+        ),
         question(Ability.NATIVE_TOOLS, twice, _calls_double, "tools", tools=(_DOUBLE,)),
         question(Ability.VISION, halves, _sees_both_halves, images=(_TWO_HALVES,)),
         question(Ability.WHOLE_PROMPT, _long_text(), _says(MARKER)),
@@ -117,7 +127,7 @@ def _keeps_limit(reply: Reply) -> bool | None:
         return None
     if written > 2 * LIMIT_TOKENS:
         return False
-    return True if reply.finish_reason == "length" or written >= LIMIT_TOKENS else None
+    return True if reply.is_cut_off or written >= LIMIT_TOKENS else None
 
 
 def _sees_both_halves(reply: Reply) -> bool:

@@ -92,6 +92,9 @@ class EndpointModel(models.Model):
     price_out_usd = models.DecimalField(
         max_digits=12, decimal_places=6, null=True, blank=True, help_text="per million tokens"
     )
+    price_cached_usd = models.DecimalField(
+        max_digits=12, decimal_places=6, null=True, blank=True, help_text="as in; empty: the same"
+    )
     price_as_of = models.DateField(null=True, blank=True)
     price_source = models.CharField(max_length=200, blank=True)
     probed_at = models.DateTimeField(null=True, blank=True)
@@ -133,9 +136,10 @@ class EndpointModel(models.Model):
         Raises:
             ValidationError: It is not, or one of them is missing.
         """
-        if self.price_in_usd is None and self.price_out_usd is None:
+        prices = (self.price_in_usd, self.price_out_usd, self.price_cached_usd)
+        if prices == (None, None, None):
             return
-        if min(self.price_in_usd or 0, self.price_out_usd or 0) < 0:
+        if min(price or 0 for price in prices) < 0:
             raise ValidationError({"price_in_usd": "a price is 0 or more"})
         needed = ("price_in_usd", "price_out_usd", "price_as_of", "price_source")
         missing = [name for name in needed if getattr(self, name) in (None, "")]

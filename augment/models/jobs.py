@@ -274,6 +274,9 @@ class ModelCall(models.Model):
         blank=True,
         help_text="its messages and its answer were removed for their age; the numbers stay",
     )
+    cached_tokens = models.PositiveIntegerField(
+        null=True, blank=True, help_text="so many of the prompt's came from the endpoint's cache"
+    )
 
     class Meta:
         ordering = ("number",)

@@ -12,12 +12,14 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from augment.errors import ReplyUnreadable
+from augment.llm.vendors import says
 
 LONGEST_ANSWER = 200_000
 """Characters; a longer answer is not looked at."""
 LONGEST_VALUE = 4_000
 """Characters that one value within a text may run over."""
 
+_LONGEST_REFUSAL = 2_000
 _CHANGES = re.compile(r"""["'](?:add|move|remove)["']\s*:""")
 _FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
 # Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
@@ -91,6 +93,12 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
         if isinstance(value, dict) and keys & value.keys():
             return value, clean != block
     wanted = ", ".join(f'"{key}"' for key in sorted(keys))
+    other = re.compile(rf"""[{{,]\s*'?(?:{"|".join(sorted(keys))})'?\s*:""")
+    if any(map(other.search, blocks)):
+        problem = (
+            f"the block with the keys {wanted} is not JSON: keys and texts stand in double quotes"
+        )
+        raise ReplyUnreadable([problem])
     raise ReplyUnreadable([f"there is no fenced JSON block with the keys {wanted}"])
 
 
@@ -117,6 +125,13 @@ def strict_json_at(text: str, start: int) -> tuple[object, int]:
 def names_changes(answer: str) -> bool:
     """Return whether the answer holds a key of a block of changes, however broken the block is."""
     return _CHANGES.search(answer) is not None
+
+
+def declines(answer: str) -> bool:
+    """Return whether an answer is a refusal in prose: it begins as one and holds no block."""
+    text = without_thoughts(answer).strip()
+    is_prose = len(text) <= _LONGEST_REFUSAL and "{" not in text
+    return is_prose and says("declines", text)
 
 
 def without_thoughts(answer: str) -> str:

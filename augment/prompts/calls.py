@@ -26,6 +26,7 @@ PARAMETERS = (
 MOST_LOOKED_AT = 64
 
 _FORM = '{"call": "pose_on_lane", "arguments": {...}}'
+NATIVE = f"calls are not made natively here; a call is one line of the form {_FORM}"
 _NAMES = ("call", "name", "function", "tool", "tool_name", "function_name")
 _ARGUMENTS = ("arguments", "parameters", "args", "kwargs", "input")
 _OPENING = re.compile(rf"""\{{\s*["'](?:{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s*:""")

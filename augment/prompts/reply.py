@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
 from augment.geometry.frames import wrap
@@ -37,6 +37,20 @@ LONGEST_ENTRY = 1000
 MOST_FEEDBACK = 20
 _MOST_PROBLEMS = 8
 
+_TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
+
+
+def _insist_on_object(kind: object) -> object:
+    """Return the type of an object that may be placed; the ego is none.
+
+    Raises:
+        ValueError: It is another; the sentence lists those that may.
+    """
+    if kind not in _TYPES:
+        raise ValueError(f"Input should be one of {', '.join(_TYPES)}")
+    return kind
+
+
 _Item = TypeVar("_Item")
 _Id = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 _Size = Annotated[float, Field(ge=0.1, le=20.0)]
@@ -47,7 +61,7 @@ _Rating = Annotated[int, Field(ge=1, le=5)]
 
 class _Agent(Strict):
     id: _Id
-    type: Annotated[AgentType, Field(strict=False)]
+    type: Annotated[AgentType, Field(strict=False), BeforeValidator(_insist_on_object)]
     x_m: float
     y_m: float
     heading_rad: float = Field(ge=-2.0 * math.pi, le=2.0 * math.pi)
@@ -179,8 +193,6 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
             problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
         if agent.walk_to is not None and agent.motion is not None:
             problems.append(f"{agent.id}: it has walk_to or a motion, not both")
-        if agent.type is AgentType.EGO_VEHICLE:
-            problems.append(f"{agent.id}: nobody else is an EGO_VEHICLE")
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = fit_boxes(scene, _modification(block, scene, names))

@@ -21,7 +21,8 @@ from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.llm.client import ChatClient, Patience
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
-from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
+from augment.prompts.blocks import names_changes
+from augment.prompts.calls import NATIVE, TOOL, WrittenCall, calls_in, read_arguments
 from augment.prompts.fill import Calling, Form, Messages
 from augment.prompts.reply import ReadReply, read_intent, read_reply
 from augment.prompts.vectors import changes_text
@@ -352,7 +353,10 @@ class _ToolDesk:
         if native and reply.tool_calls:
             return self._native_turns(reply)
         results: list[str] = []
-        for call in calls_in(reply.text, is_cut_off=reply.is_cut_off):
+        calls = calls_in(reply.text, is_cut_off=reply.is_cut_off)
+        if not (calls or names_changes(reply.text)):
+            calls = tuple(WrittenCall(name=c.name, problem=NATIVE) for c in reply.tool_calls)
+        for call in calls:
             results.append(self._answer(call))
             if self.is_over:
                 break

@@ -11,6 +11,7 @@ from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
 from augment.llm.costs import cut_of
 from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
+from augment.prompts.blocks import declines
 from augment.prompts.fill import prompt_version, review_re_ask_messages
 
 Messages = tuple[Message, ...]
@@ -154,7 +155,7 @@ class Respondents:
         """
         ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE)
         max_tokens, asked = self.max_tokens, 0
-        reply = reply or ask(messages)
+        reply, has_declined = reply or ask(messages), True
         while True:
             try:
                 return reader(reply.text), messages, reply
@@ -162,6 +163,13 @@ class Respondents:
                 problems = list(unreadable.problems)
                 if reply.is_cut_off:
                     problems.insert(0, "the answer was cut off at its length limit: be shorter")
+                elif reply.tool_calls:
+                    problems.insert(0, "no native call is answered: write the answer itself")
+                elif reply.reasoning and not reply.text:
+                    problems.insert(0, "there are thoughts and no answer: write it as well")
+                has_declined = has_declined and declines(reply.text)
+                if asked == self.re_asks and has_declined:
+                    raise ModelRefused(reply.text.strip()) from None
                 if asked == self.re_asks:
                     raise errors.ReplyUnreadable(problems) from None
             messages = again(messages, reply.text, problems)
@@ -196,7 +204,7 @@ class Respondents:
         reply = self.send(role, request, prompt_version())
         if reply.refusal is not None:
             raise ModelRefused(reply.refusal or "The model declined without a reason.")
-        if reply.finish_reason == "content_filter":
+        if reply.is_withheld:
             raise ModelRefused("The endpoint's content filter withheld the answer.")
         return reply
 

@@ -15,7 +15,7 @@ from tests.results.old import OLD, stored
 
 pytestmark = pytest.mark.django_db
 
-ADDED = ("rank_best", "rank_worst", "preregistration", "options", "question")
+ADDED = ("rank_best", "rank_worst", "preregistration", "options", "question", "sends")
 """The columns that files of an old rating did not have, in their order at the end."""
 OF_ALL = ("preregistration", "question")
 """Those that JSON says once."""

@@ -42,10 +42,10 @@ def add_kind(slug: str, kind: str = Contestant.Kind.REFERENCE) -> Contestant:
     return Contestant.objects.create(slug=slug, name=slug, kind=kind)
 
 
-def add_model(slug: str, *, endpoint: Endpoint, model: str) -> Contestant:
+def add_model(slug: str, *, endpoint: Endpoint, model: str, **columns: object) -> Contestant:
     kind = Contestant.Kind.SIMULATED if endpoint.is_simulated else Contestant.Kind.LLM
     return Contestant.objects.create(
-        slug=slug, name=slug, kind=kind, variant="otm", endpoint=endpoint, model=model
+        slug=slug, name=slug, kind=kind, variant="otm", endpoint=endpoint, model=model, **columns
     )
 
 

@@ -15,6 +15,7 @@ from augment.models import (
     Augmentation,
     CallLease,
     Endpoint,
+    EndpointModel,
     Event,
     GenerationJob,
     ModelCall,
@@ -363,12 +364,25 @@ def test_a_fault_is_no_answer() -> None:
     assert len(model.requests) == 1
 
 
+def test_cached_tokens_and_remarks_are_stored_and_the_cache_has_its_price() -> None:
+    model = Model(
+        lambda request: replace(reply(), cached_tokens=500, reasoning="Hm.", remarks=("Odd.",))
+    )
+    job = llama_job(price="2")
+    EndpointModel.objects.update(price_cached_usd=1)
+    ran(job, model)
+    call = ModelCall.objects.get()
+    assert (call.cached_tokens, call.extras) == (500, {"reasoning": "Hm.", "remarks": ["Odd."]})
+    whole = 2000 * ((call.prompt_tokens or 0) + (call.completion_tokens or 0))
+    assert call.cost_nano_usd == whole - 500 * 1000
+
+
 def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> None:
-    cut = Model(lambda request: replace(reply(), prompt_tokens=12))
+    cut = Model(lambda request: replace(reply(), prompt_tokens=2048))
     job = llama_job(price="1")
     assert "silently cut" in ran(job, cut).reason
     call = ModelCall.objects.get()
-    assert (call.answer, call.prompt_tokens) == (GOOD, 12)
+    assert (call.answer, call.prompt_tokens) == (GOOD, 2048)
     assert "silently cut" in call.fault
     job.refresh_from_db()
     assert job.spent_tokens > 0

@@ -6,12 +6,14 @@ from typing import Any
 
 import pytest
 
+from arena.contestants.queries import probe_lines
 from augment.llm.costs import least_tokens
 from augment.llm.messages import LengthName
 from augment.llm.questions import MARKER, Ability
 from augment.models import CallLease, Endpoint, EndpointModel, Event
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import ProbeReport, probe
+from tests.jobs.rows import add_model
 from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -124,3 +126,23 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
     assert report.has(Ability.ANSWER_LIMIT) is True
     assert report.refused == row().refused_parameters == ["max_completion_tokens"]
     assert report.calls == 7
+
+
+class Particular(Candidate):
+    """Takes every parameter and one temperature."""
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+        if body.get("temperature", 0.0) > 1.0:
+            return 400, _error("temperature must be at most 1", "temperature")
+        return super().answer(body)
+
+
+def test_a_value_that_a_contestant_will_send_is_tried_before_it_runs() -> None:
+    with serving(Particular(EVERYTHING, 200)) as server:
+        endpoint = Endpoint.objects.create(label="local", base_url=server.url)
+        for slug, options in (("cool", {"temperature": 0.5}), ("hot", {"temperature": 1.5})):
+            add_model(slug, endpoint=endpoint, model="m", options=options)
+        report = asked()
+    assert (report.has(Ability.TEMPERATURE), row().temperature, report.refused) == (None, None, [])
+    lines = {line["ability"]: line for line in probe_lines(row(), None)}
+    assert lines["temperature"]["note"].endswith("400: temperature must be at most 1")

@@ -12,8 +12,9 @@ OPENAI = "https://api.openai.com/v1"
 def test_a_listed_model_has_a_price_and_a_source() -> None:
     found = listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
     assert found is not None
-    in_usd, out_usd, source = found
-    assert (in_usd, out_usd) == (Decimal("2.5"), Decimal(10))
+    price, source = found
+    assert (price.prompt_usd, price.completion_usd) == (Decimal("2.5"), Decimal(10))
+    assert price.cached_usd == Decimal("1.25")
     assert source.startswith("genai-prices 0.")
     assert source.endswith(": openai/gpt-4o")
 
@@ -24,7 +25,7 @@ def test_a_price_is_that_of_its_day() -> None:
     prices = [
         listed_price(base_url=google, model="gemini-3.8-flash", now=day) for day in (NOW, later)
     ]
-    assert [price and price[0] for price in prices] == [Decimal("0.75"), Decimal("1.5")]
+    assert [found and found[0].prompt_usd for found in prices] == [Decimal("0.75"), Decimal("1.5")]
 
 
 @pytest.mark.parametrize(

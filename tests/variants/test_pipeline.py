@@ -9,7 +9,7 @@ from augment.variants.respondents import RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
-from tests.variants.playing import GOOD, Play, agent, answer, block
+from tests.variants.playing import GOOD, Play, agent, answer, block, native
 
 
 def test_one_good_answer_is_one_call_and_a_modification() -> None:
@@ -46,6 +46,37 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
     first, second = made.client.requests
     assert second.max_tokens == 2 * first.max_tokens
     assert "cut off at its length limit" in second.messages[-1].text
+
+
+@pytest.mark.parametrize(
+    ("script", "status"),
+    [
+        (["I'm sorry, but I can't help with that."] * 2, OutcomeStatus.REFUSED),
+        (["<think>Hm.</think>Sorry, this is unsafe.", "I cannot do this."], OutcomeStatus.REFUSED),
+        (["I can\u2019t assist with this request.", GOOD], OutcomeStatus.DONE),
+        (["I'm sorry, I can't.", "The car stands ahead."], OutcomeStatus.UNREADABLE),
+        (["I must place the car ahead of the ego."] * 2, OutcomeStatus.UNREADABLE),
+        (["I can't: " + GOOD.replace('"', "'")] * 2, OutcomeStatus.UNREADABLE),
+    ],
+)
+def test_a_refusal_in_prose_that_is_repeated_is_a_refusal(
+    script: list[str], status: OutcomeStatus
+) -> None:
+    made = Play("otm", script)
+    assert (made.outcome.status, len(made.client.requests)) == (status, 2)
+
+
+@pytest.mark.parametrize(
+    ("first", "problem"),
+    [
+        (native("{}"), "no native call is answered"),
+        (Reply(text="", reasoning="Let me see."), "there are thoughts and no answer"),
+    ],
+)
+def test_an_answer_beside_the_text_is_told_so(first: Reply, problem: str) -> None:
+    made = Play("otm", [first, GOOD])
+    assert made.outcome.status is OutcomeStatus.DONE
+    assert problem in made.client.requests[1].messages[-1].text
 
 
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:

@@ -105,6 +105,15 @@ def test_a_model_in_a_loop_is_stopped_and_unreadable() -> None:
     assert "could not be read" in play.client.requests[5].messages[-1].text
 
 
+def test_a_native_call_where_calls_are_written_is_told_so_and_counts() -> None:
+    play = Play("fc", [native(POSE, POSE), call(), car(21.4)])
+    assert play.outcome.status is OutcomeStatus.DONE
+    told = play.client.requests[1].messages[-1].text
+    assert told.startswith("Function result")
+    assert told.count("calls are not made natively here; a call is one line of the form") == 2
+    assert len(play.notes("tool_call")) == 3
+
+
 def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> None:
     signed = '{"extra_content": {"google": {"thought_signature": "abc"}}}'
     play = Play("fc", [native(POSE, POSE, extra=signed), car(21.4)], native=True)

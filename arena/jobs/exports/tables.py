@@ -32,15 +32,14 @@ def _count(name: str) -> Callable[[Any], int | None]:
     return count
 
 
-def _options(line: Any) -> str | None:
-    options = line.row.options
-    return None if options is None else json.dumps(options, sort_keys=True)
+def _json(document: Any) -> str | None:
+    return None if document is None else json.dumps(document, sort_keys=True)
 
 
 AUGMENTATIONS: Columns = {
     **displacement.WHOSE,
     "sample": ("row.sample", Dtype.WHOLE),
-    "options": (_options, Dtype.TEXT),
+    "options": (lambda line: _json(line.row.options), Dtype.TEXT),
     "augmentation": ("row.code", Dtype.TEXT),
     "state": ("row.state", Dtype.TEXT),
     "matched": (_count("matches"), Dtype.WHOLE),
@@ -111,6 +110,7 @@ def augmentation_sheet(job: GenerationJob) -> Sheet:
     name, lines = "augmentations", list(augmentation_lines(job))
     if any(line.displacement and line.displacement.over_time for line in lines):
         columns = {**columns, **OVER_TIME}
+    columns = {**columns, "sends": (lambda line: _json(line.row.contestant.sends), Dtype.TEXT)}
     return sheet_of(lines, columns, name=name, key=name)
 
 

@@ -60,6 +60,7 @@ class Row(Line):
     Attributes:
         variant: The recipe's name as it ends the contestant's name, empty without.
         options: How it asked, a JSON object with sorted names; empty for who asks no model.
+        sends: What of that its models take, by role, in the same form.
         card: Who made a submission and how; None for all others.
     """
 
@@ -68,6 +69,7 @@ class Row(Line):
     simulated: bool
     variant: str = ""
     options: str = ""
+    sends: str = ""
     card: dict[str, Any] | None = None
 
     @property
@@ -196,7 +198,7 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
 def _row(standing: Standing, part: int) -> Row:
     name, variant, who = standing.name, standing.variant, standing.contestant
     last_word = name.rpartition(" ")[2]
-    fixed = who.frozen_options if who else None
+    options, sends = (who.frozen_options, who.sends) if who else (None, None)
     return Row(
         name=name,
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
@@ -204,7 +206,8 @@ def _row(standing: Standing, part: int) -> Row:
         kind=standing.kind,
         simulated=standing.is_simulated,
         part=part,
-        options=json.dumps(fixed, sort_keys=True) if fixed else "",
+        options=json.dumps(options, sort_keys=True) if options else "",
+        sends=json.dumps(sends, sort_keys=True) if sends else "",
         card=who.card if who else None,
         **stored_values(standing),
     )
@@ -276,6 +279,7 @@ COLUMNS = (
     Column(field="ranks_text", printed="95% ranks"),
     _column("options"),
     _column("question", key=""),
+    _column("sends"),
 )
 
 IN_FILES = tuple(column for column in COLUMNS if column.name)

@@ -73,7 +73,8 @@ class EndpointRequest(EndpointFacts):
 
 
 MODEL_FACTS = (
-    *("model_class", "price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+    *("model_class", "price_in_usd", "price_out_usd", "price_cached_usd"),
+    *("price_as_of", "price_source"),
     *("context_tokens", "max_output_tokens", "reasoning_effort"),
     *("vision", "native_tools", "temperature"),
 )

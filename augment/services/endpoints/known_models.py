@@ -59,8 +59,9 @@ def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
         now = timezone.now()
         listed = listed_price(base_url=endpoint.base_url, model=model, now=now)
         if listed is not None:
-            row.price_in_usd, row.price_out_usd, row.price_source = listed
-            row.price_as_of = now.date()
+            price, row.price_source = listed
+            row.price_in_usd, row.price_out_usd = price.prompt_usd, price.completion_usd
+            row.price_cached_usd, row.price_as_of = price.cached_usd, now.date()
             row.save()
     return row
 
@@ -99,13 +100,15 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
     row = facts_of(endpoint=endpoint, model=model)
     if row.price_in_usd is None or row.price_out_usd is None:
         return None
-    return Price(prompt_usd=row.price_in_usd, completion_usd=row.price_out_usd)
+    return Price(
+        prompt_usd=row.price_in_usd,
+        completion_usd=row.price_out_usd,
+        cached_usd=row.price_cached_usd,
+    )
 
 
-def listed_price(
-    *, base_url: str, model: str, now: datetime
-) -> tuple[Decimal, Decimal, str] | None:
-    """Return USD per million tokens in and out and where that is written; None where it is not.
+def listed_price(*, base_url: str, model: str, now: datetime) -> tuple[Price, str] | None:
+    """Return the price of a model and where that is written; None where it is not.
 
     The vendor is told by the address alone: a model of the same name on somebody else's server
     has another price. Where long prompts cost more, the price is that of short ones.
@@ -122,9 +125,9 @@ def listed_price(
     except (LookupError, ValueError):
         return None
     prices = vars(price.model_price)
-    in_usd, out_usd = (
+    in_usd, out_usd, cached_usd = (
         getattr(prices.get(name), "base", prices.get(name))
-        for name in ("input_mtok", "output_mtok")
+        for name in ("input_mtok", "output_mtok", "cache_read_mtok")
     )
     if not (isinstance(in_usd, Decimal) and isinstance(out_usd, Decimal)):
         return None
@@ -133,7 +136,7 @@ def listed_price(
     if match is None or base_url[match.end() :][:1] not in {"", "/", ":"}:
         return None
     source = f"genai-prices {version('genai-prices')}: {price.provider.id}/{price.model.id}"
-    return in_usd, out_usd, source[:200]
+    return Price(prompt_usd=in_usd, completion_usd=out_usd, cached_usd=cached_usd), source[:200]
 
 
 def sum_spending(which: Q, *, by: str) -> dict[int, Spending]:

@@ -19,9 +19,10 @@ from augment.llm.client import ChatClient, ModelProfile
 from augment.llm.costs import cut_of, usd_of
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
-from augment.models import Endpoint, EndpointModel, Probe
+from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
 from augment.services.endpoints.known_models import TEMPERATURE, model_at, price_of
+from augment.services.endpoints.treatments import SAMPLING
 from augment.services.events import log_change
 from augment.services.texts import make_document_storable, one_line
 from augment.services.work import Lease, Settlement, WorkKind
@@ -72,8 +73,9 @@ class ProbeReport:
     cost_usd: str | None = None
 
     def has(self, ability: Ability) -> bool | None:
-        """Return what was found of the ability, None where nothing was."""
-        return next((made.has_it for made in self.findings if made.ability == ability), None)
+        """Return what was found of the ability by all questions, None where nothing was."""
+        answers = [made.has_it for made in self.findings if made.ability == ability]
+        return next((has_it for has_it in answers if not has_it), True if answers else None)
 
 
 def probe(
@@ -96,7 +98,7 @@ def probe(
     report = ProbeReport(probed_at=timezone.now())
     with wire_to(row.endpoint) as wire:
         prober = _Prober(client=wire, row=row)
-        for question in questions_for(row.model):
+        for question in questions_for(row.model, _list_chosen_values(row)):
             report.findings.append(prober.ask(question))
             on_finding(report.findings[-1])
             if report.findings[0].latency_s is None:
@@ -183,7 +185,9 @@ class _Prober:
             self.profile = self.profile.without(refused.parameter)
             return ProbeFinding(ability=ability, has_it=False, note=_short(str(refused)))
         except ModelFault as fault:
-            refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
+            # A value that is not taken says nothing of others.
+            is_other = ability in (Ability.ANSWERS, Ability.TEMPERATURE)
+            refuses = fault.status in _REFUSALS and not is_other
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = cut_of(request, reply, context_tokens=self._row.context_tokens)
@@ -195,11 +199,12 @@ class _Prober:
                 self.profile = renamed
                 return replace(self.ask(question), cost_usd=None)
         calls = ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
+        said = str(cut) if cut else reply.text or reply.refusal or calls
         return ProbeFinding(
             ability=ability,
             # Any answer shows that the parameter is taken.
             has_it=ability in (Ability.ANSWERS, Ability.TEMPERATURE) or is_good,
-            note=_short(str(cut) if cut else reply.text or reply.refusal or calls),
+            note=_short("; ".join((said, *reply.remarks) if said else reply.remarks)),
             model_returned=reply.model,
             prompt_tokens=reply.prompt_tokens,
             completion_tokens=reply.completion_tokens,
@@ -224,8 +229,22 @@ class _Prober:
         prompt, completion = reply.prompt_tokens, reply.completion_tokens
         if self._price is None or prompt is None or completion is None:
             return None
-        nano_usd = self._price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
+        nano_usd = self._price.nano_usd(
+            prompt_tokens=prompt,
+            completion_tokens=completion,
+            cached_tokens=reply.cached_tokens or 0,
+        )
         return f"{usd_of(nano_usd):f}"
+
+
+def _list_chosen_values(row: EndpointModel) -> list[dict[str, Any]]:
+    """Return what contestants send the model beside messages, each set of values once."""
+    rows = Contestant.objects.filter(endpoint=row.endpoint, model=row.model, retired_at=None)
+    chosen = [
+        {name: given[name] for name in sorted(SAMPLING & given.keys())}
+        for given in rows.values_list("options", flat=True)
+    ]
+    return [values for n, values in enumerate(chosen) if values and values not in chosen[:n]]
 
 
 def _short(text: str) -> str:

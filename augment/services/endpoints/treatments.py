@@ -24,7 +24,7 @@ from augment.variants.options import ContestantOptions, complete_options, option
 from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.respondents import ModelRole
 
-_REFUSABLE = frozenset({"temperature", "seed", "reasoning_effort"})
+SAMPLING = frozenset({"temperature", "seed", "reasoning_effort"})
 """Options that some endpoints refuse."""
 
 
@@ -203,7 +203,7 @@ def left_out(contestant: Contestant) -> dict[str, list[str]]:
         Conflict: An endpoint that it names is gone.
     """
     # Never of what is completed at the first run: no default of ours is one of these.
-    chosen = _REFUSABLE & (contestant.frozen_options or contestant.options).keys()
+    chosen = SAMPLING & (contestant.frozen_options or contestant.options).keys()
     if not chosen:
         return {}
     sends = contestant.sends or {
@@ -249,7 +249,7 @@ def _completed(contestant: Contestant) -> ContestantOptions:
 
 def _document_of(profile: ModelProfile) -> dict[str, Any]:
     """Return what of a profile changes what contestants send; no variant sends a schema."""
-    sent = _REFUSABLE | frozenset(LengthName)
+    sent = SAMPLING | frozenset(LengthName)
     return asdict(profile) | {"refused": sorted(profile.refused & sent)}
 
 

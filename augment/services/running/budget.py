@@ -211,6 +211,7 @@ def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Use
     seen = WorstCase(
         prompt_tokens=worst.prompt_tokens if prompt is None else prompt,
         completion_tokens=worst.completion_tokens if completion is None else completion,
+        cached_tokens=reply.cached_tokens or 0,
     )
     return Used(
         tokens=seen.tokens,

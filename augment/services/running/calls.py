@@ -45,7 +45,7 @@ IMAGES = "asked"
 
 _COPIED = (
     *("answer", "refusal", "extras", "model_returned", "finish_reason"),
-    *("prompt_tokens", "completion_tokens"),
+    *("prompt_tokens", "completion_tokens", "cached_tokens"),
 )
 
 
@@ -361,31 +361,37 @@ def _hold_question(request_hash: str) -> None:
 
 def _columns_of(reply: Reply) -> dict[str, Any]:
     """Return the answer as columns; a refusal that says nothing else is the answer."""
-    extras: dict[str, Any] | None = None
-    if reply.tool_calls:
-        extras = {"tool_calls": [asdict(call) for call in reply.tool_calls]}
-        if reply.calls_left_out:
-            extras["calls_left_out"] = reply.calls_left_out
+    extras = {
+        "tool_calls": [asdict(call) for call in reply.tool_calls],
+        "calls_left_out": reply.calls_left_out,
+        "reasoning": reply.reasoning,
+        "remarks": list(reply.remarks),
+    }
+    extras = {name: value for name, value in extras.items() if value}
     return {
         "answer": make_storable(reply.text or reply.refusal or ""),
         "refusal": None if reply.refusal is None else make_storable(reply.refusal),
-        "extras": make_document_storable(extras),
+        "extras": make_document_storable(extras or None),
         "model_returned": make_storable(reply.model)[:120],
         "finish_reason": make_storable(reply.finish_reason)[:40],
         "prompt_tokens": reply.prompt_tokens,
         "completion_tokens": reply.completion_tokens,
+        "cached_tokens": reply.cached_tokens,
         "latency_s": reply.latency_s,
     }
 
 
 def _reply_of(call: ModelCall) -> Reply:
     """Return the answer that a call had, as it would come again; it took no time."""
+    extras = call.extras or {}
     return Reply(
         text=call.answer or "",
         model=call.model_returned,
         finish_reason=call.finish_reason,
         refusal=call.refusal,
-        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
+        tool_calls=tuple(ToolCall(**made) for made in extras.get("tool_calls", [])),
         prompt_tokens=call.prompt_tokens,
         completion_tokens=call.completion_tokens,
+        cached_tokens=call.cached_tokens,
+        reasoning=extras.get("reasoning", ""),
     )

@@ -44,7 +44,7 @@ _CALL = (
     *("code", "number", "role", "prompt_version", "request", "request_hash", "served_from"),
     *("answer", "refusal", "extras", "fault", "model_returned", "finish_reason"),
     *("prompt_tokens", "completion_tokens", "spent_tokens", "cost_usd", "is_cost_estimated"),
-    *("started_at", "sent_at", "latency_s"),
+    *("started_at", "sent_at", "latency_s", "cached_tokens"),
 )
 
 

@@ -1,0 +1,374 @@
+"""What an OpenAI-compatible server answered: a `Reply`, or the fault that it stands for. Pure.
+
+Vendors write the same in many forms. Each value is absent, understood, or not understood; the
+last is a fault where nobody could use the answer without it, and a remark of the reply elsewhere.
+What is too long is cut here, at the border: a run and its replay from the store see the same.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+
+from augment.errors import ModelFault, ParameterRefused
+from augment.foreign import ForeignObject, kind_of
+from augment.llm.costs import FAR_BELOW
+from augment.llm.messages import LengthName, Reply, ToolCall, shorten
+from augment.llm.vendors import says
+
+LONGEST_REFUSAL = 4_000
+LONGEST_NAME = 200
+LONGEST_ARGUMENTS = 10_000
+"""Of one call, in characters."""
+LONGEST_EXTRA = 100_000
+"""What hangs on a call goes back as it came, so it can't be cut: longer ones are left out."""
+LONGEST_MESSAGE, LONGEST_CODE = 300, 80
+"""Of what an error body says, in characters."""
+MOST_CALLS = 64
+"""Of one answer."""
+MOST_REMARKS = 20
+MOST_TOKENS = 100_000_000
+"""A count beyond is none: no model reads or writes so much at once."""
+
+_REASONING = ("reasoning_content", "reasoning", "reasoning_details")
+_FIELDS = frozenset({"content", "refusal", "tool_calls", "function_call", *_REASONING})
+_KINDS = {"refusal": "refusal"} | dict.fromkeys(
+    ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
+)
+_WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal")
+"""Names under which a part of a message holds its text."""
+_CACHED = ("cached_tokens", "prompt_cache_hit_tokens", "cache_read_input_tokens")
+
+_PASSING = frozenset({408, 409, 425, 429})
+_SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
+# Names under which an error body says what is wrong.
+_SENTENCES = re.compile(
+    r"(error_?)?(message|msg|description)|errors?|details?|reason|title|status_msg|"
+)
+_CODES = ("code", "error_code", "error_type", "type", "status", "reason", "error")
+_FLAGS = ("filtered", "input_sensitive", "output_sensitive")
+_FILTERED = ("code", "content_filter")
+
+# What a request can do without, or say in another way.
+_DROPPABLE: tuple[str, ...] = ("temperature", "seed", "reasoning_effort", *LengthName)
+_NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter", "extra_forbidden"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForeignError:
+    """What an error body says, whatever its form.
+
+    Attributes:
+        message: Its sentences; empty where there is none.
+        code: The vendor's word for it.
+        parameter: What of the request it names.
+        is_withheld: Whether a filter withheld the answer.
+    """
+
+    message: str
+    code: str
+    parameter: str
+    is_withheld: bool
+
+    def __str__(self) -> str:
+        code = f" ({shorten(self.code, LONGEST_CODE)})" if self.code else ""
+        return code + (f": {shorten(self.message, LONGEST_MESSAGE)}" if self.message else "")
+
+
+def read_completion(document: object, *, least_prompt: int) -> Reply:
+    """Return the reply in the body of a 200.
+
+    Args:
+        document: The body, decoded.
+        least_prompt: So many tokens the texts of the prompt have at least.
+
+    Raises:
+        ModelFault: It is no completion, or the endpoint broke it off.
+    """
+    answer = ForeignObject(fields=document if isinstance(document, dict) else {})
+    notes, choices = answer.notes, answer.fields.get("choices")
+    first = choices[0] if isinstance(choices, list) and choices else None
+    choice = ForeignObject(
+        fields=first if isinstance(first, dict) else {}, path="choices.0.", notes=notes
+    )
+    message = choice.fields.get("message")
+    pieces, calls = _read_message(message if isinstance(message, dict) else {}, notes)
+    texts, thoughts, refusals, unread = (
+        [text for kind, text in pieces if kind == wanted]
+        for wanted in ("text", "thought", "refusal", "unread")
+    )
+    reason = choice.read("finish_reason", str) or ""
+    error = read_error([part.fields.get("error") for part in (answer, choice)])
+    around = [{**answer.fields, "choices": 0, "usage": 0}, {**choice.fields, "message": 0}]
+    if error.is_withheld or _FILTERED in _leaves(around) or says("withheld", reason):
+        reason = reason if says("withheld", reason) else "content_filter"
+        refusals = refusals or ([error.message] if error.message else [])
+    else:
+        is_usable = bool("".join(texts) or calls or refusals)
+        _insist_on_answer(choice.fields, error, [] if is_usable else unread)
+    notes.extend(f"left out: {text}" for text in unread)
+    usage = ForeignObject(fields=answer.read("usage", dict) or {}, path="usage.", notes=notes)
+    has_output = bool(calls or "".join([*texts, *thoughts, *refusals]))
+    prompt, completion, cached = _read_usage(usage, least_prompt, has_output=has_output)
+    return Reply(
+        text="".join(texts),
+        model=shorten(answer.read("model", str) or "", 120),
+        finish_reason=shorten(reason, 40),
+        refusal=shorten("".join(refusals), LONGEST_REFUSAL) if refusals else None,
+        prompt_tokens=prompt,
+        completion_tokens=completion,
+        cached_tokens=cached,
+        tool_calls=tuple(calls[:MOST_CALLS]),
+        calls_left_out=len(calls[MOST_CALLS:]),
+        reasoning=shorten("\n".join(thoughts), LONGEST_EXTRA),
+        remarks=tuple(shorten(note, LONGEST_MESSAGE) for note in notes[:MOST_REMARKS]),
+    )
+
+
+def read_error(body: object) -> ForeignError:
+    """Read an error: OpenAI's form, a text, or what LM Studio, TGI, FastAPI and others write."""
+    leaves = list(_leaves(body))
+    sentences = [text for name, text in leaves if _SENTENCES.fullmatch(name)]
+    message = "; ".join(dict.fromkeys(text for text in sentences if not text.isdigit()))
+    codes = [text for key in _CODES for name, text in leaves if name == key and " " not in text]
+    return ForeignError(
+        message=message,
+        code=next((text for name, text in leaves if name in _CODES[:3]), ""),
+        parameter=next((text for name, text in leaves if name == "param"), ""),
+        is_withheld=any(says("withheld", code) for code in codes)
+        or says("withheld_sentence", message),
+    )
+
+
+def fault_of_status(
+    status: int, body: object, headers: Mapping[str, str], *, sent: Mapping[str, object]
+) -> ModelFault | Reply:
+    """Return the fault that an HTTP status and its decoded body stand for, or a refusal.
+
+    An exhausted quota comes as a 429 and does not pass by waiting.
+
+    Args:
+        status: Of the answer.
+        body: Of the answer, decoded; a text where it is no JSON.
+        headers: Of the answer, by names in lower case.
+        sent: What the request had, of which the endpoint may refuse something.
+    """
+    page = re.search(r"<title>(.*?)</title>", body, re.DOTALL) if isinstance(body, str) else None
+    error = read_error(page[1] if page else body)
+    if error.is_withheld and status not in (401, 404) and status not in _PASSING:
+        refusal = shorten(error.message or error.code, LONGEST_REFUSAL)
+        return Reply(text="", finish_reason="content_filter", refusal=refusal, completion_tokens=0)
+    message = error.message or (json.dumps(body, ensure_ascii=False) if body else "")
+    code = "" if error.code == str(status) else error.code
+    text = f"the endpoint answered {status}{replace(error, message=message, code=code)}"
+    refused = _refused_parameter(error, sent) if status in (400, 422) else None
+    if refused:
+        return ParameterRefused(refused, text, status=status)
+    passing = (status in _PASSING or status >= 500) and error.code not in _SPENT
+    wait_s, remark = _read_wait(headers) if passing else (None, "")
+    return ModelFault(text + remark, retryable=passing, status=status, retry_after_s=wait_s)
+
+
+# Private
+
+
+def _read_message(
+    message: Mapping[str, object], notes: list[str]
+) -> tuple[list[tuple[str, str]], list[ToolCall]]:
+    """Return text, thoughts, refusal and what can't be read, each by its kind, and the calls."""
+    thoughts = next((message[name] for name in _REASONING if message.get(name)), None)
+    pieces = [
+        *_pieces(message.get("content"), "content"),
+        *_pieces(thoughts, "reasoning", "thought"),
+        *_pieces(message.get("refusal") or None, "refusal", "refusal"),
+    ]
+    if message.keys() - {"role"} and not message.keys() & _FIELDS:
+        pieces.append(("unread", "the message has none of the fields of a message"))
+    made: list[ToolCall] = []
+    calls = message.get("tool_calls")
+    if calls is None and message.get("function_call"):
+        calls = [{"function": message["function_call"]}]  # as it was called before 2024
+    if calls is not None and not isinstance(calls, list):
+        pieces.append(("unread", f"tool_calls is {kind_of(calls)}, not a list"))
+        calls = None
+    for number, fields in enumerate(calls or [], start=1):
+        path = f"tool_calls.{number}."
+        fields = fields if isinstance(fields, dict) else {}
+        call = ForeignObject(fields=fields, path=path, notes=notes)
+        function = call.read("function", dict) or {}
+        name = ForeignObject(fields=function, path=path, notes=notes).read("name", str)
+        if not name:
+            pieces.append(("unread", f"call {number} names no function"))
+            continue
+        # Some servers number no calls, some all alike; the answer to one must name it.
+        given = fields.get("id")
+        call_id = str(given) if type(given) is int else call.read("id", str)
+        if not call_id or any(call_id == earlier.id for earlier in made):
+            call_id = f"call_{number}"
+        # A text, which may be broken; some servers send the object itself.
+        arguments = function.get("arguments")
+        if arguments is None or not isinstance(arguments, str):
+            arguments = "" if arguments is None else json.dumps(arguments)
+        rest = {key: fields[key] for key in fields if key not in ("id", "type", "function")}
+        extra = json.dumps(rest, sort_keys=True) if rest else ""
+        if len(extra) > LONGEST_EXTRA:
+            notes.append(f"{path} carries more than {LONGEST_EXTRA} characters: left out")
+        made.append(
+            ToolCall(
+                id=shorten(call_id, LONGEST_NAME),
+                name=shorten(name, LONGEST_NAME),
+                arguments=shorten(arguments, LONGEST_ARGUMENTS),
+                extra=extra if len(extra) <= LONGEST_EXTRA else "",
+            )
+        )
+    return pieces, made
+
+
+def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str, str]]:
+    """Yield the texts of a message's field by their kind: a text, a part, or a list of either."""
+    if isinstance(value, str):
+        yield kind, value
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            yield from _pieces(item, f"{path}.{number}", kind)
+    elif isinstance(value, dict):
+        name = next((name for name in _WORDS if value.get(name) is not None), None)
+        if name is None:
+            yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
+        else:
+            yield from _pieces(value[name], path, _KINDS.get(str(value.get("type")), kind))
+    elif value is True and kind == "refusal":
+        yield kind, ""
+    elif value is not None:
+        yield "unread", f"{path} is {kind_of(value)}, not a text"
+
+
+def _insist_on_answer(
+    choice: Mapping[str, object], error: ForeignError, unread: list[str]
+) -> None:
+    """Return where there is an answer that nobody broke off.
+
+    Args:
+        choice: The first; empty without one.
+        error: What stands beside it.
+        unread: What is there instead of anything that can be used.
+
+    Raises:
+        ModelFault: There is none.
+    """
+    reason, message = choice.get("finish_reason"), choice.get("message")
+    is_passing = True
+    if isinstance(reason, str) and says("broken", reason):
+        problem = f"broke off its answer, finish_reason {shorten(reason, 40)!r}{error}"
+    elif str(error):
+        problem = f"answered 200 with an error{error}"
+        is_passing = not re.fullmatch(r"4\d\d", error.code) or int(error.code) in _PASSING
+    elif not choice:
+        problem = "answered without a choice"
+    elif not isinstance(message, dict):
+        what = "" if message is None else f" that is an object: it is {kind_of(message)}"
+        problem = f"answered without a message{what}"
+    elif unread:
+        problem = f"answered in a form that can't be read: {unread[0]}"
+    else:
+        return
+    raise ModelFault(f"the endpoint {problem}", retryable=is_passing, status=200)
+
+
+def _read_usage(
+    usage: ForeignObject, least_prompt: int, *, has_output: bool
+) -> tuple[int | None, int | None, int | None]:
+    """Return the tokens of prompt and answer, and those of the prompt from a cache.
+
+    Zeros are unknown. Gateways to Anthropic leave what came from the cache out of the prompt: it
+    is then more than the prompt, or what lacks to the total or to what was sent.
+    """
+
+    def count(names: tuple[str, ...], part: ForeignObject = usage) -> int | None:
+        counts = (part.count(name, most=MOST_TOKENS) for name in names)
+        return next((number for number in counts if number is not None), None)
+
+    prompt = count(("prompt_tokens", "input_tokens"))
+    completion = count(("completion_tokens", "output_tokens"))
+    cached = count(_CACHED)
+    for name in ("prompt_tokens_details", "input_tokens_details"):
+        details = ForeignObject(
+            fields=usage.read(name, dict) or {}, path=f"usage.{name}.", notes=usage.notes
+        )
+        cached = count(_CACHED, details) if cached is None else cached
+    beside = (cached or 0) + (count(("cache_creation_input_tokens",)) or 0)
+    total, least = count(("total_tokens",)), FAR_BELOW * least_prompt
+    if prompt is not None and beside:
+        whole = prompt + beside
+        if beside > prompt or total == whole + (completion or 0) or prompt < least <= whole:
+            prompt = whole
+    if completion == 0 and (has_output or not prompt):
+        completion = None
+    if prompt and prompt < least:
+        usage.notes.append(
+            f"the endpoint counted {prompt} tokens of a prompt that has at least {least_prompt}"
+        )
+    return prompt or None, completion, cached
+
+
+def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
+    """Yield each text and number of an error body with the name that it stands under."""
+    if isinstance(value, dict):
+        place = value.get("loc")
+        if isinstance(place, list) and place and isinstance(value.get("msg"), str):
+            yield "param", str(place[-1])
+            value = {**value, "msg": f"{place[-1]}: {value['msg']}"}
+        blocked = value.get("blockReason") or value.get("block_reason")
+        if blocked or any(value.get(flag) is True for flag in _FLAGS):
+            yield _FILTERED
+        for key, inner in value.items():
+            yield from _leaves(inner, key)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _leaves(item, name)
+    elif isinstance(value, str | int) and not isinstance(value, bool) and str(value).strip():
+        yield name, str(value).strip()
+
+
+def _refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str | None:
+    """Return the parameter that the endpoint says it does not know, None where it says other.
+
+    A value that is not taken (too large, not one of a list, only the default) is no parameter
+    that is not taken, and a word that stands in a sentence is no parameter at all.
+    """
+    named, text = error.parameter.partition(".")[0], error.message
+    for name in _DROPPABLE:
+        if name not in sent or named not in ("", name):
+            continue
+        given = f"{sent[name]:g}" if isinstance(sent[name], float) else str(sent[name])
+        is_about_value = says("about_value", text) or re.search(
+            rf"(?<![\w.-]){re.escape(given)}\b", text
+        )
+        if (named and error.code in _NOT_TAKEN) or says("unknown_parameter", text, name=name):
+            return name
+        is_unknown = says("unknown_unless_value", text, name=name) or (
+            named and says("unknown", text)
+        )
+        if is_unknown and not is_about_value:
+            return name
+    return None
+
+
+def _read_wait(headers: Mapping[str, str]) -> tuple[float | None, str]:
+    """Return the seconds that the headers ask to wait, and a remark on what can't be read."""
+    name = "retry-after-ms" if "retry-after-ms" in headers else "retry-after"
+    given = headers.get(name, "")
+    try:
+        seconds = float(given) / (1000.0 if name == "retry-after-ms" else 1.0)
+    except ValueError:
+        try:
+            until = parsedate_to_datetime(given).replace(tzinfo=UTC)  # HTTP knows GMT alone
+            seconds = (until - datetime.now(UTC)).total_seconds()
+        except (ValueError, OverflowError):
+            seconds = math.nan
+    if math.isfinite(seconds):
+        return max(0.0, seconds), ""
+    return None, f" (its {name} can't be read: {given[:40]!r})" if given else ""

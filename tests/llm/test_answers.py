@@ -1,0 +1,231 @@
+"""Every field of what a server answers, with the right type, another form, and the wrong one."""
+
+import copy
+import json
+import re
+from datetime import UTC, datetime, timedelta
+from email.utils import format_datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from augment.errors import ModelFault, ParameterRefused
+from augment.llm.answers import fault_of_status, read_completion
+from augment.llm.messages import Reply
+
+_FILE = Path(__file__).parent / "answers.jsonl"
+ROWS = [json.loads(line) for line in _FILE.read_text("utf-8").splitlines()]
+CALL = {"id": "c", "type": "function", "function": {"name": "f", "arguments": "{}"}}
+USAGE = {
+    "prompt_tokens": 50,
+    "completion_tokens": 9,
+    "total_tokens": 59,
+    "prompt_tokens_details": {"cached_tokens": 7},
+}
+MESSAGE = {"role": "assistant", "content": "Hi", "refusal": None, "reasoning_content": "Hm."}
+CHOICE = {"index": 0, "finish_reason": "stop", "message": MESSAGE | {"tool_calls": [CALL]}}
+WHOLE: dict[str, Any] = {"model": "m", "choices": [CHOICE], "usage": USAGE}
+
+
+def answer(message: object, finish_reason: object = "stop", **more: object) -> dict[str, Any]:
+    choice = {"index": 0, "finish_reason": finish_reason, "message": message} | more
+    return WHOLE | {"choices": [choice]}
+
+
+def read(document: object, least: int = 0) -> Reply:
+    return read_completion(document, least_prompt=least)
+
+
+# --- No silent default -------------------------------------------------------------------------
+
+WRONG: tuple[object, ...] = (7, -1.5, True, "word", "", [], [7], [["a"]], {}, {"a": 1}, None)
+
+
+def paths(document: object, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every place of a document but the parts that nobody reads."""
+    if isinstance(document, dict):
+        inner = [(name, part) for name, part in document.items() if name not in ("index", "role")]
+    else:
+        inner = list(enumerate(document)) if isinstance(document, list) else []
+    return [
+        place for name, part in inner for place in [(*path, name), *paths(part, (*path, name))]
+    ]
+
+
+def put(document: object, path: tuple[Any, ...], value: object) -> Any:
+    changed = copy.deepcopy(document)
+    place: Any = changed
+    for name in path[:-1]:
+        place = place[name]
+    place[path[-1]] = value
+    return changed
+
+
+def is_empty(value: object) -> bool:
+    return value is None or value in ("", [], {})
+
+
+def rows(kind: str) -> list[dict[str, Any]]:
+    return [row for row in ROWS if row["kind"] == kind]
+
+
+def outcome(document: object) -> Reply | ModelFault:
+    try:
+        return read(document)
+    except ModelFault as fault:
+        return fault
+
+
+@pytest.mark.parametrize("value", WRONG, ids=str)
+@pytest.mark.parametrize("path", paths(WHOLE), ids=lambda path: ".".join(map(str, path)))
+def test_no_value_of_an_answer_is_silently_another(path: tuple[Any, ...], value: object) -> None:
+    """Whatever stands in a place is shown, remarked upon or a fault, unless it says nothing."""
+    reply = outcome(put(WHOLE, path, value))
+    says_nothing = is_empty(value) or path[-1] in ("type", "total_tokens")
+    says_nothing |= value == {"a": 1} and str(path[-1]).startswith(("usage", "prompt_tokens_d"))
+    if isinstance(reply, ModelFault):
+        assert reply.retryable
+    elif not (reply.remarks or says_nothing or reply.refusal is not None):
+        texts = (reply.text, reply.reasoning, reply.model, reply.finish_reason)
+        calls = [text for one in reply.tool_calls for text in (one.id, one.name, one.arguments)]
+        counts = (reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens)
+        written: set[object] = {
+            json.dumps(value),
+            str(value),
+            "a" if value == [["a"]] else str(value),
+        }
+        written |= {value} if isinstance(value, int) else set()
+        assert written & {*texts, *calls, *counts}, reply
+
+
+ERROR = {"message": "No.", "type": "t", "param": "messages", "code": "c"}
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *({"error": ERROR | {name: value}} for name in ERROR for value in WRONG),
+        *({name: value} for name in ("error", "detail", "message", "errors") for value in WRONG),
+        *WRONG,
+    ],
+    ids=str,
+)
+def test_whatever_an_error_body_is_it_is_shown(body: Any) -> None:
+    fault = fault_of_status(400, body, {}, sent={"seed": 7, "temperature": 0.5})
+    assert isinstance(fault, ModelFault)
+    assert not isinstance(fault, ParameterRefused)
+    assert is_empty(body) or ": " in str(fault), fault
+
+
+@pytest.mark.parametrize("row", rows("reason"), ids=str)
+def test_a_reason_is_shown_whatever_form_it_has(row: dict[str, Any]) -> None:
+    assert str(fault_of_status(400, row["body"], {}, sent={})).endswith(f": {row['reason']}")
+
+
+@pytest.mark.parametrize("row", rows("content"), ids=str)
+def test_texts_are_joined_and_thoughts_kept_apart(row: dict[str, Any]) -> None:
+    reply = read(answer({"content": row["content"]}))
+    assert (reply.text, reply.reasoning, reply.remarks) == (row["text"], row["reasoning"], ())
+
+
+def test_what_nobody_can_read_is_a_fault_alone_and_a_remark_beside_a_text() -> None:
+    sound = {"type": "audio", "data": "x"}
+    with pytest.raises(ModelFault, match=r"read: content\.0 is a part of type 'audio'"):
+        read(answer({"content": [sound, {"type": "thinking", "thinking": "Hm."}]}))
+    reply = read(answer({"content": ["Hi", sound]}))
+    assert reply.remarks == ("left out: content.1 is a part of type 'audio'",)
+
+
+def test_calls_in_other_forms_are_calls() -> None:
+    calls = [
+        {"function": {"name": "f", "arguments": {"a": 1}}},
+        {"id": 3, "function": {"name": "f", "arguments": None}},
+        {"id": "3", "function": {"name": "f", "arguments": "{}"}, "extra_content": {"x": 1}},
+    ]
+    made = read(answer({"content": None, "tool_calls": calls})).tool_calls
+    assert [(one.id, one.arguments) for one in made] == [
+        ("call_1", '{"a": 1}'),
+        ("3", ""),
+        ("call_3", "{}"),
+    ]
+    old = read(answer({"content": None, "function_call": {"name": "f", "arguments": "{}"}}))
+    assert [one.name for one in old.tool_calls] == ["f"]
+
+
+@pytest.mark.parametrize("row", rows("broken"), ids=str)
+def test_an_answer_that_the_endpoint_broke_off_may_be_asked_for_again(row: dict[str, Any]) -> None:
+    with pytest.raises(ModelFault, match=re.escape(row["reason"])) as caught:
+        read(row["answer"])
+    assert (caught.value.retryable, caught.value.status) == (True, 200)
+
+
+@pytest.mark.parametrize("row", rows("withheld"), ids=str)
+def test_a_filter_that_withholds_an_answer_says_so_in_many_words(row: dict[str, Any]) -> None:
+    assert read(row["answer"]).is_withheld
+
+
+@pytest.mark.parametrize("reason", ["stop", "eos", "tool_calls", "", "length", "OTHER"])
+def test_an_answer_of_its_own_is_withheld_by_nobody(reason: str) -> None:
+    quiet = {"hate": {"filtered": False}, "error": {"code": "content_filter_error"}}
+    assert not read(answer({"content": "Hi"}, reason, content_filter_results=quiet)).is_withheld
+
+
+@pytest.mark.parametrize("reason", ["length", "MAX_TOKENS", "model_length", "max_output_tokens"])
+def test_a_limit_has_several_names(reason: str) -> None:
+    assert read(answer({"content": "Hi"}, reason)).is_cut_off
+
+
+@pytest.mark.parametrize("row", [*rows("refusal"), *rows("fault")], ids=str)
+def test_an_error_of_a_filter_is_a_refusal_and_no_other_is(row: dict[str, Any]) -> None:
+    reply = fault_of_status(row["status"], row["body"], {}, sent={})
+    assert isinstance(reply, Reply) == (row["kind"] == "refusal")
+    if isinstance(reply, Reply):
+        assert reply.is_withheld
+        assert reply.refusal
+
+
+@pytest.mark.parametrize("row", rows("usage"), ids=str)
+def test_cached_tokens_belong_to_the_prompt_and_a_small_count_is_a_remark(
+    row: dict[str, Any],
+) -> None:
+    reply = read(answer({"content": "Hi"}) | {"usage": row["usage"]}, least=4900)
+    counts = [reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens]
+    assert (counts, len(reply.remarks)) == (row["counts"], row["remarks"]), reply.remarks
+
+
+SENT = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh", "max_completion_tokens": 8192}
+
+
+@pytest.mark.parametrize("row", [*rows("unknown parameter"), *rows("refused value")], ids=str)
+def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -> None:
+    """Not where a value is not taken, and not where its name is a word in a sentence."""
+    refused = fault_of_status(422, row["body"], {}, sent=SENT)
+    assert isinstance(refused, ModelFault)
+    parameter = refused.parameter if isinstance(refused, ParameterRefused) else None
+    assert (parameter, refused.retryable) == (row.get("parameter"), "parameter" in row)
+
+
+@pytest.mark.parametrize(
+    ("headers", "wait_s"),
+    [
+        ({"retry-after-ms": "800", "retry-after": "1"}, 0.8),
+        ({"retry-after": "45"}, 45.0),
+        ({"retry-after": "Wed, 21 Oct 2015 07:28:00 GMT"}, 0.0),
+        ({"retry-after": "soon"}, None),
+    ],
+)
+def test_the_wait_that_is_asked_for_has_three_forms(
+    headers: dict[str, str], wait_s: float | None
+) -> None:
+    fault = fault_of_status(429, {"message": "Slower."}, headers, sent={})
+    assert isinstance(fault, ModelFault)
+    assert fault.retry_after_s == wait_s
+    assert ("can't be read: 'soon'" in str(fault)) == (wait_s is None)
+
+
+def test_a_date_is_waited_for() -> None:
+    until = format_datetime(datetime.now(UTC) + timedelta(seconds=60), usegmt=True)
+    fault = fault_of_status(503, "", {"retry-after": until}, sent={})
+    assert isinstance(fault, ModelFault)
+    assert fault.retry_after_s == pytest.approx(60.0, abs=5.0)
