@@ -11,7 +11,7 @@ drives there. The maps have no speed limits, no lights (their state is unknown) 
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -20,7 +20,7 @@ from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
 from augment.formats.reading import Log, LogReader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import WHAT, FloatArray, fault_at, look_up, read_finite
+from augment.formats.values import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up
 from augment.scene.entities import AgentType, AreaKind
 from augment.scene.schema import problems_of
 
@@ -100,15 +100,17 @@ class ArgoverseSensor(LogReader):
         Its boxes are in the ego frame of their sweep, whose origin lies under the rear axle; here
         the ego is its geometric centre. T sweeps.
         """
-        boxes, poses = (
-            _read_table(path / BOXES, _BOX_COLUMNS),
-            _read_table(path / POSES, _POSE_COLUMNS),
-        )
-        for category in boxes["category"].unique():
-            look_up({**TYPE_OF, EGO: None}, category, f"{BOXES}: category")
+        doubts = Doubts()
+        boxes = _read_table(path / BOXES, _BOX_COLUMNS, doubts)
+        poses = _read_table(path / POSES, _POSE_COLUMNS, doubts)
+        boxes = _known_rows(boxes, "category", {**TYPE_OF, EGO: None}, doubts)
+        poses = poses.drop_duplicates("timestamp_ns").set_index("timestamp_ns")
+        has_pose = boxes["timestamp_ns"].isin(poses.index)
+        doubts.assume("A box at a time without a pose was left out", (~has_pose).sum())
+        boxes = boxes[has_pose]
         stamps, sweeps = np.unique(boxes["timestamp_ns"], return_inverse=True)
-        poses = poses.drop_duplicates("timestamp_ns").set_index("timestamp_ns").reindex(stamps)
-        if not len(stamps) or poses.isna().any(axis=None):
+        poses = poses.reindex(stamps)
+        if not len(stamps):
             raise fault_at(POSES, "has no pose at an annotated time")
         times_s = (stamps - stamps[0]) * 1e-9
         turn, places = _rotation(poses), poses[_PLACE].to_numpy(copy=True)
@@ -134,7 +136,7 @@ class ArgoverseSensor(LogReader):
             world=WORLD,
             title=f"Argoverse 2 Sensor data set, log {path.resolve().name}",
             licence=LICENCE,
-            notes=["Speeds were taken from the recorded places."],
+            notes=["Speeds were taken from the recorded places.", *doubts.notes],
         )
 
 
@@ -153,12 +155,17 @@ class ArgoverseMotion(LogReader):
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """The scenario, with one of its tracks as the ego; positions are centres."""
         file = _only_file(path, "scenario_*.parquet") if path.is_dir() else path
-        table = _read_table(file, _MOTION_COLUMNS)
+        doubts = Doubts()
+        table = _read_table(file, _MOTION_COLUMNS, doubts)
+        table = _known_rows(table, "object_type", MOTION_TYPE_OF, doubts)
+        is_step = table["timestep"].between(0, MOST_STEPS - 1)
+        doubts.assume(
+            f"A step that is not from 0 to {MOST_STEPS - 1} was left out", (~is_step).sum()
+        )
+        table = table[is_step]
         steps = table["timestep"]
-        if not len(steps) or steps.min() < 0 or steps.max() >= MOST_STEPS:
+        if not len(steps):
             raise fault_at(f"{file.name}: timestep", f"needs steps from 0 to {MOST_STEPS - 1}")
-        for kind in table["object_type"].unique():
-            look_up(MOTION_TYPE_OF, kind, "object_type")
         names = {"track_id": "track", "object_type": "kind", "timestep": "step"}
         names |= {"position_x": "x_m", "position_y": "y_m", "heading": "heading_rad"}
         speeds_mps = np.hypot(table["velocity_x"], table["velocity_y"])
@@ -179,14 +186,15 @@ class ArgoverseMotion(LogReader):
             licence=LICENCE,
             item=item,
             frame=int(steps[table["observed"] > 0].max()) if table["observed"].any() else 0,
+            notes=doubts.notes,
         )
 
 
 # Tables
 
 
-def _read_table(file: Path, columns: Mapping[str, str]) -> "pd.DataFrame":
-    """The named columns of a Feather or Parquet file, none of their values missing.
+def _read_table(file: Path, columns: Mapping[str, str], doubts: Doubts) -> "pd.DataFrame":
+    """The named columns of a Feather or Parquet file; rows with gaps or odd numbers are left out.
 
     Both formats can be compressed a thousandfold, and pyarrow takes every length at its word:
     what is too large for the memory of the reading process ends there (`sandbox`).
@@ -208,13 +216,31 @@ def _read_table(file: Path, columns: Mapping[str, str]) -> "pd.DataFrame":
     except (pa.ArrowException, *_ARROW_FAULTS) as fault:
         problem = f"can't be read, or has not the columns {', '.join(columns)}: {str(fault)[:200]}"
         raise fault_at(file.name, problem) from None
-    for name in columns:
-        if table[name].null_count:
-            raise fault_at(f"{file.name}: {name}", "a value is missing")
     frame: pd.DataFrame = table.to_pandas()
-    doubles = [name for name, kind in columns.items() if kind == "double"]
-    read_finite(frame[doubles], file.name)
-    return frame
+    # An object without a size has the usual one.
+    doubles = {name for name, kind in columns.items() if kind == "double"}
+    numbers = frame[sorted(doubles - {"length_m", "width_m"})].to_numpy()
+    is_odd = ~(np.abs(numbers) <= FURTHEST).all(axis=1)
+    is_odd |= frame[sorted(columns.keys() - doubles)].isna().any(axis=1).to_numpy()
+    if set(_QUATERNION) <= columns.keys():
+        is_odd |= np.abs(frame[_QUATERNION].to_numpy()).max(axis=1, initial=0.0) < 1e-6
+    lost = f"A row of {file.name} with a gap or an odd number was left out"
+    doubts.assume(lost, is_odd.sum())
+    counts = {name: "int64" for name, kind in columns.items() if kind == "int64"}
+    whole: pd.DataFrame = frame[~is_odd].reset_index(drop=True).astype(counts)
+    return whole
+
+
+def _known_rows(
+    table: "pd.DataFrame", column: str, types: Mapping[str, object], doubts: Doubts
+) -> "pd.DataFrame":
+    """The rows of kinds that are known."""
+    is_odd = ~table[column].isin(list(types))
+    for kind in table[column][is_odd].unique():
+        with doubts.about("kinds of objects"):
+            look_up(types, kind, column)
+    known: pd.DataFrame = table[~is_odd].reset_index(drop=True)
+    return known
 
 
 _ARROW_FAULTS = (ValueError, TypeError, KeyError, IndexError, OSError, OverflowError)
@@ -236,6 +262,9 @@ class _Part(BaseModel):
     """A part of the map file; fields that nobody needs here are allowed."""
 
     model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+
+Part = TypeVar("Part", bound=_Part)
 
 
 class _Point(_Part):
@@ -272,9 +301,11 @@ class _Drivable(_Part):
 
 
 class _Map(_Part):
-    lane_segments: dict[str, _Segment]
-    drivable_areas: dict[str, _Drivable] = {}
-    pedestrian_crossings: dict[str, _Crossing] = {}
+    """Its parts are read one by one."""
+
+    lane_segments: dict[str, object]
+    drivable_areas: dict[str, object] = {}
+    pedestrian_crossings: dict[str, object] = {}
 
 
 def _only_file(folder: Path, pattern: str) -> Path:
@@ -286,19 +317,22 @@ def _only_file(folder: Path, pattern: str) -> Path:
 
 def _read_map(folder: Path) -> RoadMap:
     file = _only_file(folder, "log_map_archive_*.json")
-    try:
-        city = _Map.model_validate(read_json(file, what=WHAT))
-    except ValidationError as fault:
-        problems = [(f"{file.name}: {place}", text) for place, text in problems_of(fault)]
-        raise InvalidDocument(WHAT, problems) from None
+    doubts, city = Doubts(), _read_part(_Map, read_json(file, what=WHAT), file.name)
+
+    def read_parts(kind: type[Part], name: str) -> list[Part]:
+        rows = ((kind, value, f"{name}.{key[:40]}") for key, value in getattr(city, name).items())
+        return doubts.read_all(name, _read_part, rows)
+
     areas = [
-        (AreaKind.DRIVABLE, _array(area.area_boundary)) for area in city.drivable_areas.values()
+        (AreaKind.DRIVABLE, _array(area.area_boundary))
+        for area in read_parts(_Drivable, "drivable_areas")
     ]
-    for crossing in city.pedestrian_crossings.values():
+    for crossing in read_parts(_Crossing, "pedestrian_crossings"):
         one, other = _array(crossing.edge1), _array(crossing.edge2)
         is_same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
         areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if is_same_way else other])))
-    driven = [one for one in city.lane_segments.values() if one.lane_type != "BIKE"]
+    lanes = read_parts(_Segment, "lane_segments")
+    driven = [one for one in lanes if one.lane_type != "BIKE"]
     return RoadMap(
         place=f"{file.name}: lane_segments",
         segments=tuple(
@@ -315,8 +349,17 @@ def _read_map(folder: Path) -> RoadMap:
             for one in driven
         ),
         areas=tuple(areas),
-        left_out={"bicycle lanes": len(city.lane_segments) - len(driven)},
+        left_out={"bicycle lanes": len(lanes) - len(driven)},
+        doubts=doubts,
     )
+
+
+def _read_part(kind: type[Part], value: object, place: str) -> Part:
+    try:
+        return kind.model_validate(value)
+    except ValidationError as fault:
+        problems = [(f"{place}: {where}", text) for where, text in problems_of(fault)]
+        raise InvalidDocument(WHAT, problems) from None
 
 
 def _array(points: Sequence[_Point]) -> FloatArray:

@@ -16,8 +16,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from augment.formats.nuplan_map import city_around, open_tables
-from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, frames_every, tracks_of
-from augment.formats.values import FloatArray, fault_at, look_up, read_finite
+from augment.formats.reading import (
+    Log,
+    LoggedTrack,
+    LogReader,
+    Moment,
+    frames_every,
+    speeds,
+    tracks_of,
+)
+from augment.formats.values import (
+    FURTHEST,
+    Doubts,
+    FloatArray,
+    fault_at,
+    look_up,
+    read_finite,
+    read_whole,
+)
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 
 if TYPE_CHECKING:
@@ -40,7 +56,7 @@ TYPE_OF = {
     "generic_object": AgentType.GENERIC_OBJECT,
 }
 _FRAME = "SELECT timestamp FROM lidar_pc WHERE token = ?"
-LIGHT_OF = {"green": TrafficLight.GREEN, "yellow": TrafficLight.YELLOW, "red": TrafficLight.RED}
+LIGHT_OF = {name: TrafficLight(name) for name in ("green", "yellow", "red", "unknown")}
 
 
 class NuPlan(LogReader):
@@ -66,8 +82,9 @@ class NuPlan(LogReader):
                 raise fault_at("log", "has no row")
             location, version, logfile = (str(one or "")[:200] for one in place)
             token = _token(base, item)
-            times_s, ego, tracks = _motion(base, token)
-            lights, notes = _lights(base, token), _tag_notes(base, token)
+            doubts = Doubts()
+            times_s, ego, tracks = _motion(base, token, doubts)
+            lights, notes = _lights(base, token, doubts), _tag_notes(base, token)
         yield Log(
             times_s=times_s,
             ego=ego,
@@ -83,7 +100,7 @@ class NuPlan(LogReader):
             title=f"nuPlan data set, log {logfile or path.stem}, lidar_pc {token}",
             licence=LICENCE,
             item=token,
-            notes=notes,
+            notes=[*notes, *doubts.notes],
         )
 
 
@@ -103,9 +120,9 @@ def vehicles_at(path: Path, tokens: Sequence[str]) -> dict[str, list[tuple[float
         return {
             one: [
                 (round(length_m, 3), round(width_m, 3))
-                for length_m, width_m in _finite(
-                    base.execute(text, (bytes.fromhex(one),)).fetchall(), "lidar_box"
-                )
+                for length_m, width_m in read_finite(
+                    base.execute(text, (bytes.fromhex(one),)).fetchall(), "lidar_box", 2
+                ).tolist()
             ]
             for one in known
         }
@@ -145,56 +162,65 @@ def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
     ).fetchall()
     if not rows:
         raise fault_at("item", "the log has no frame")
-    return [(str(token).lower(), _whole(time, "lidar_pc.timestamp")) for token, time in rows]
-
-
-def _whole(value: object, place: str) -> int:
-    if isinstance(value, str) and value.isdecimal() and len(value) <= 18:
-        return int(value)
-    if not isinstance(value, int):
-        raise fault_at(place, f"{str(value)[:40]!r} is no whole number")
-    return value
+    return [(str(token).lower(), read_whole(time, "lidar_pc.timestamp")) for token, time in rows]
 
 
 def _motion(
-    base: sqlite3.Connection, token: str
+    base: sqlite3.Connection, token: str, doubts: Doubts
 ) -> tuple[FloatArray, FloatArray, dict[str, LoggedTrack]]:
     """Times, the ego's states and all tracks from a lidar_pc on, which is the first step."""
     start = base.execute(_FRAME, (bytes.fromhex(token),)).fetchone()
     if start is None:
         raise fault_at("item", f"there is no lidar_pc {token}")
-    first = _whole(start[0], "lidar_pc.timestamp")
-    rows = base.execute(
+    first = read_whole(start[0], "lidar_pc.timestamp")
+    query = (
         "SELECT l.token, l.timestamp, e.x, e.y, e.qw, e.qx, e.qy, e.qz, e.vx, e.vy "
         "FROM lidar_pc l JOIN ego_pose e ON e.token = l.ego_pose_token "
-        "WHERE l.timestamp BETWEEN ? AND ? ORDER BY l.timestamp LIMIT ?",
-        (first, min(first, LATEST_US) + LASTS_US, MOST_FRAMES),
-    ).fetchall()
-    if not rows or rows[0][1] != first:
+        "WHERE l.timestamp BETWEEN ? AND ? ORDER BY l.timestamp LIMIT ?"
+    )
+    rows = base.execute(query, (first, min(first, LATEST_US) + LASTS_US, MOST_FRAMES)).fetchall()
+    poses = _numbers(rows, "token timestamp", "x y qw qx qy qz", "vx vy", doubts)
+    stamps = poses["timestamp"].tolist()
+    if not stamps or stamps[0] != first:
         raise fault_at("ego_pose", f"has no pose for lidar_pc {token}")
-    chosen = rows[:1]
-    for row in rows[1:]:
-        if row[1] - chosen[-1][1] >= STEP_US * 0.9:
-            chosen.append(row)
-    x_m, y_m, qw, qx, qy, qz, vx, vy = _finite([row[2:] for row in chosen], "ego_pose").T
+    chosen = [0]
+    for index, stamp in enumerate(stamps):
+        if stamp - stamps[chosen[-1]] >= STEP_US * 0.9:
+            chosen.append(index)
+    poses = poses.iloc[chosen]
+    qw, qx, qy, qz, vx, vy = poses.iloc[:, 4:].to_numpy().T
     yaw = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-    x_m = x_m + REAR_AXLE_TO_CENTER_M * np.cos(yaw)
-    y_m = y_m + REAR_AXLE_TO_CENTER_M * np.sin(yaw)
-    times_s = np.array([(row[1] - first) * 1e-6 for row in chosen])
-    boxes = _boxes(base, [row[0] for row in chosen])
-    ego = np.column_stack([x_m, y_m, yaw, np.hypot(vx, vy)])
+    way = np.column_stack([np.cos(yaw), np.sin(yaw)])
+    center_m = poses[["x", "y"]].to_numpy() + REAR_AXLE_TO_CENTER_M * way
+    times_s = np.array([(stamps[index] - first) * 1e-6 for index in chosen])
+    speed_mps = np.hypot(vx, vy)
+    speed_mps = np.where(np.isnan(speed_mps), speeds(times_s, center_m), speed_mps)
+    boxes = _boxes(base, poses["token"].tolist(), doubts)
+    ego = np.column_stack([center_m, yaw, speed_mps])
     return times_s, ego, tracks_of(boxes, TYPE_OF, times_s)
 
 
-def _finite(rows: Sequence[Sequence[Any]], place: str) -> FloatArray:
-    """Finite numbers (R, C); NULL counts as 0."""
-    return read_finite([[value or 0.0 for value in row] for row in rows], place)
-
-
-def _boxes(base: sqlite3.Connection, frames: Sequence[bytes]) -> "pd.DataFrame":
-    """All boxes of the frames, without a join: a log has millions, and no index need be."""
+def _numbers(
+    rows: Sequence[Sequence[Any]], names: str, needed: str, further: str, doubts: Doubts
+) -> "pd.DataFrame":
+    """The rows with numbers in the needed columns; what is none in the further ones is NaN."""
     import pandas as pd
 
+    columns, numbers = [*names.split(), *needed.split(), *further.split()], f"{needed} {further}"
+    table = pd.DataFrame([*rows], columns=columns)
+    for name in numbers.split():
+        values = pd.to_numeric(table[name], errors="coerce").astype(np.float64)
+        table[name] = values.where(values.abs() <= FURTHEST)
+    whole = table[needed.split()].notna().all(axis=1)
+    doubts.assume("A row with a gap or an odd number was left out", (~whole).sum())
+    kept: pd.DataFrame = table[whole].reset_index(drop=True)
+    gaps = kept[further.split()].isna().any(axis=1).sum()
+    doubts.assume("A velocity that is not given is that of the motion, a size the usual", gaps)
+    return kept
+
+
+def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) -> "pd.DataFrame":
+    """All boxes of the frames, without a join: a log has millions, and no index need be."""
     text = "SELECT t.token, c.name FROM track t JOIN category c ON c.token = t.category_token"
     kinds = dict(base.execute(text).fetchall())
     rows = base.execute(
@@ -202,29 +228,30 @@ def _boxes(base: sqlite3.Connection, frames: Sequence[bytes]) -> "pd.DataFrame":
         f"WHERE lidar_pc_token IN ({', '.join('?' * len(frames))})",
         list(frames),
     ).fetchall()
-    rows = [row for row in rows if kinds.get(row[1]) not in (None, "ego")]
-    for kind in {kinds[row[1]] for row in rows}:
-        look_up(TYPE_OF, kind, "category.name")
+    for kind in {str(kinds.get(row[1])) for row in rows} - {"ego", *TYPE_OF}:
+        with doubts.about("objects"):
+            look_up(TYPE_OF, kind, "category.name")
+    rows = [row for row in rows if kinds.get(row[1]) in TYPE_OF]
+    boxes = _numbers(rows, "frame token", "x_m y_m heading_rad", "vx vy length_m width_m", doubts)
     step_of = {frame: step for step, frame in enumerate(frames)}
-    values = _finite([row[2:] for row in rows], "lidar_box").reshape(-1, 7)
-    return pd.DataFrame(
-        values, columns=["x_m", "y_m", "heading_rad", "vx", "vy", "length_m", "width_m"]
-    ).assign(
-        step=[step_of[row[0]] for row in rows],
-        track=[row[1].hex() if isinstance(row[1], bytes) else str(row[1]) for row in rows],
-        kind=[kinds[row[1]] for row in rows],
-        speed_mps=np.hypot(values[:, 3], values[:, 4]),
+    return boxes.assign(
+        step=boxes["frame"].map(step_of),
+        track=[one.hex() if isinstance(one, bytes) else str(one) for one in boxes["token"]],
+        kind=boxes["token"].map(kinds),
+        speed_mps=np.hypot(boxes["vx"], boxes["vy"]),
     )
 
 
-def _lights(base: sqlite3.Connection, token: str) -> dict[int, TrafficLight]:
+def _lights(base: sqlite3.Connection, token: str, doubts: Doubts) -> dict[int, TrafficLight]:
     """The state by lane connector."""
     text = "SELECT lane_connector_id, status FROM traffic_light_status WHERE lidar_pc_token = ?"
-    place = "traffic_light_status.lane_connector_id"
-    return {
-        _whole(connector, place): LIGHT_OF.get(str(state), TrafficLight.UNKNOWN)
-        for connector, state in base.execute(text, (bytes.fromhex(token),))
-    }
+    lights = {}
+    for value, status in base.execute(text, (bytes.fromhex(token),)):
+        with doubts.about("lights"):
+            connector = read_whole(value, "traffic_light_status.lane_connector_id")
+            lights[connector] = TrafficLight.UNKNOWN
+            lights[connector] = look_up(LIGHT_OF, status, "traffic_light_status.status")
+    return lights
 
 
 def _tag_notes(base: sqlite3.Connection, token: str) -> list[str]:

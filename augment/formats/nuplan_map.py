@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import FloatArray, fault_at
+from augment.formats.values import Doubts, FloatArray, fault_at, read_speed, read_whole
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 
 BICYCLE_LANE = 1
@@ -82,7 +82,7 @@ def city_around(
             for layer, kind in AREA_OF.items()
             if layer in layers.geometry
             for _, points in layers.read(layer, ("fid",))
-            if layers.is_near(points) and len(np.unique(points, axis=0)) >= 3
+            if layers.is_near(points)
         )
     # Logs differ in what they call their city: the folder that the map lies in counts too.
     is_left = any(name.startswith(LEFT_HAND) for name in (location, path.parent.parent.name))
@@ -92,6 +92,7 @@ def city_around(
         areas=areas,
         side=TrafficSide.LEFT if is_left else TrafficSide.RIGHT,
         left_out={"bicycle lanes": bicycle_lanes},
+        doubts=layers.doubts,
     )
 
 
@@ -105,10 +106,11 @@ class _Layers:
         geometry: By layer its column of geometries, and the id of their reference system.
         lines: The centrelines within reach by their segment's name.
         edges: The boundaries by name.
+        doubts: About features.
     """
 
     def __init__(self, base: sqlite3.Connection, center: FloatArray) -> None:
-        self._base, self._center = base, center
+        self._base, self._center, self.doubts = base, center, Doubts()
         text = "SELECT value FROM meta WHERE key = 'projectedCoordSystem'"
         system = str((base.execute(text).fetchone() or ("",))[0])
         code = system.rsplit(":", 1)[-1].strip()
@@ -119,12 +121,15 @@ class _Layers:
             raise fault_at("meta.projectedCoordSystem", problem)
         text = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
         self.geometry = {table: (column, system) for table, column, system in base.execute(text)}
-        self.edges = {_name(fid): points for (fid,), points in self.read("boundaries", ("fid",))}
-        self.lines = {}
+        self.edges, self.lines = dict[str, FloatArray](), dict[str, FloatArray]()
+        for (fid,), points in self.read("boundaries", ("fid",)):
+            with self.doubts.about("boundaries"):
+                self.edges[_name(fid)] = points
         columns = ("lane_fid", "lane_connector_fid")
         for (lane, connector), points in self.read("baseline_paths", columns):
-            if self.is_near(points):
-                self.lines[_name(lane) or f"c{_name(connector)}"] = points
+            with self.doubts.about("baseline paths"):
+                if self.is_near(points):
+                    self.lines[_name(lane) or f"c{_name(connector)}"] = points
 
     def read(self, layer: str, columns: tuple[str, ...]) -> Iterator[tuple[Any, FloatArray]]:
         """Yield each near feature's named columns as a tuple, and its points.
@@ -138,11 +143,18 @@ class _Layers:
             raise fault_at(layer, f"is in EPSG:{system}, which is not read")
         names = ", ".join(f"[{name}]" for name in (*columns, geometry))
         text = f"SELECT {names} FROM [{layer}] WHERE [{geometry}] IS NOT NULL"
-        rows = self._base.execute(text).fetchall()
-        lines = self._lines([row[-1] for row in rows], system, layer)
-        for row, points in zip(rows, lines, strict=True):
-            if self.is_near(points, REACH_M + BESIDE_M):
-                yield row[:-1], points
+        named, lines = [], []
+        for *row, block in self._base.execute(text).fetchall():
+            with self.doubts.about(layer):
+                lines.append(_outline(block, system == GEOGRAPHIC, f"{layer} {row[0]}"))
+                named.append(tuple(row))
+        points, owners = shapely.get_coordinates(lines, return_index=True)
+        if system == GEOGRAPHIC and len(points):
+            points = to_utm(points, zone=self._zone, is_south=self._system >= 32700)
+        parts = np.split(points, np.flatnonzero(np.diff(owners)) + 1) if len(points) else []
+        for row, part in zip(named, parts, strict=True):
+            if self.is_near(part, REACH_M + BESIDE_M):
+                yield row, part
 
     def is_near(self, points: FloatArray, reach_m: float = REACH_M) -> bool:
         """Return whether the box around points lies within reach."""
@@ -150,23 +162,23 @@ class _Layers:
         gap = np.maximum(np.maximum(local.min(axis=0), -local.max(axis=0)), 0.0)
         return bool(np.hypot(*gap) <= reach_m)
 
-    def _lines(self, blocks: list[Any], system: int, layer: str) -> list[FloatArray]:
-        """The points (P, 2) of each geometry; all of a layer are projected in one go."""
-        if not blocks:
-            return []
-        try:
-            geometries = shapely.from_wkb([_well_known_binary(block) for block in blocks])
-            lines = [_longest_line(geometry) for geometry in geometries]
-            points, owners = shapely.get_coordinates(lines, return_index=True)
-            if not np.isfinite(points).all():
-                raise ValueError("a point is not finite")
-            if system == GEOGRAPHIC:
-                if (np.abs(points) > (180.0, 89.0)).any():
-                    raise ValueError("degrees that are none")
-                points = to_utm(points, zone=self._zone, is_south=self._system >= 32700)
-        except (ValueError, shapely.errors.ShapelyError) as fault:
-            raise fault_at(layer, f"has a broken geometry: {fault}") from None
-        return np.split(points, np.flatnonzero(np.diff(owners)) + 1)
+
+def _outline(block: Any, is_geographic: bool, place: str) -> Any:
+    """The line of a feature.
+
+    Raises:
+        InvalidDocument: The geometry is broken.
+    """
+    try:
+        line = _longest_line(shapely.from_wkb(_well_known_binary(block)))
+        points = shapely.get_coordinates(line)
+        if not np.isfinite(points).all():
+            raise ValueError("a point is not finite")
+        if is_geographic and (np.abs(points) > (180.0, 89.0)).any():
+            raise ValueError("degrees that are none")
+    except (ValueError, shapely.errors.ShapelyError) as fault:
+        raise fault_at(place, f"has a broken geometry: {fault}") from None
+    return line
 
 
 def _well_known_binary(block: Any) -> bytes:
@@ -248,16 +260,20 @@ def _lanes(layers: _Layers) -> tuple[list[Segment], int]:
     Lanes of one group lie side by side, their index rises to the right.
     """
     lanes: dict[Any, Segment] = {}
-    bicycle_lanes = 0
+    bicycle_lanes, doubts = 0, layers.doubts
     columns = ("fid", *_EDGES, "speed_limit_mps", "lane_group_fid", "lane_index", "lane_type_fid")
-    for (fid, left, right, limit, *place, kind), _ in layers.read("lanes_polygons", columns):
-        name = _name(fid)
-        if name in layers.lines and kind == BICYCLE_LANE:
-            bicycle_lanes += 1
-        elif name in layers.lines:
-            is_placed = place[0] is not None and isinstance(place[1], int)
-            key = tuple(place) if is_placed else (name, None)
-            lanes[key] = _segment(layers, name, (left, right), limit)
+    for (fid, left, right, limit, group, index, kind), _ in layers.read("lanes_polygons", columns):
+        with doubts.about("lanes"):
+            name, place = _name(fid), f"lane {fid}"
+            if (
+                name in layers.lines
+                and doubts.read("types of lanes", read_whole, kind, place) == 1
+            ):
+                bicycle_lanes += 1
+            elif name in layers.lines:
+                row = doubts.read("lane indices", read_whole, index, place)
+                key = (name, None) if group is None or row is None else (group, row)
+                lanes[key] = _segment(layers, name, (left, right), limit)
 
     def names_at(group: Any, index: int | None, step: int) -> tuple[Any, ...]:
         beside = None if index is None else lanes.get((group, index + step))
@@ -275,37 +291,41 @@ def _lanes(layers: _Layers) -> tuple[list[Segment], int]:
 
 def _connectors(layers: _Layers, lights: Mapping[int, TrafficLight]) -> Iterator[Segment]:
     areas = "gen_lane_connectors_scaled_width_polygons"
-    sides: dict[str, tuple[Any, Any]] = {}
+    sides, doubts = dict[str, tuple[Any, Any]](), layers.doubts
     if areas in layers.geometry:
-        read = layers.read(areas, ("lane_connector_fid", *_EDGES))
-        sides = {_name(fid): (left, right) for (fid, left, right), _ in read}
+        for (fid, left, right), _ in layers.read(areas, ("lane_connector_fid", *_EDGES)):
+            with doubts.about("outlines of connectors"):
+                sides[_name(fid)] = left, right
     columns = ("fid", "exit_lane_fid", "entry_lane_fid", "speed_limit_mps")
     for values, _ in layers.read("lane_connectors", (*columns, "traffic_light_stop_line_fids")):
         fid, before, after, limit, stop_lines = values
-        name = f"c{_name(fid)}"
-        if name not in layers.lines:
-            continue
-        dark = TrafficLight.UNKNOWN if str(stop_lines or "").strip() else TrafficLight.NONE
-        yield replace(
-            _segment(layers, name, sides.get(_name(fid), (None, None)), limit),
-            crosses=True,
-            predecessors=tuple(filter(None, [_name(before)])),
-            successors=tuple(filter(None, [_name(after)])),
-            light=lights.get(int(_name(fid)), dark),
-        )
+        with doubts.about("lane connectors"):
+            name = f"c{_name(fid)}"
+            ends = [doubts.read("ends of connectors", _name, end) for end in (before, after)]
+            stops = [(stop,) for stop in str(stop_lines or "").replace(",", " ").split()]
+            dark = TrafficLight.UNKNOWN if stops else TrafficLight.NONE
+            doubts.read_all("stop lines", _name, stops)
+            if name in layers.lines:
+                edges = sides.get(_name(fid), (None, None))
+                yield replace(
+                    _segment(layers, name, edges, limit),
+                    crosses=True,
+                    predecessors=tuple(filter(None, ends[:1])),
+                    successors=tuple(filter(None, ends[1:])),
+                    light=lights.get(int(_name(fid)), dark),
+                )
 
 
 def _segment(layers: _Layers, name: str, edges: tuple[Any, Any], limit: Any) -> Segment:
     """With its boundaries in the direction of travel; some run against it in the source."""
     line, sides = layers.lines[name], []
     for fid in edges:
-        edge = layers.edges.get(_name(fid))
+        edge = layers.edges.get(layers.doubts.read("boundaries", _name, fid) or "")
         if edge is not None:
             along = np.hypot(*(edge[0] - line[0])) + np.hypot(*(edge[-1] - line[-1]))
             against = np.hypot(*(edge[0] - line[-1])) + np.hypot(*(edge[-1] - line[0]))
             sides.append(edge[::-1] if against < along else edge)
     left, right = sides if len(sides) == 2 else (None, None)
-    # NULL and NaN are both no limit.
-    has_limit = isinstance(limit, int | float) and 0.0 < limit <= 100.0
-    limit_mps = float(limit) if has_limit else None
-    return Segment(name=name, centerline=line, left=left, right=right, speed_limit_mps=limit_mps)
+    limit = None if isinstance(limit, float) and math.isnan(limit) else limit
+    speed_mps = layers.doubts.read("speed limits", read_speed, limit, f"lane {name}")
+    return Segment(name=name, centerline=line, left=left, right=right, speed_limit_mps=speed_mps)

@@ -15,10 +15,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from augment.formats.road_map import RoadMap, complete_map
-from augment.formats.roads import RADIUS_M, road_around
-from augment.formats.values import FURTHEST, FloatArray, fault_at, read_finite
+from augment.formats.roads import RADIUS_M, middle_of, refuse_shape, road_around
+from augment.formats.values import (
+    FASTEST_MPS,
+    FURTHEST,
+    Doubts,
+    FloatArray,
+    fault_at,
+    look_up,
+    read_finite,
+    read_number,
+)
 from augment.geometry.frames import Pose, wrap
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
+from augment.scene.entities import (
+    EGO_LENGTH_M,
+    EGO_WIDTH_M,
+    LENGTH_WIDTH_M,
+    AgentType,
+    Origin,
+    Scene,
+    TrafficAgent,
+)
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording, Track, agent_of
 
@@ -93,7 +110,7 @@ class LoggedTrack:
     @property
     def has_size(self) -> bool:
         """Whether its size can be."""
-        return all(0.0005 < size_m <= LONGEST_M for size_m in (self.length_m, self.width_m))
+        return _is_size(self.length_m, self.width_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,6 +129,7 @@ class Log:
         item: Which part it is, see `Moment`.
         frame: The one that the format means to be t0.
         notes: What neither the tracks nor the map tell.
+        no_ego: Why nobody can be the ego, and who could; empty where somebody is.
     """
 
     times_s: FloatArray
@@ -126,9 +144,16 @@ class Log:
     item: str | None = None
     frame: int = 0
     notes: Sequence[str] = ()
+    no_ego: str = ""
 
     def moments(self, every_s: float) -> Iterator[Moment]:
-        """Yield the steps that far apart in which the ego is there."""
+        """Yield the steps that far apart in which the ego is there.
+
+        Raises:
+            InvalidDocument: Nobody can be the ego.
+        """
+        if self.no_ego:
+            raise fault_at("ego", self.no_ego)
         frames = np.flatnonzero(np.isfinite(self.ego).all(axis=1)).tolist()
         times_s = self.times_s[frames].tolist()
         for index in frames_every(times_s, every_s):
@@ -150,7 +175,10 @@ class Log:
         origin = self._ego_pose(frame)
         city, map_notes = complete_map(self.map_at(frame))
         road = road_around(city, origin, reach_m)
-        tracks, names = _tracks(self, frame, origin)
+        if city.doubts.notes and not (road.lanes or road.connectors or road.far):
+            raise fault_at(city.place, "; ".join(city.doubts.notes))
+        log = replace(self, tracks=[_bound(track, city.doubts) for track in self.tracks])
+        tracks, names = _tracks(log, frame, origin)
         scene = Scene(
             name=name,
             ego=_ego(self, frame),
@@ -164,18 +192,21 @@ class Log:
             connectors=road.connectors,
             areas=road.areas,
         )
-        notes = [*map_notes, *self.notes]
+        notes = [*map_notes, *self.notes, *city.doubts.notes]
         sizeless = sum(not track.has_size for track in self.tracks)
         if sizeless:
             sizes = f"{sizeless} of {len(self.tracks)} objects"
             notes.append(f"{sizes} got the usual size of their class.")
         here = self.ego[frame, :2]
-        away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in self.tracks]
+        if not _is_size(*self.ego_size_m):
+            notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
+        away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in log.tracks]
         far = road.far + sum(bool(distance_m > reach_m) for distance_m in away_m)
         if far:
             notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
         if road.side_is_assumed:
-            notes.append(f"That people drive on the {road.traffic_side} is assumed.")
+            side = f"{road.traffic_side} is assumed{city.side_reason}"
+            notes.append(f"That people drive on the {side}.")
         if not self.is_free:
             notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(
@@ -190,8 +221,31 @@ class Log:
             names=names,
         )
 
+    def put_ego(self, place: str, frame: int) -> "Log":
+        """Return the log with an ego that stands on a lane at a frame, in place of its own.
+
+        Args:
+            place: The lane as the source calls it, a comma, and how many metres along it.
+            frame: The one at which the ego is there.
+
+        Raises:
+            InvalidDocument: There is no such lane, or it is shorter.
+        """
+        lane, _, along = place.rpartition(",")
+        segments = {str(one.name): one for one in self.map_at(frame).segments}
+        with refuse_shape(f"lane {lane}"):
+            line = middle_of(look_up(segments, lane.strip(), "lane"))
+        pose = line.pose_at(read_number(along, "lane", 0.0, line.length_m))
+        ego = np.full(self.ego.shape, np.nan)
+        ego[frame : frame + 1] = pose.x_m, pose.y_m, pose.heading_rad, 0.0
+        put = f"The ego was put on lane {lane}, {along} m along it; nobody recorded it."
+        size_m = EGO_LENGTH_M, EGO_WIDTH_M
+        return replace(self, ego=ego, ego_size_m=size_m, notes=[*self.notes, put], no_ego="")
+
     def _ego_pose(self, frame: int) -> Pose:
         steps = len(self.times_s)
+        if self.no_ego:
+            raise fault_at("ego", self.no_ego)
         if not 0 <= frame < steps:
             raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
@@ -235,7 +289,8 @@ class Reader(ABC):
 
         Args:
             path: The file or folder.
-            item: See `Moment`; None for the first.
+            item: See `Moment`; None for the first. After it, or alone, "@LANE,S" puts an ego on a
+                lane of a recording, see `Log.put_ego`.
             frame: See `Moment`; None for the one that the format means.
             name: The scene's slug.
 
@@ -269,12 +324,16 @@ class LogReader(Reader):
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """Return the scene at one moment of one log."""
+        part, is_put, place = (item or "").rpartition("@")
+        item = part or None if is_put else item
         if item is not None and not self.has_items:
             raise fault_at("item", f"there are no parts, {item!r} is not there")
         log = next(self.logs(path, item), None)
         if log is None:
             raise fault_at("item", f"{str(item or 'a first part')[:60]!r} is not there")
-        return log.reading_at(log.frame if frame is None else frame, name, self.reach_m)
+        frame = log.frame if frame is None else frame
+        log = log.put_ego(place, frame) if is_put else log
+        return log.reading_at(frame, name, self.reach_m)
 
 
 def frames_every(times_s: Sequence[float], every_s: float) -> Iterator[int]:
@@ -353,14 +412,20 @@ def place_on_lanes(scene: Scene) -> Scene:
 # Private
 
 
+def _bound(track: LoggedTrack, doubts: Doubts) -> LoggedTrack:
+    """The track without the states in which nothing on earth is."""
+    odd = np.any(np.abs(track.states) > [FURTHEST, FURTHEST, FURTHEST, FASTEST_MPS], axis=1)
+    doubts.assume("A state beyond the earth, or faster than 100 m/s, was left out", odd.sum())
+    return replace(track, states=np.where(odd[:, None], np.nan, track.states))
+
+
 def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict[str, str]]:
     """The tracks near the ego from t0 on, and their names in the source by id.
 
     Who is there at t0 comes first, then by time; within one step the nearest.
     """
-    for states in (log.ego, *(track.states for track in log.tracks)):
-        if (np.abs(states) > FURTHEST).any():
-            raise fault_at("tracks", f"has a number over {FURTHEST:.0e}")
+    if (np.abs(log.ego) > FURTHEST).any():
+        raise fault_at("ego", f"has a number over {FURTHEST:.0e}")
     met = []
     ego = log.ego[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.
@@ -400,8 +465,13 @@ def _local(states: FloatArray, origin: Pose) -> FloatArray:
     return local
 
 
+def _is_size(*sizes_m: float) -> bool:
+    return all(0.0005 < size_m <= LONGEST_M for size_m in sizes_m)
+
+
 def _ego(log: Log, frame: int) -> TrafficAgent:
-    length_m, width_m = log.ego_size_m
+    is_size = _is_size(*log.ego_size_m)
+    length_m, width_m = log.ego_size_m if is_size else (EGO_LENGTH_M, EGO_WIDTH_M)
     return TrafficAgent(
         id="Agent1",
         type=AgentType.EGO_VEHICLE,

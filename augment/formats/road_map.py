@@ -11,7 +11,7 @@ from statistics import fmean
 import numpy as np
 import shapely
 
-from augment.formats.values import FloatArray
+from augment.formats.values import Doubts, FloatArray
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 
 Name = int | str
@@ -62,8 +62,10 @@ class RoadMap:
         place: How faults call the part of the file.
         side: Where the lanes do not tell on which side people drive.
         is_side_told: Whether the source itself says so, whatever the lanes look like.
+        side_reason: From what the side is assumed, as it ends the note on it.
         left_out: How many parts of which name have no place in a scene.
         tells_crossings: Whether the source says what lies in an intersection; else the lines do.
+        doubts: About what is in it; those about shapes come when a scene is taken from it.
     """
 
     place: str
@@ -71,8 +73,10 @@ class RoadMap:
     areas: tuple[tuple[AreaKind, FloatArray], ...] = ()
     side: TrafficSide = TrafficSide.RIGHT
     is_side_told: bool = False
+    side_reason: str = ""
     left_out: Mapping[str, int] = field(default_factory=dict)
     tells_crossings: bool = True
+    doubts: Doubts = field(default_factory=Doubts)
 
 
 def complete_map(city: RoadMap) -> tuple[RoadMap, list[str]]:

@@ -7,7 +7,8 @@ rounded to millimetres.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,8 @@ from augment.scene.lane_graph import traffic_side_of, turn_type_of
 
 RADIUS_M = 150.0
 """Map and agents further from the ego than this are left out, but for a reader's own reach."""
+LARGEST_M = 100_000.0
+"""No scene is larger."""
 SPACING_M = 2.0
 SAME_POINT_M = 0.05
 
@@ -59,16 +62,15 @@ class Strip:
 def road_around(city: RoadMap, ego: Pose, reach_m: float = RADIUS_M) -> MapExtract:
     """Return the map within reach of the ego's centre, which is given in the world frame.
 
-    Raises:
-        InvalidDocument: A part has no shape.
+    Parts without a shape are left out; the map's doubts count them.
     """
-    strips = dict[Name, Strip]()
+    strips, far = dict[Name, Strip](), 0
     for segment in city.segments:
-        try:
+        place = f"{city.place}.{segment.name}"
+        with city.doubts.about("lanes"), refuse_shape(place):
             strip = _strip(segment, ego, reach_m)
-        except ValueError as fault:
-            raise fault_at(f"{city.place}.{segment.name}", str(fault)) from None
-        strips |= {} if strip is None else {segment.name: strip}
+            far += strip is None
+            strips |= {} if strip is None else {segment.name: strip}
     inside = {name for name, strip in strips.items() if strip.segment.crosses}
     plain = sorted(
         strips.keys() - inside, key=lambda name: (round(strips[name].distance_m, 3), name)
@@ -77,15 +79,37 @@ def road_around(city: RoadMap, ego: Pose, reach_m: float = RADIUS_M) -> MapExtra
     following = following_of({name: strip.segment for name, strip in strips.items()})
     lanes = tuple(_lane(name, strips, lane_ids, following) for name in lane_ids)
     side = city.side if city.is_side_told else traffic_side_of(lanes)
-    areas = _areas(city, ego, reach_m)
+    areas, far_areas = _areas(city, ego, reach_m)
     return MapExtract(
         traffic_side=side or city.side,
         side_is_assumed=side is None,
         lanes=lanes,
         connectors=_connectors(ways_through(following, inside), strips, lane_ids),
         areas=areas,
-        far=len(city.segments) - len(strips) + len(city.areas) - len(areas),
+        far=far + far_areas,
     )
+
+
+@contextmanager
+def refuse_shape(place: str) -> Iterator[None]:
+    """Raise InvalidDocument for a line of the block that has no shape."""
+    try:
+        yield
+    except ValueError as fault:
+        raise fault_at(place, str(fault)) from None
+
+
+def middle_of(segment: Segment) -> Polyline:
+    """Return a segment's centreline in its world frame, or the line between its boundaries.
+
+    Raises:
+        ValueError: It has no shape.
+    """
+    if segment.centerline is not None:
+        return Polyline(segment.centerline)
+    if segment.left is None or segment.right is None:
+        raise ValueError("has neither a centreline nor boundaries")
+    return midline(Polyline(segment.left), Polyline(segment.right))
 
 
 def midline(left: Polyline, right: Polyline) -> Polyline:
@@ -121,6 +145,8 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
     local = [None if line is None else _local(line, ego) for line in given]
     if all(points is None or _is_far(points, reach_m) for points in local):
         return None
+    if any(points is not None and (np.abs(points) > LARGEST_M).any() for points in local):
+        raise ValueError(f"reaches further than {LARGEST_M:g} m")
     line, left, right = (None if points is None else Polyline(points) for points in local)
     if left is None or right is None:
         left = right = None
@@ -157,25 +183,37 @@ def _is_far(points: FloatArray, reach_m: float) -> bool:
     return bool(np.hypot(*gap) > reach_m)
 
 
-def _areas(city: RoadMap, ego: Pose, reach_m: float) -> tuple[Area, ...]:
-    """The areas within reach of the ego, the nearest first."""
-    near = []
-    for kind, points in city.areas:
-        ring = _local(points, ego)
-        if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):
-            ring = ring[:-1]
-        if not np.isfinite(ring).all() or len(np.unique(ring, axis=0)) < 3:
-            problem = f"has a {kind} area without an inside, or that is not finite"
-            raise fault_at(city.place, problem)
-        if _is_far(ring, reach_m):
-            continue
-        distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m
-        if distance_m <= reach_m:
-            near.append((round(distance_m, 3), kind, ring.tolist()))
-    return tuple(
+def _areas(city: RoadMap, ego: Pose, reach_m: float) -> tuple[tuple[Area, ...], int]:
+    """The areas within reach of the ego, the nearest first, and how many are not."""
+    near, far = [], 0
+    for number, (kind, points) in enumerate(city.areas):
+        with city.doubts.about("areas"), refuse_shape(f"{city.place}: {kind} {number}"):
+            ring = _ring(points, ego)
+            distance_m = reach_m + 1.0
+            if not _is_far(ring, reach_m):
+                distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m
+            if distance_m <= reach_m:
+                near.append((round(distance_m, 3), kind, ring.tolist()))
+            far += distance_m > reach_m
+    areas = tuple(
         Area(id=f"Area{number}", kind=kind, boundary_m=tuple((x, y) for x, y in boundary))
         for number, (_, kind, boundary) in enumerate(sorted(near), start=1)
     )
+    return areas, far
+
+
+def _ring(points: FloatArray, ego: Pose) -> FloatArray:
+    """The outline of an area in the ego frame, its end not joined.
+
+    Raises:
+        ValueError: It has no inside, or is not finite.
+    """
+    ring = _local(points, ego)
+    if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):
+        ring = ring[:-1]
+    if not (np.abs(ring) <= LARGEST_M).all() or len(np.unique(ring, axis=0)) < 3:
+        raise ValueError("is an area without an inside, or not finite")
+    return ring
 
 
 def _lane(
@@ -243,12 +281,13 @@ def _along(chain: Sequence[Strip], before: Strip | None, line: Polyline) -> dict
     limits = [strip.segment.speed_limit_mps for strip in chain]
     lights = [strip.segment.light for strip in (*chain, *([] if before is None else [before]))]
     shown = [one for one in lights if one not in (TrafficLight.UNKNOWN, TrafficLight.NONE)]
+    dark = [one for one in lights[: len(chain)] if one is TrafficLight.UNKNOWN]
     left = [strip.left for strip in chain if strip.left is not None]
     right = [strip.right for strip in chain if strip.right is not None]
     lengths = [strip.line.length_m for strip in chain]
     return {
         "width_m": round(float(np.average([s.width_m for s in chain], weights=lengths)), 3),
-        "traffic_light": (*shown, lights[0])[0],
+        "traffic_light": (*shown, *dark, lights[0])[0],
         "turn_type": (chain[0].segment.turn if len(chain) == 1 else None) or turn_type_of(line),
         "speed_limit_mps": max((limit for limit in limits if limit is not None), default=None),
         "left_boundary": _joined(left) if len(left) == len(chain) else None,

@@ -1,10 +1,15 @@
 """Numbers and names out of a stranger's recording, checked where they come in.
 
-What breaks the format is told as one place in the file and what is allowed there.
+A value is absent, understood or not understood. The last is a fault, told as one place in the file
+and what is allowed there; where it costs a part alone, `Doubts` makes a note of it.
 """
 
-from collections.abc import Mapping
-from typing import Any, Final, TypeVar
+import math
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Any, Final, SupportsInt, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,3 +88,122 @@ def read_times(values: Any, place: str) -> FloatArray:
     if not len(times_s) or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0.0).any():
         raise fault_at(place, "needs finite times that ascend")
     return np.asarray(times_s - times_s[0])
+
+
+# What stands for one value: absent (the caller's None), understood, or not understood (a fault)
+
+_KMH, _MPH = 1.0 / 3.6, 0.44704
+_UNITS_MPS = {
+    **{"km/h": _KMH, "kmh": _KMH, "kph": _KMH, "kmph": _KMH, "mph": _MPH, "mi/h": _MPH},
+    **{"m/s": 1.0, "mps": 1.0},
+}
+_SPEED = re.compile(r"\s*([0-9]+(?:[.,][0-9]+)?)\s*([a-z/]*)\s*", re.IGNORECASE)
+FASTEST_MPS: Final = 100.0
+
+
+def read_number(
+    value: object, place: str, least: float = -FURTHEST, most: float = FURTHEST
+) -> float:
+    """Return a finite number within bounds, also from its text or from a list of it alone.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    value = value.ravel().tolist() if isinstance(value, np.ndarray) else value
+    value = value[0] if isinstance(value, list) and len(value) == 1 else value
+    number = math.nan
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        with suppress(ValueError, OverflowError):
+            number = float(value)
+    if not least <= number <= most:
+        reach = f"from {least:g} to {most:g}"
+        raise fault_at(place, f"expected a finite number {reach}, got {str(value)[:40]!r}")
+    return number
+
+
+def read_whole(value: object, place: str) -> int:
+    """Return a whole number such as an id or a time, also from its digits.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    text = value.strip() if isinstance(value, str) else ""
+    if len(text) <= 18 and text.removeprefix("-").isdecimal():
+        return int(text)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise fault_at(place, f"expected a whole number, got {str(value)[:40]!r}")
+    return value
+
+
+def read_text(value: object, place: str) -> str:
+    """Return a text.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    if not isinstance(value, str):
+        raise fault_at(place, f"expected a text, got {str(value)[:40]!r}")
+    return value
+
+
+def read_speed(value: object, place: str, unit_mps: float = 1.0) -> float:
+    """Return a speed limit in m/s; a text may name its own unit ("25 mph", "30km/h").
+
+    Args:
+        value: A number, its text, or a list of one.
+        place: Where it stands.
+        unit_mps: What one of the format's own unit is in m/s.
+
+    Raises:
+        InvalidDocument: It is none that a road has.
+    """
+    match = _SPEED.fullmatch(value) if isinstance(value, str) else None
+    if match is not None:
+        value = match[1].replace(",", ".")
+        unit_mps = look_up(_UNITS_MPS | {"": unit_mps}, match[2].lower(), place)
+    limit = read_number(value, place, 0.001, FASTEST_MPS / unit_mps)
+    return limit if unit_mps == 1.0 else round(limit * unit_mps, 3)
+
+
+class Doubts:
+    """What of a recording was not understood or had to be assumed, counted for its notes."""
+
+    def __init__(self) -> None:
+        self._faults: dict[str, list[str]] = defaultdict(list)
+        self._assumed = Counter[str]()
+
+    @contextmanager
+    def about(self, kind: str) -> Iterator[None]:
+        """Count a fault of the block by the kind of what is left out with it."""
+        try:
+            yield
+        except InvalidDocument as fault:
+            self._faults[kind].append(": ".join(fault.problems[0]))
+
+    def read(
+        self, kind: str, read: Callable[..., Value | None], value: Any, *args: Any
+    ) -> Value | None:
+        """Return what is read from a value; None where it is absent, or counted as a fault."""
+        if value is not None:
+            with self.about(kind):
+                return read(value, *args)
+        return None
+
+    def read_all(
+        self, kind: str, read: Callable[..., Value | None], rows: Iterable[tuple[Any, ...]]
+    ) -> list[Value]:
+        """Return what can be read, each from the arguments in a row."""
+        return [made for row in rows if (made := self.read(kind, read, *row)) is not None]
+
+    def assume(self, sentence: str, times: SupportsInt = 1) -> None:
+        """Count an assumption, told as a sentence without its full stop."""
+        self._assumed[sentence] += int(times)
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on all of it."""
+        lost = "Not understood and left out: {} ({}); first {}.".format
+        notes = [lost(kind, len(faults), faults[0]) for kind, faults in self._faults.items()]
+        for text, times in self._assumed.items():
+            notes += [f"{text}." if times == 1 else f"{text} ({times} times)."] * bool(times)
+        return notes

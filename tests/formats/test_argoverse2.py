@@ -113,16 +113,26 @@ def without(rows: list[dict[str, Any]], column: str) -> list[dict[str, Any]]:
     return [{name: value for name, value in row.items() if name != column} for row in rows]
 
 
-def test_broken_tables_are_named(tmp_path: Path) -> None:
+def notes_of(folder: Path) -> str:
+    return " ".join(ArgoverseSensor().read(folder, item=None, frame=0, name="made").notes)
+
+
+def test_odd_rows_are_left_out_with_a_note(tmp_path: Path) -> None:
     rows = boxes()
     unknown = [rows[0] | {"category": "UNICORN"}, *rows[1:]]
-    assert "category: unknown 'UNICORN'" in fault_of(write_log(tmp_path / "a", box_rows=unknown))
+    assert "category: unknown 'UNICORN'" in notes_of(write_log(tmp_path / "a", box_rows=unknown))
     broken = [rows[0], rows[1] | {"tx_m": math.nan}, *rows[2:]]
     folder = write_log(tmp_path / "b", box_rows=broken)
-    assert "annotations.feather[1]: needs finite numbers" in fault_of(folder)
+    assert "annotations.feather with a gap or an odd number was left out." in notes_of(folder)
+    folder = write_log(tmp_path / "d", pose_rows=poses()[1:])
+    assert "A box at a time without a pose was left out (3 times)" in notes_of(folder)
+
+
+def test_broken_tables_are_named(tmp_path: Path) -> None:
+    rows = boxes()
     folder = write_log(tmp_path / "c", box_rows=without(rows, "qw"))
     assert "annotations.feather: can't be read, or has not the columns" in fault_of(folder)
-    folder = write_log(tmp_path / "d", pose_rows=poses()[1:])
+    folder = write_log(tmp_path / "d", pose_rows=[poses()[0] | {"timestamp_ns": 1}])
     assert "city_SE3_egovehicle.feather: has no pose at an annotated time" in fault_of(folder)
     folder = write_log(tmp_path / "e", box_rows=[row | {"tx_m": "far"} for row in rows])
     assert "annotations.feather: can't be read" in fault_of(folder)
@@ -135,12 +145,11 @@ def test_a_broken_map_names_the_place(tmp_path: Path) -> None:
     city = city_map()
     city["lane_segments"]["12"]["left_lane_boundary"][1]["y"] = "north"
     city["lane_segments"]["13"]["lane_type"] = "TRAM"
-    text = fault_of(write_log(tmp_path / "a", city=city))
-    assert "lane_segments.12.left_lane_boundary[1].y" in text
-    assert "lane_segments.13.lane_type" in text
+    text = notes_of(write_log(tmp_path / "a", city=city))
+    assert "lane_segments (2); first lane_segments.12: left_lane_boundary[1].y" in text
     city = city_map()
     city["lane_segments"]["12"]["left_lane_boundary"] = [{"x": 1, "y": 2}] * 2
-    assert "lane_segments.12: a line needs" in fault_of(write_log(tmp_path / "b", city=city))
+    assert "lane_segments.12: a line needs" in notes_of(write_log(tmp_path / "b", city=city))
     folder = write_log(tmp_path / "c")
     next((folder / "map").iterdir()).write_text("{")
     assert "is not JSON" in fault_of(folder)

@@ -1,4 +1,5 @@
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,7 @@ def older() -> str:
         "</obstacle>"
     )
     network = NETWORK.format(limit="<speedLimit>9.5</speedLimit>")
+    network = network.replace('<trafficLightRef ref="50"/>', "")
     return HEAD.format(version="2018b") + network + car + PROBLEM + "</commonRoad>"
 
 
@@ -111,7 +113,7 @@ def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     assert reading.recording.ego[:, 0].tolist() == [0.0, 0.5]
     assert not set(ASSUMED) & set(reading.notes)
     assert read(tmp_path, newer(more="")).moment.item == "70"
-    assert "unknown '72'; known: 90, 70" in fault_of(tmp_path, newer(), "72")
+    assert "unknown '72'; known: 90, 70, 71" in fault_of(tmp_path, newer(), "72")
 
 
 def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
@@ -161,13 +163,162 @@ OUTSIDE = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><commonRoad>&a;
         (BOMB, "declares a document type"),
         (OUTSIDE, "declares a document type"),
         ("<osm/>", "is 'osm' of version '', not commonRoad"),
-        (newer().replace('timeStepSize="0.1"', 'timeStepSize="-1"'), "is no step"),
-        (newer().replace("<type>car<", "<type>zeppelin<"), "unknown 'zeppelin'"),
-        (newer().replace("<color>red<", "<color>blue<"), "unknown 'blue'"),
-        (newer().replace("<x>-1.5</x>", "<x>1e999</x>"), "finite number"),
-        (newer().replace('ref="3"', 'ref="three"'), "whole number, got 'three'"),
-        (newer().replace("<exact>2</exact>", "<exact>1e7</exact>"), "a time step lies from"),
+        (newer().replace('timeStepSize="0.1"', 'timeStepSize="-1"'), "number from 0.001 to 10"),
     ],
 )
 def test_hostile_and_broken_files_are_refused(tmp_path: Path, text: str, said: str) -> None:
     assert said in fault_of(tmp_path, text)
+
+
+# A good file with one part changed, the note on it, and what is left: lanes, connectors, agents.
+@pytest.mark.parametrize(
+    ("good", "odd", "said", "left"),
+    [
+        ("<type>car<", "<type>zeppelin<", "objects (1); first obstacle 70: unknown", (2, 1, 1)),
+        ("<color>red<", "<color>blue<", "states of lights (1); first trafficLight 50", (2, 1, 2)),
+        ("<x>-1.5</x><y>40", "<x>1e999</x><y>40", "lanelets (2); first lanelet 2", (1, 0, 2)),
+        ('ref="3"', 'ref="three"', "a whole number, got 'three'", (2, 1, 2)),
+        ("<exact>2</exact>", "<exact>1e7</exact>", "states (1); first obstacle 70", (2, 1, 2)),
+        ("<y>90.0</y>", "<y>40.0</y>", "first lanelet 3: a line needs", (1, 1, 2)),
+        (">11.5<", ">fast<", "speed limits (1); first trafficSign 40", (2, 1, 2)),
+        ("<length>4.4</length>", "", "shapes (2); first obstacle 70.length", (2, 1, 2)),
+        ("sidewalk", "moon", "types of lanelets (1); first lanelet 4: unknown", (3, 1, 2)),
+    ],
+)
+def test_one_bad_part_is_left_out_with_a_note(
+    tmp_path: Path, good: str, odd: str, said: str, left: tuple[int, int, int]
+) -> None:
+    reading = read(tmp_path, newer().replace(good, odd))
+    scene = reading.scene
+    assert said in " ".join(reading.notes)
+    assert (len(scene.lanes), len(scene.connectors), len(scene.agents)) == left
+
+
+@pytest.mark.parametrize(
+    ("sign", "value", "limit_mps"),
+    [
+        *(("R2-1", "25mph", 11.176), ("274", "30 km/h", 8.333), ("274.1", "30kmh", 8.333)),
+        *(("B14", "13.89", 13.89), ("C43", "13,89", 13.89), ("r301", "10 m/s", 10.0)),
+        *(("R2-1", "-3", None), ("R2-1", "30 furlongs", None), ("306", "30", None)),
+    ],
+)
+def test_a_limit_is_what_its_sign_and_unit_say(
+    tmp_path: Path, sign: str, value: str, limit_mps: float | None
+) -> None:
+    text = newer().replace("R2-1", sign).replace("11.5", value)
+    assert read(tmp_path, text).scene.lanes[0].speed_limit_mps == limit_mps
+
+
+@pytest.mark.parametrize(
+    ("good", "odd", "light"),
+    [
+        ("successorsStraight", "outgoingStraight", TrafficLight.GREEN),
+        ('<successorsStraight ref="2"/>', "", TrafficLight.GREEN),
+        ("intersection", "junction", TrafficLight.GREEN),
+        (
+            '<trafficLightRef ref="50"/>',
+            '<stopLine><trafficLightRef ref="50"/></stopLine>',
+            "green",
+        ),
+        ("<direction>all<", "<direction>diagonal<", TrafficLight.GREEN),
+        ("</trafficLight>", "<active>false</active></trafficLight>", TrafficLight.UNKNOWN),
+        ("cycle", "circle", TrafficLight.UNKNOWN),
+        ('trafficLight id="50"', 'trafficLight id="51"', TrafficLight.UNKNOWN),
+        ("<direction>all<", "<direction>left<", TrafficLight.NONE),
+        ('<trafficLightRef ref="50"/>', "", TrafficLight.NONE),
+    ],
+)
+def test_every_way_to_name_a_light_gives_it_to_what_it_governs(
+    tmp_path: Path, good: str, odd: str, light: str
+) -> None:
+    reading = read(tmp_path, newer().replace(good, odd))
+    (connector,) = reading.scene.connectors
+    assert connector.traffic_light == light
+    notes = " ".join(reading.notes)
+    assert ("of unknown state" in notes) == (light == TrafficLight.UNKNOWN)
+    assert ("governs no lane" in notes) == (light == TrafficLight.NONE or 'id="51"' in odd)
+
+
+# Where the state of step 1 lies, which way it goes and how fast, as commonroad-io has it.
+@pytest.mark.parametrize(
+    ("state", "expected"),
+    [
+        (
+            "<point><x>0</x><y>11</y></point>|<velocity>3</velocity><velocityY>4</velocityY>",
+            (11, 0, 0.9273, 5),
+        ),
+        ("<point><x>0</x><y>11</y></point>|<velocity>5</velocity>", (11, 0, 1.5708, 5)),
+        (
+            "<point><x>0</x><y>11</y></point>|<orientation>1.5708</orientation>",
+            (11, 0, 1.5708, 10),
+        ),
+        (
+            "<rectangle><length>2</length><width>1</width><orientation>1</orientation><center><x>1</x>"
+            "<y>12</y></center></rectangle>|<velocity>-5</velocity><orientation>1.5708</orientation>",
+            (12, 1, 1.5708, 5),
+        ),
+        (
+            "<circle><radius>2</radius><center><x>0</x><y>12</y></center></circle>|"
+            "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd></velocity>"
+            "<orientation>1.5708</orientation>",
+            (12, 0, 1.5708, 5),
+        ),
+        (
+            "<polygon><point><x>-3</x><y>10</y></point><point><x>3</x><y>10</y></point>"
+            "<point><x>0</x><y>16</y></point></polygon>|<velocity>5</velocity>"
+            "<orientation>1.5708</orientation>",
+            (12, 0, 1.5708, 5),
+        ),
+        (
+            "<lanelet ref='2'/>|<velocity>5</velocity><orientation>1.5708</orientation>",
+            (30, 0, 1.5708, 5),
+        ),
+    ],
+)
+def test_a_state_may_be_given_in_every_way_of_the_format(
+    tmp_path: Path, state: str, expected: tuple[float, ...]
+) -> None:
+    position, values = state.split("|")
+    values = re.sub("<(velocityY?|orientation)>([-.0-9]+)<", r"<\1><exact>\2</exact><", values)
+    text = f"<state><position>{position}</position><time><exact>1</exact></time>{values}</state>"
+    made = re.sub("<trajectory>.*</trajectory>", f"<trajectory>{text}</trajectory>", newer())
+    recording = read(tmp_path, made).recording
+    assert recording is not None
+    x, y, heading, speed = recording.tracks[0].states[1]
+    assert (x, y, heading, speed) == pytest.approx(
+        (expected[0], -expected[1], expected[2] - math.pi / 2, expected[3]), abs=0.01
+    )
+
+
+def test_shapes_of_an_obstacle_become_the_box_around_them(tmp_path: Path) -> None:
+    part = (
+        "<rectangle><length>{}</length><width>2</width><originXShift>{}</originXShift></rectangle>"
+    )
+    made = newer().replace(SHAPE, f"<shape>{part.format(4, -1)}{part.format(2, 2)}</shape>", 1)
+    car = read(tmp_path, made).scene.agents[0]
+    assert (car.length_m, car.width_m, car.x_m) == (6.0, 2.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("country", "side"), [("GBR", "left"), ("C-JPN", "left"), ("ZAM", "right")]
+)
+def test_the_country_tells_the_side_where_the_lanes_do_not(
+    tmp_path: Path, country: str, side: str
+) -> None:
+    made = newer().replace("<commonRoad ", f'<commonRoad benchmarkID="{country}_Test-1_1_T-1" ')
+    assert read(tmp_path, made).scene.traffic_side == side
+
+
+def test_a_map_without_an_ego_says_so_and_takes_one_on_a_lane(tmp_path: Path) -> None:
+    made = newer(more="").replace("<type>car<", "<type>bus<")
+    said = fault_of(tmp_path, made)
+    assert "no planning problem and no moving car" in said
+    assert "as the item: 70 (bus), 71 (parkedVehicle)" in said
+    assert read(tmp_path, made, "70").scene.ego.length_m == 4.4
+    reading = read(tmp_path, made, "@1,12.5")
+    assert (reading.scene.origin.pose.x_m, reading.scene.origin.pose.y_m) == (0.0, -17.5)
+    assert len(reading.scene.agents) == 2
+    assert "lane: expected a finite number from 0 to 50, got '60'" in fault_of(
+        tmp_path, made, "@1,60"
+    )
+    assert "unknown '9'; known: 1, 2, 3" in fault_of(tmp_path, made, "@9,1")

@@ -40,3 +40,22 @@ def test_a_walk_is_written_as_motion() -> None:
     assert state["position"][-1, :2] == pytest.approx((70.0, 8.0 - 12.0 * 2.5 / 15.0), abs=0.1)
     moving = np.flatnonzero(np.hypot(*state["velocity"].T) > 0.0)
     assert moving[0] * 0.1 == pytest.approx(2.6, abs=0.11)  # 20 m on, at 8 m/s: 50 m away
+
+
+def test_gpudrive_converters_find_road_edges_and_stop_points_of_two_numbers() -> None:
+    made = document(before=crossing())
+    edges = [one for one in made["map_features"].values() if one["type"] == "ROAD_EDGE_BOUNDARY"]
+    assert all(edge["polyline"].shape[1] == 3 and len(edge["polyline"]) > 1 for edge in edges)
+    inner = np.vstack(
+        [one["polyline"] for key, one in made["map_features"].items() if "Connector" in key]
+    )
+    assert edges
+    assert (
+        min(
+            np.hypot(*(inner[:, None, :2] - edge["polyline"][:, :2]).reshape(-1, 2).T).min()
+            for edge in edges
+        )
+        > 0.3
+    )
+    assert all(len(light["stop_point"]) == 2 for light in made["dynamic_map_states"].values())
+    assert made["dynamic_map_states"]

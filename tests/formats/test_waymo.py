@@ -7,7 +7,7 @@ from augment.formats.reading import Reading
 from augment.formats.waymo.scenario import WaymoMotion
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import TrafficLight, TurnType
-from tests.formats.waymo_files import record, scenario, state, track, write
+from tests.formats.waymo_files import lane, message, points, record, scenario, state, track, write
 
 
 def read(path: Path, item: str | None = None, frame: int | None = None) -> Reading:
@@ -77,14 +77,36 @@ def test_wrong_checksums_and_cut_off_files_are_refused(file: Path) -> None:
     ("payload", "said"),
     [
         (scenario(ego=5), "sdc_track_index: unknown '5'"),
-        (scenario(track(9, 7, *[state(0, 0, 0, 0)] * 3)), "tracks[2].object_type: unknown '7'"),
-        (scenario(track(9, 1, state(0, 0, 0, 0))), "track 000000000009: has 1 states for 3 times"),
         (b"", "timestamps_seconds"),
+        (
+            message((1, message((1, message((1, b"state/current/x")))))),
+            "take the data set's Scenario",
+        ),
         (b"\x0b", "message: is broken"),
     ],
 )
 def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, said: str) -> None:
     assert said in fault_of(write(tmp_path / "x.tfrecord", payload))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (
+            track(9, 7, *[state(0, 0, 0, 0)] * 3),
+            "objects (1); first tracks[2].object_type: unknown",
+        ),
+        (track(9, 1, state(0, 0, 0, 0)), "first tracks[2]: has 1 states for 3 times"),
+        (lane(5, (2, 2), *points(8, (990, 503))), "lanes (1); first map_features.5: a line needs"),
+        ((8, message((1, 6), (8, message(*points(1, (990, 503), (991, 503)))))), "areas (1)"),
+    ],
+)
+def test_one_bad_part_is_left_out_with_a_note(
+    tmp_path: Path, more: tuple[int, object], said: str
+) -> None:
+    reading = read(write(tmp_path / "x.tfrecord", scenario(more)))
+    assert said in " ".join(reading.notes)
+    assert len(reading.scene.lanes) == 2
 
 
 def test_it_is_recognised_by_its_first_checksum(file: Path, tmp_path: Path) -> None:

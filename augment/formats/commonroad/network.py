@@ -1,23 +1,43 @@
 """Lanelets, signs, lights and intersections of CommonRoad XML as segments and areas.
 
-What an intersection names as the successors of its incoming lanelets lies in it. In a file
-without intersections, lanelets of forks and merges that cross others do. Turn types are those
-that it names; a light holds for the ways in its direction.
+What an intersection names as the successors of its incoming lanelets lies in it, and so do the
+other successors of these. In a file without intersections, lanelets of forks and merges that cross
+others do. What follows a lanelet with a light does in any case. Turn types are those that the
+intersection names; a light holds for the ways in its direction.
 """
 
-import math
+import re
 from collections import Counter
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import FURTHEST, FloatArray, fault_at, look_up, read_finite
-from augment.scene.entities import AreaKind, TrafficLight, TurnType
+from augment.formats.road_map import Name, RoadMap, Segment, crossing_segments, following_of
+from augment.formats.roads import middle_of, refuse_shape
+from augment.formats.values import (
+    Doubts,
+    FloatArray,
+    Value,
+    fault_at,
+    look_up,
+    read_finite,
+    read_speed,
+    read_whole,
+)
+from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
+from augment.scene.lane_graph import turn_type_of
 
-SPEED_SIGNS = frozenset({"274", "R2-1"})
-"""The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
+SPEED_SIGNS = "274 274.1 R2-1 r301 3.24 R15 C43 B14 Ρ-32 P-32 B31 R4-1"
+"""Highest speeds, values in m/s: of Germany and the countries without signs of their own (a zone
+too), the United States, Spain, Russia, Argentina, Belgium, France, Greece, Croatia, Australia."""
+LEFT_HAND = (
+    "AUS BGD BHS BRB BRN BTN BWA CYP FJI GBR GGY GUY HKG IDN IMN IND IRL JAM JEY JPN KEN LKA LSO "
+    "MAC MDV MLT MOZ MUS MWI MYS NAM NPL NZL PAK PNG SGP SUR SWZ SYC THA TTO TZA UGA ZAF ZMB ZWE"
+)
+"""Countries of benchmark ids (ISO 3166-1 alpha-3) in which people drive on the left."""
 AREA_OF = {
     "sidewalk": AreaKind.WALKWAY,
     "crosswalk": AreaKind.CROSSWALK,
@@ -25,7 +45,18 @@ AREA_OF = {
     "busStop": AreaKind.DRIVABLE,
     "parking": AreaKind.CARPARK,
 }
-LEFT_OUT = {"bicycleLane": "bicycle lanes", "border": "borders", "restricted": "restricted lanes"}
+LEFT_OUT = {
+    "bicycleLane": "bicycle lanes",
+    "border": "borders",
+    "restricted": "restricted lanes",
+    "restricted_area": "restricted lanes",
+}
+_DRIVEN = (
+    "urban interstate country highway busLane exitRamp mainCarriageWay accessRamp driveWay "
+    "intersection unknown"
+)
+_TYPES = dict.fromkeys((*_DRIVEN.split(), *AREA_OF, *LEFT_OUT))
+_WAYS = dict.fromkeys(("same", "opposite"))
 COLOURS = {
     "green": TrafficLight.GREEN,
     "yellow": TrafficLight.YELLOW,
@@ -34,40 +65,30 @@ COLOURS = {
     "inactive": TrafficLight.UNKNOWN,
 }
 _TURNS = {"Straight": TurnType.STRAIGHT, "Left": TurnType.LEFT, "Right": TurnType.RIGHT}
-"""By the ends of an incoming's children; a light's direction has the same words."""
+"""By the ends of an incoming's children, which begin with successors or, later, outgoing."""
+Light = tuple[TrafficLight, set[TurnType]]
+"""Its colour, and the turns of the ways that it is for."""
+_DARK: Light = (TrafficLight.UNKNOWN, {*_TURNS.values()})
 
 
-# Numbers and references
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lanelet:
+    """A lanelet as it stands in the file, without what intersections and lights say of it.
 
-
-def whole(text: str | None, place: str) -> int:
-    """Return a whole number such as an id.
-
-    Raises:
-        InvalidDocument: It is none.
+    Attributes:
+        turn: What its shape says.
+        lights: The numbers of those that it or its stop line names.
+        outline: (P, 2) around it.
     """
-    given = (text or "").strip()
-    if len(given) <= 15 and given.removeprefix("-").isdecimal():
-        return int(given)
-    raise fault_at(place, f"expected a whole number, got {given[:40]!r}")
+
+    segment: Segment
+    turn: TurnType
+    kinds: set[str]
+    lights: set[int]
+    outline: FloatArray
 
 
-def real(text: str | None, place: str) -> float:
-    """Return a finite number.
-
-    Raises:
-        InvalidDocument: It is none.
-    """
-    try:
-        number = float(text or "")
-    except ValueError:
-        number = math.nan
-    if not abs(number) <= FURTHEST:
-        raise fault_at(place, f"expected a finite number, got {(text or '')[:40]!r}")
-    return number
-
-
-def points_of(parent: Element, place: str) -> FloatArray:
+def read_points(parent: Element, place: str) -> FloatArray:
     """Return the points (P, 2) of a bound or polygon.
 
     Raises:
@@ -77,124 +98,191 @@ def points_of(parent: Element, place: str) -> FloatArray:
     return read_finite([(one.findtext("x"), one.findtext("y")) for one in points], place, 2)
 
 
-def _references(parent: Element, name: str) -> tuple[int, ...]:
-    return tuple(whole(one.get("ref"), f"{parent.tag}.{name}") for one in parent.findall(name))
-
-
-# The map
-
-
 def network_of(root: Element, step: int) -> RoadMap:
-    """Return the map with the lights at one time step.
+    """Return the map with the lights at one time step."""
+    doubts, left_out = Doubts(), Counter[str]()
 
-    Raises:
-        InvalidDocument: A lanelet, sign or light breaks the format.
-    """
-    limits, left_out = _limits(root)
-    lights = dict(_light(element, step) for element in root.findall("trafficLight"))
-    elements = {whole(one.get("id"), "lanelet"): one for one in root.findall("lanelet")}
-    kinds = {
-        key: {(kind.text or "").strip() for kind in one.findall("laneletType")}
-        for key, one in elements.items()
-    }
-    lanelets = {key: _segment(key, one, limits) for key, one in elements.items()}
-    inside = _inside(root, {key for key in kinds if "intersection" in kinds[key]})
-    segments, areas = [], []
-    for key, one in lanelets.items():
-        for kind in sorted(kinds[key] & AREA_OF.keys())[:1]:
-            areas.append((AREA_OF[kind], np.vstack([one.left, one.right[::-1]])))  # type: ignore[list-item,index]
-        for kind in kinds[key] & LEFT_OUT.keys():
-            left_out[LEFT_OUT[kind]] += 1
-        if kinds[key] & (AREA_OF.keys() | LEFT_OUT.keys()):
-            continue
-        light, turn = TrafficLight.NONE, inside.get(key)
-        if key in inside:  # its own light, or that of the lanelets before it
-            before = [elements[name] for name in one.predecessors if name in elements]
-            named = [
-                n for e in (elements[key], *before) for n in _references(e, "trafficLightRef")
-            ]
-            known = [lights[number] for number in named if number in lights]
-            shown = [colour for colour, way in known if _holds_for(way, turn)]
-            light = shown[0] if shown else light
-        segments.append(replace(one, crosses=key in inside, turn=turn, light=light))
+    def read_by_id(tag: str, read: Callable[..., Value], *more: Any) -> dict[int, Value]:
+        rows = ((one, f"{tag} {one.get('id')}", doubts, *more) for one in root.findall(tag))
+        return dict(doubts.read_all(f"{tag}s", _with_id, ((row[0], read, row) for row in rows)))
+
+    limits = read_by_id("trafficSign", _limit, left_out)
+    lights = read_by_id("trafficLight", _light, step)
+    driven, areas = dict[Name, Lanelet](), []
+    for name, one in read_by_id("lanelet", _lanelet, limits).items():
+        for kind in sorted(one.kinds & AREA_OF.keys())[:1]:
+            areas.append((AREA_OF[kind], one.outline))
+        left_out.update(LEFT_OUT[kind] for kind in one.kinds & LEFT_OUT.keys())
+        if not one.kinds & (AREA_OF.keys() | LEFT_OUT.keys()):
+            driven[name] = one
+    segments = {name: one.segment for name, one in driven.items()}
+    inside = dict.fromkeys(name for name, one in driven.items() if "intersection" in one.kinds)
+    inside |= _find_inside(root, segments, doubts)
+    inside = inside or dict.fromkeys(crossing_segments(segments))
+    shown = _show_lights(driven, inside, lights, doubts)
+    for key, segment in segments.items():
+        light, turn = shown.get(key, TrafficLight.NONE), inside.get(key)
+        segments[key] = replace(segment, crosses=key in inside, turn=turn, light=light)
+    country = root.get("benchmarkID", "").removeprefix("C-")[:3]
+    is_left = country in LEFT_HAND.split()
     return RoadMap(
         place="lanelet",
-        segments=tuple(segments),
+        segments=tuple(segments.values()),
         areas=tuple(areas),
+        side=TrafficSide.LEFT if is_left else TrafficSide.RIGHT,
+        side_reason=f", from the country {country} in the scenario's id" if is_left else "",
         left_out=left_out,
-        tells_crossings=any(
-            one.crosses for one in segments
-        ),  # the dialect of 2018b has no intersections
+        doubts=doubts,
     )
 
 
-def _limits(root: Element) -> tuple[dict[int, float], Counter[str]]:
-    """The limit of each sign that is one, and the other signs."""
-    limits: dict[int, float] = {}
-    others: Counter[str] = Counter()
-    for sign in root.findall("trafficSign"):
-        sign_id = whole(sign.get("id"), "trafficSign")
-        for element in sign.findall("trafficSignElement"):
-            name = element.findtext("trafficSignID", "").strip()
-            value = element.findtext("additionalValue")
-            if name in SPEED_SIGNS and value is not None:
-                limits[sign_id] = real(value, f"trafficSign {sign_id}")
-            else:
-                others[f"sign {name[:20]}"] += 1
-    return limits, others
+def _with_id(
+    element: Element, read: Callable[..., Value], arguments: tuple[Any, ...]
+) -> tuple[int, Value]:
+    return read_whole(element.get("id"), f"{element.tag}.id"), read(*arguments)
 
 
-def _light(element: Element, step: int) -> tuple[int, tuple[TrafficLight, str]]:
-    """The number of a light, its colour at a time step, and the direction that it is for."""
-    light_id = whole(element.get("id"), "trafficLight")
-    place = f"trafficLight {light_id}"
+# Signs and lights
+
+
+def _limit(sign: Element, place: str, doubts: Doubts, left_out: Counter[str]) -> float | None:
+    """The limit of a sign that is one; other signs are left out."""
+    limits = []
+    for element in sign.findall("trafficSignElement"):
+        name, value = (
+            element.findtext("trafficSignID", "").strip(),
+            element.find("additionalValue"),
+        )
+        if name in SPEED_SIGNS.split() and value is not None:
+            limits.append((value.text or "", place))
+        else:
+            left_out[f"sign {name[:20]}"] += 1
+    return min(doubts.read_all("speed limits", read_speed, limits), default=None)
+
+
+def _light(element: Element, place: str, doubts: Doubts, step: int) -> Light:
+    """The colour of a light at a time step, and the turns that it is for."""
+    direction = element.findtext("direction", "").strip()
+    turns, colour = _DARK[1], None
+    if direction not in ("", "all"):
+        words = re.findall("[A-Z]?[a-z]+|[^a-z]+", direction)
+        rows = ((_TURNS, word.capitalize(), place) for word in words)
+        turns = {*doubts.read_all("directions of lights", look_up, rows)} or turns
+    with doubts.about("states of lights"):
+        active = element.findtext("active", "true").strip()
+        if look_up({"true": True, "1": True, "false": False, "0": False}, active, place):
+            colour = _colour(element, step, place)
+    if colour is None:
+        doubts.assume("A light that is off, or has no cycle, is of unknown state")
+    return colour or TrafficLight.UNKNOWN, turns
+
+
+def _colour(element: Element, step: int, place: str) -> TrafficLight | None:
+    """The colour at a time step; None without a cycle."""
     cycle: list[TrafficLight] = []
-    for part in element.findall("cycle/cycleElement"):
+    for part in element.findall("cycle/*"):
+        if part.tag == "timeOffset":
+            step -= read_whole(part.text, f"{place}.timeOffset")
+            continue
         colour = look_up(COLOURS, part.findtext("color", "").strip(), place)
-        steps = whole(part.findtext("duration"), f"{place}.duration")
+        steps = read_whole(part.findtext("duration"), f"{place}.duration")
         if not 0 <= steps <= 100_000:
             raise fault_at(place, f"a duration of {steps} steps is none")
         cycle += [colour] * steps
-    offset = whole(element.findtext("cycle/timeOffset", "0"), f"{place}.timeOffset")
-    is_off = element.findtext("active", "").strip() == "false" or not cycle
-    shown = TrafficLight.UNKNOWN if is_off else cycle[(step - offset) % len(cycle)]
-    return light_id, (shown, element.findtext("direction", "").strip())
+    return cycle[step % len(cycle)] if cycle else None
 
 
-def _holds_for(direction: str, turn: TurnType | None) -> bool:
-    """Whether a way of that turn obeys a light: "all", or words like "leftStraight"."""
-    words = [word.lower() for word, kind in _TURNS.items() if kind is turn]
-    return not words or direction in ("", "all") or words[0] in direction.lower()
+def _show_lights(
+    lanelets: Mapping[Name, Lanelet],
+    inside: dict[Name, TurnType | None],
+    lights: Mapping[int, Light],
+    doubts: Doubts,
+) -> dict[Name, TrafficLight]:
+    """Return the colour for each lanelet that a light governs, and put it inside.
+
+    Of several lanelets in a row with one light, the last leads into the intersection.
+    """
+    following = following_of({name: one.segment for name, one in lanelets.items()})
+    governing = {name: {*lanelets[name].lights} for name in lanelets if name in inside}
+    for name, one in lanelets.items():
+        for after in following[name] if one.lights and name not in inside else ():
+            if after in inside or not one.lights & lanelets[after].lights:
+                governing[after] = governing.get(after, set()) | one.lights
+    shown, used = dict[Name, TrafficLight](), set[int]()
+    for name, numbers in governing.items():
+        turn = inside.setdefault(name) or lanelets[name].turn
+        turn = TurnType.LEFT if turn is TurnType.U_TURN else turn
+        holding = sorted(one for one in numbers if turn in lights.get(one, _DARK)[1])
+        used.update(holding)
+        if holding:
+            # One that shines goes before a dark one, one for this way alone before one for all.
+            colours = [lights.get(one, _DARK) for one in holding]
+            shown[name] = min(colours, key=lambda one: (one[0] is _DARK[0], len(one[1])))[0]
+    idle, lost = len(lights.keys() - used), len(used - lights.keys())
+    doubts.assume("A traffic light governs no lane that cars drive on", idle)
+    doubts.assume("A light that is named and not there is of unknown state", lost)
+    return shown
 
 
-def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
-    place = f"lanelet {key}"
+# Lanelets
+
+
+def _references(parent: Element, path: str, doubts: Doubts) -> tuple[int, ...]:
+    rows = ((one.get("ref", ""), f"{parent.tag}.{path}") for one in parent.findall(path))
+    return tuple(doubts.read_all("references", read_whole, rows))
+
+
+def _lanelet(
+    element: Element, place: str, doubts: Doubts, limits: Mapping[int, float | None]
+) -> Lanelet:
     left, right = element.find("leftBound"), element.find("rightBound")
     if left is None or right is None:
         raise fault_at(place, "needs a leftBound and a rightBound")
-    edges = points_of(left, place), points_of(right, place)
-    signs = _references(element, "trafficSignRef")
-    known = [limits[sign] for sign in signs if sign in limits]
-    known += [real(one.text, f"{place}.speedLimit") for one in element.findall("speedLimit")]
+    edges = read_points(left, place), read_points(right, place)
+    own = ((one.text or "", place) for one in element.findall("speedLimit"))
+    known = doubts.read_all("speed limits", read_speed, own)
+    signed = [limits.get(sign) for sign in _references(element, "trafficSignRef", doubts)]
+    known += [limit for limit in signed if limit is not None]
+    kinds = {(kind.text or "").strip() for kind in element.findall("laneletType")}
+    for kind in sorted(kinds):
+        with doubts.about("types of lanelets"):
+            look_up(_TYPES, kind, place)
+    for beside in (*element.findall("adjacentLeft"), *element.findall("adjacentRight")):
+        with doubts.about("neighbours of lanelets"):
+            look_up(_WAYS, beside.get("drivingDir"), place)
     # The format pairs the points of the bounds; the middle of each pair is on the centreline.
     is_paired = len(edges[0]) == len(edges[1])
-    return Segment(
-        name=key,
+    segment = Segment(
+        name=read_whole(element.get("id"), place),
         centerline=(edges[0] + edges[1]) / 2.0 if is_paired else None,
         left=edges[0],
         right=edges[1],
-        successors=_references(element, "successor"),
-        predecessors=_references(element, "predecessor"),
-        left_neighbors=_references(element, "adjacentLeft[@drivingDir='same']"),
-        right_neighbors=_references(element, "adjacentRight[@drivingDir='same']"),
-        speed_limit_mps=min((limit for limit in known if 0.0 < limit <= 100.0), default=None),
+        successors=_references(element, "successor", doubts),
+        predecessors=_references(element, "predecessor", doubts),
+        left_neighbors=_references(element, "adjacentLeft[@drivingDir='same']", doubts),
+        right_neighbors=_references(element, "adjacentRight[@drivingDir='same']", doubts),
+        speed_limit_mps=min(known, default=None),
+    )
+    with refuse_shape(place):
+        turn = turn_type_of(middle_of(segment))
+    lights = [_references(element, f"{at}trafficLightRef", doubts) for at in ("", "stopLine/")]
+    outline = np.vstack([edges[0], edges[1][::-1]])
+    return Lanelet(
+        segment=segment, turn=turn, kinds=kinds, lights={*lights[0], *lights[1]}, outline=outline
     )
 
 
-def _inside(root: Element, marked: set[int]) -> dict[int, TurnType | None]:
-    """What lies in an intersection, with its turn where the file tells it."""
-    named: dict[int, TurnType | None] = dict.fromkeys(marked)
+def _find_inside(
+    root: Element, lanelets: Mapping[Name, Segment], doubts: Doubts
+) -> dict[Name, TurnType | None]:
+    """Return what intersections name, with its turn where they tell it."""
+    following, named = following_of(lanelets), dict[Name, TurnType | None]()
     for incoming in root.findall("intersection/incoming"):
+        for lane in _references(incoming, "incomingLanelet", doubts):
+            named |= {after: named.get(after) for after in following.get(lane, [])}
         for word, turn in _TURNS.items():
-            named |= dict.fromkeys(_references(incoming, f"successors{word}"), turn)
-    return named
+            for begin in ("successors", "outgoing"):
+                named |= dict.fromkeys(_references(incoming, f"{begin}{word}", doubts), turn)
+    bare = [one.find("incoming/incomingLanelet") is None for one in root.findall("intersection")]
+    doubts.assume("An intersection without incoming lanelets tells nothing", sum(bare))
+    return {name: turn for name, turn in named.items() if name in lanelets}

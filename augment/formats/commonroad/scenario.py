@@ -13,15 +13,23 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from augment.formats.commonroad.network import network_of, points_of, real, whole
+from augment.formats.commonroad.network import network_of
+from augment.formats.commonroad.states import StateReader, read_box
 from augment.formats.documents import read_xml
 from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, LogReader
 from augment.formats.road_map import left_out_notes
-from augment.formats.values import WHAT, fault_at, look_up
+from augment.formats.values import (
+    WHAT,
+    Doubts,
+    FloatArray,
+    fault_at,
+    look_up,
+    read_number,
+    read_whole,
+)
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 
-VERSIONS = ("2018b", "2020a")
-MOST_STEPS = 100_000
+VERSIONS = ("2018b", "2020a", "2024")
 TYPE_OF = {
     "car": AgentType.VEHICLE,
     "truck": AgentType.VEHICLE,
@@ -48,32 +56,43 @@ ASSUMED = (
     f"The ego is assumed to be {EGO_LENGTH_M:g} m long.",
     "The ego's motion was not recorded: drives are measured by an IDM drive.",
 )
-State = tuple[float, float, float, float]
-"""x, y, heading, speed."""
+PROBLEM = "planning problem"
+_VEHICLES = ("car", "truck", "bus", "taxi", "priorityVehicle", "parkedVehicle", "motorcycle")
+DRIVERS = (PROBLEM, *_VEHICLES)
+"""Whose place the ego can take."""
+NO_EGO = (
+    "no planning problem and no moving car, truck or taxi is here to be the ego; who could be, as "
+    "the item: {}. Or put an ego on a lane: --ego-at LANE,S of import_scene"
+)
+MOST_OFFERED = 12
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Obstacle:
     """An obstacle, or the ego of a planning problem.
 
     Attributes:
+        kind: What the file calls it.
         size_m: Length and width, zeros where the file does not tell them.
-        states: By time step; of what stands, one.
+        states: (K, 4) of its centre at the steps (K,); of what stands, one.
     """
 
     id: int
-    type: AgentType
+    kind: str
     size_m: tuple[float, float]
-    states: dict[int, State]
+    steps: list[int]
+    states: FloatArray
     stands: bool = False
+
+    @property
+    def type(self) -> AgentType:
+        """What it is here."""
+        return TYPE_OF.get(self.kind, AgentType.EGO_VEHICLE)
 
     def track(self, steps: int) -> LoggedTrack:
         """Return its states at each step; what stands is there all the time."""
         states = np.full((steps, 4), np.nan)
-        if self.stands:
-            states[:] = (*next(iter(self.states.values()))[:3], 0.0)
-        else:
-            states[list(self.states)] = list(self.states.values())
+        states[slice(None) if self.stands else self.steps] = self.states
         length_m, width_m = self.size_m
         name = f"{self.id:018d}"
         return LoggedTrack(
@@ -91,17 +110,23 @@ class CommonRoad(LogReader):
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One for each planning problem, and where there is none for each vehicle."""
         root, step_s = _root(path)
-        obstacles, notes = _obstacles(root)
-        problems = [_problem(element) for element in root.findall("planningProblem")]
+        doubts, left_out = Doubts(), Counter[str]()
+        states = StateReader(root=root, step_s=step_s, doubts=doubts)
+        things = ((one, states, left_out) for one in root if one.tag.lower().endswith("obstacle"))
+        obstacles = doubts.read_all("objects", _obstacle, things)
+        starts = ((element, states) for element in root.findall("planningProblem"))
+        problems = doubts.read_all("planning problems", _problem, starts)
         vehicles = [one for one in obstacles if one.type is AgentType.VEHICLE and not one.stands]
-        egos = {str(one.id): one for one in (*problems, *vehicles)}
-        chosen = problems or vehicles
+        egos = {str(one.id): one for one in (*problems, *obstacles) if one.kind in DRIVERS}
+        chosen = problems or vehicles or [_NOBODY]
         if item is not None:
             chosen = [look_up(egos, item, "item")]
+        notes = [*left_out_notes("objects", left_out), *doubts.notes]
         if step_s > LONGEST_GAP_S:
             notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
-        steps = 1 + max((max(one.states) for one in (*obstacles, *chosen)), default=0)
+        steps = 1 + max(max(one.steps) for one in (*obstacles, *chosen))
         benchmark = root.get("benchmarkID", path.stem)[:80]
+        offer = ", ".join(f"{one.id} ({one.kind})" for one in [*egos.values()][:MOST_OFFERED])
         for ego in chosen:
             yield Log(
                 times_s=np.arange(steps, dtype=np.float64) * step_s,
@@ -113,13 +138,19 @@ class CommonRoad(LogReader):
                 title=f"CommonRoad scenario {benchmark}, ego {ego.id}",
                 licence=root.get("source", "").strip()[:200] or "no source named",
                 is_free=True,
-                item=str(ego.id),
-                frame=min(ego.states),
-                notes=[*notes, *(ASSUMED if ego in problems else [])],
+                item=None if ego is _NOBODY else str(ego.id),
+                frame=ego.steps[0],
+                notes=[*notes, *(ASSUMED if ego.kind == PROBLEM else [])],
+                no_ego=NO_EGO.format(offer or "nobody") if ego is _NOBODY else "",
             )
 
 
 # Private
+
+
+_NOBODY = Obstacle(
+    id=0, kind="", size_m=(EGO_LENGTH_M, EGO_WIDTH_M), steps=[0], states=np.full((1, 4), np.nan)
+)
 
 
 def _root(path: Path) -> tuple[Element, float]:
@@ -129,74 +160,38 @@ def _root(path: Path) -> tuple[Element, float]:
     if root.tag != "commonRoad" or version not in VERSIONS:
         text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"
         raise fault_at(path.name, f"{text} {' or '.join(VERSIONS)}")
-    step_s = real(root.get("timeStepSize"), "timeStepSize")
-    if not 0.001 <= step_s <= 10.0:
-        raise fault_at("timeStepSize", f"{step_s:g} s is no step from 0.001 to 10 s")
+    step_s = read_number(root.get("timeStepSize"), "timeStepSize", 0.001, 10.0)
     return root, step_s
 
 
-def _problem(element: Element) -> Obstacle:
-    number = whole(element.get("id"), "planningProblem")
-    step, state = _state(element.find("initialState"), f"planningProblem {number}")
-    return Obstacle(
-        id=number,
-        type=AgentType.EGO_VEHICLE,
-        size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
-        states={step: state},
+def _problem(element: Element, states: StateReader) -> Obstacle:
+    place = f"planningProblem {element.get('id', '')[:20]}"
+    steps, rows = states.read(element, place)
+    size_m, number = (EGO_LENGTH_M, EGO_WIDTH_M), read_whole(element.get("id"), place)
+    return Obstacle(id=number, kind=PROBLEM, size_m=size_m, steps=steps, states=rows)
+
+
+def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> Obstacle | None:
+    """What stands or drives; None for what is left out."""
+    kind = element.findtext("type", "").strip()
+    place = f"obstacle {element.get('id', '')[:20]}"
+    if kind in SCENERY or element.tag in SCENERY:
+        left_out[kind or element.tag] += 1
+        return None
+    look_up(TYPE_OF, kind, place)
+    role = element.findtext("role", element.tag.removesuffix("Obstacle")).strip()  # in 2018b
+    stands, doubts = (
+        look_up({"static": True, "dynamic": False}, role, f"{place}.role"),
+        states.doubts,
     )
-
-
-def _obstacles(root: Element) -> tuple[list[Obstacle], list[str]]:
-    """What stands and drives, and what is left out of it."""
-    obstacles, left_out = [], Counter[str]()
-    for element in root:
-        kind = element.findtext("type", "").strip()
-        place = f"obstacle {element.get('id', '')[:20]}"
-        if not element.tag.lower().endswith("obstacle"):
-            continue
-        if kind in SCENERY or element.tag in SCENERY:
-            left_out[kind or element.tag] += 1
-            continue
-        elements = [element.find("initialState"), *element.findall("trajectory/state")]
-        role = element.findtext("role", "").strip()  # in 2018b
-        obstacles.append(
-            Obstacle(
-                id=whole(element.get("id"), place),
-                type=look_up(TYPE_OF, kind, place),
-                size_m=_size(element, place),
-                states=dict(sorted(_state(one, place) for one in elements)),
-                stands=element.tag == "staticObstacle" or role == "static",
-            )
-        )
-    return obstacles, left_out_notes("objects", left_out)
-
-
-def _state(element: Element | None, place: str) -> tuple[int, State]:
-    """The time step, and where something is then; 0 for what is not given."""
-    if element is None:
-        raise fault_at(place, "needs an initialState")
-    names = ("time", "position/point/x", "position/point/y", "orientation", "velocity")
-    texts = [element.findtext(f"{name}/exact", element.findtext(name)) for name in names]
-    if texts[1] is None:
-        raise fault_at(place, "a position needs a point")
-    values = [
-        real(text or "0", f"{place}.{name}") for text, name in zip(texts, names, strict=True)
-    ]
-    step, x_m, y_m, heading_rad, speed_mps = values
-    if not 0.0 <= step <= MOST_STEPS:
-        raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
-    return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
-
-
-def _size(element: Element, place: str) -> tuple[float, float]:
-    """Length and width of the first shape, zeros where there is none."""
-    shape = element.find("shape/*")
-    if shape is None:
-        return 0.0, 0.0
-    if shape.tag == "polygon" and len(points := points_of(shape, place)):
-        length_m, width_m = np.ptp(points, axis=0).tolist()
-        return length_m, width_m
-    if shape.tag == "circle":
-        diameter_m = 2.0 * real(shape.findtext("radius"), place)
-        return diameter_m, diameter_m
-    return real(shape.findtext("length", "0"), place), real(shape.findtext("width", "0"), place)
+    if element.find("occupancySet") is not None:
+        doubts.assume("Where somebody may be after t0 is no motion, and was left out")
+    steps, rows = states.read(element, place, stands=stands)
+    if not stands and len(steps) == 1:
+        doubts.assume("Somebody who moves is known at the first step alone")
+    box = doubts.read("shapes", read_box, element.find("shape"), place, doubts) or (0.0,) * 4
+    cos, sin = np.cos(rows[:, 2]), np.sin(rows[:, 2])
+    rows[:, 0] += box[0] * cos - box[1] * sin
+    rows[:, 1] += box[0] * sin + box[1] * cos
+    number = read_whole(element.get("id"), place)
+    return Obstacle(id=number, kind=kind, size_m=box[2:], steps=steps, states=rows, stands=stands)

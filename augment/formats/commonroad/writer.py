@@ -23,6 +23,8 @@ VERSION: Final = "2020a"
 GOAL_RADIUS_M: Final = 2.0
 SPEED_SIGN = "274"
 _SAME_M = 0.01
+_MOVED_M = 0.5
+"""What is recorded to stand is not seen at the same place in every step."""
 _STATIC = {
     AgentType.TRAFFIC_CONE: "constructionZone",
     AgentType.CONSTRUCTION_SIGN: "constructionZone",
@@ -232,7 +234,8 @@ def _is_static(movement: Movement) -> bool:
     """What never moves; people, buses and bicycles that stand keep their types as dynamic ones."""
     kind = movement.agent.type
     if kind in _STATIC:
-        return movement.source is not MotionSource.PLANNED
+        way_m = np.ptp(movement.states[movement.is_present, :2], axis=0).max()
+        return movement.source is not MotionSource.PLANNED and bool(way_m <= _MOVED_M)
     return kind is AgentType.VEHICLE and movement.stands
 
 

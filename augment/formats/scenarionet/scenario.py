@@ -17,14 +17,19 @@ from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.formats.values import (
+    Doubts,
     FloatArray,
     fault_at,
     look_up,
     read_finite,
+    read_number,
     read_numbers,
+    read_speed,
+    read_text,
     read_times,
+    read_whole,
 )
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind, TrafficLight, TrafficSide
+from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
 
 _SCENARIOS = "sd_*.pkl"
 TYPE_OF = {
@@ -69,6 +74,7 @@ LIGHT_OF = {
     "STOP": TrafficLight.RED,
     "RED": TrafficLight.RED,
     "UNKNOWN": TrafficLight.UNKNOWN,
+    "": TrafficLight.UNKNOWN,
 }
 _COLUMNS = {"position": 2, "heading": 1, "velocity": 2, "valid": 1}
 """How many numbers a step needs."""
@@ -107,168 +113,212 @@ def _log(path: Path, item: str | None) -> Log:
     for name in ("tracks", "map_features", "metadata"):
         if not isinstance(description, dict) or not isinstance(description.get(name), dict):
             raise fault_at(name, "is missing, or is no dictionary")
-    metadata = description["metadata"]
+    metadata, doubts = description["metadata"], Doubts()
     given = metadata.get("ts", metadata.get("timestep"))
     if given is None:
         length = description.get("length")
         given = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
     times_s = read_times(given, "metadata.ts")
-    tracks, left_out = {}, Counter[str]()
+    tracks, left_out = dict[str, LoggedTrack](), Counter[str]()
     for key, track in description["tracks"].items():
-        kind = track.get("type") if isinstance(track, dict) else None
-        if kind in LEFT_OUT:
-            left_out[kind] += 1
-        else:
-            place = f"tracks.{str(key)[:40]}"
-            look_up(TYPE_OF, kind, f"{place}.type")
-            tracks[str(key)] = _track(str(key), track, len(times_s), place)
+        with doubts.about("objects"):
+            kind = read_text(_dictionary(track, f"tracks.{key}").get("type"), f"tracks.{key}.type")
+            if kind in LEFT_OUT:
+                left_out[kind] += 1
+                continue
+            tracks[str(key)] = _track(str(key), track, len(times_s), doubts)
     ego = look_up(tracks, str(metadata.get("sdc_id")), "metadata.sdc_id")
     del tracks[ego.name]
-    notes = left_out_notes("objects", left_out)
     if ego.width_m > ego.length_m:
-        notes.append("The ego's length and width were swapped and put right.")
-    current, city = metadata.get("current_time_index"), str(metadata.get("map") or "")[:60]
-    data_set = str(metadata.get("dataset") or description.get("version") or "unknown")[:40]
+        doubts.assume("The ego's length and width were swapped and put right")
+    current = metadata.get("current_time_index")
+    frame = doubts.read("current times", read_whole, current, "current_time_index")
+    texts = {
+        name: doubts.read("names", read_text, values.get(name), name) or ""
+        for values, name in (
+            *((metadata, name) for name in ("dataset", "map", "provenance", "traffic_side")),
+            *((description, name) for name in ("version", "id")),
+        )
+    }
+    city, data_set = texts["map"][:60], (texts["dataset"] or texts["version"] or "unknown")[:40]
     licences = [text for name, text in DATA_LICENCES.items() if name in data_set.lower()]
-    own = str(metadata.get("provenance") or "licence not named")[:300]
     return Log(
         times_s=times_s,
         ego=ego.states,
         ego_size_m=(max(ego.length_m, ego.width_m), min(ego.length_m, ego.width_m)),
         tracks=[track for track in tracks.values() if np.isfinite(track.states).any()],
-        map_at=lambda frame: _city(description, frame, city),
+        map_at=lambda frame: _city(description, frame, city, texts["traffic_side"]),
         world=f"ScenarioNet frame of {data_set} {city}".strip(),
-        title=f"{data_set} data set by ScenarioNet, {str(description.get('id'))[:120]}",
-        licence=next(iter(licences), own),
+        title=f"{data_set} data set by ScenarioNet, {texts['id'][:120]}",
+        licence=next(iter(licences), texts["provenance"][:300] or "licence not named"),
         is_free=not licences,
         item=item,
-        frame=current if isinstance(current, int) else 0,
-        notes=notes,
+        frame=frame or 0,
+        notes=[*left_out_notes("objects", left_out), *doubts.notes],
     )
 
 
-def _track(key: str, track: dict[str, Any], steps: int, place: str) -> LoggedTrack:
-    state = track.get("state")
-    if not isinstance(state, dict):
-        raise fault_at(f"{place}.state", "is missing")
+def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
+    place = f"tracks.{key[:40]}"
+    kind = look_up(TYPE_OF, _dictionary(track, place).get("type"), f"{place}.type")
+    state = _dictionary(track.get("state"), f"{place}.state")
     columns = {
-        name: read_numbers(state.get(name), f"{place}.state.{name}", needed)
+        name: _column(state.get(name), steps, f"{place}.state.{name}", needed)
         for name, needed in _COLUMNS.items()
     }
-    known = {
-        size: read_numbers(state[size], place)[:, 0]
-        for size in ("length", "width")
-        if size in state
-    }
-    for name, column in (columns | known).items():
-        if len(column) != steps:
-            text = f"has {len(column)} steps; the scenario has {steps}"
-            raise fault_at(f"{place}.state.{name}", text)
     speed_mps = np.hypot(*columns["velocity"].T)
     states = np.column_stack([columns["position"], columns["heading"], speed_mps])
-    seen = (columns["valid"][:, 0] > 0.0) & np.isfinite(states).all(axis=1)
-    states[~seen] = np.nan
-    finer = track.get("metadata")
-    is_bus = isinstance(finer, dict) and str(finer.get("type", "")).startswith(BUS)
-    kind = AgentType.BUS if is_bus else TYPE_OF[track["type"]]
-    sizes_m = list(LENGTH_WIDTH_M[kind])
-    for number, column in enumerate(known.values() if len(known) == 2 else ()):
-        values = column[seen & np.isfinite(column) & (column > 0.0)]
-        sizes_m[number] = float(np.median(values)) if len(values) else sizes_m[number]
-    return LoggedTrack(name=key, type=kind, length_m=sizes_m[0], width_m=sizes_m[1], states=states)
+    seen = columns["valid"][:, 0] > 0.0
+    odd = seen & ~np.isfinite(states).all(axis=1)
+    doubts.assume("A state that is valid and not finite was left out", int(odd.sum()))
+    states[~seen | odd] = np.nan
+    finer = doubts.read("finer types", _dictionary, track.get("metadata"), place) or {}
+    finest = doubts.read("finer types", read_text, finer.get("type"), place) or ""
+    sizes_m = [0.0, 0.0]
+    for number, name in enumerate(("length", "width")):
+        with doubts.about("sizes"):
+            column = _column(state.get(name, [0.0] * steps), steps, f"{place}.{name}", 1)[:, 0]
+            values = column[seen & ~odd & np.isfinite(column) & (column > 0.0)]
+            sizes_m[number] = float(np.median(values)) if len(values) else 0.0
+    return LoggedTrack(
+        name=key,
+        type=AgentType.BUS if finest.startswith(BUS) else kind,
+        length_m=sizes_m[0],
+        width_m=sizes_m[1],
+        states=states,
+    )
+
+
+def _dictionary(value: object, place: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise fault_at(place, "is missing, or is no dictionary")
+    return value
+
+
+def _column(value: object, steps: int, place: str, needed: int) -> FloatArray:
+    """The rows (T, C) of each step."""
+    rows = read_numbers(value, place, needed)
+    if len(rows) != steps:
+        raise fault_at(place, f"has {len(rows)} steps; the scenario has {steps}")
+    return rows
 
 
 # The map
 
 
-def _city(description: dict[str, Any], frame: int, city_name: str) -> RoadMap:
+def _city(description: dict[str, Any], frame: int, city_name: str, told: str) -> RoadMap:
     """The map with the lights of one step."""
-    lights = _lights(description.get("dynamic_map_states") or {}, frame)
-    lanes, areas, left_out = {}, [], Counter[str]()
-    for key, feature in description["map_features"].items():
-        kind = feature.get("type") if isinstance(feature, dict) else None
-        if not isinstance(kind, str):
-            raise fault_at(f"map_features.{key}", "needs a type")
-        if kind in LANES:
-            lanes[str(key)] = feature
-        elif kind in AREA_OF and feature.get("polygon") is not None:
-            ring = read_finite(feature["polygon"], f"map_features.{key}", 2)
-            if len(np.unique(ring, axis=0)) >= 3:
-                areas.append((AREA_OF[kind], ring))
-        elif not kind.startswith(PASSED_OVER):
-            left_out["bicycle lanes" if kind == BICYCLE_LANE else kind] += 1
+    doubts = Doubts()
+    states = description.get("dynamic_map_states")
+    states = doubts.read("lights", _dictionary, states, "dynamic_map_states") or {}
+    lights = dict(doubts.read_all("lights", _light, ((*light, frame) for light in states.items())))
+    lanes, areas, left_out = dict[str, dict[str, Any]](), [], Counter[str]()
+    for key, value in description["map_features"].items():
+        place = f"map_features.{str(key)[:40]}"
+        with doubts.about("parts of the map"):
+            feature = _dictionary(value, place)
+            kind = read_text(feature.get("type"), f"{place}: needs a type")
+            if kind in LANES:
+                limit = feature.get("speed_limit_kmh")
+                limit = limit.tolist() if isinstance(limit, np.ndarray) else limit
+                lanes[str(key)] = feature | {"speed_limit_kmh": limit}
+            elif kind in AREA_OF and feature.get("polygon") is not None:
+                areas.append((AREA_OF[kind], read_finite(feature["polygon"], place, 2)))
+            elif not kind.startswith(PASSED_OVER):
+                left_out["bicycle lanes" if kind == BICYCLE_LANE else kind] += 1
     connectors = {key for key, lane in lanes.items() if lane["type"] == CONNECTOR}
     is_limit_meant = any(lanes[key].get("speed_limit_kmh") for key in lanes.keys() - connectors)
     for key in connectors:
         if lanes[key].get("speed_limit_kmh") == MEANINGLESS_KMH and not is_limit_meant:
             lanes[key] = lanes[key] | {"speed_limit_kmh": None}
-    told = description["metadata"].get("traffic_side")  # by our own writer alone
+    rows = ((*lane, lights, doubts) for lane in lanes.items())
+    segments = doubts.read_all("lanes", _segment, rows)
+    with doubts.about("sides of traffic"):  # told by our own writer alone
+        look_up(dict.fromkeys(("", "left", "right")), told, "metadata.traffic_side")
     is_left = told == "left" or city_name.lower().startswith(LEFT_HAND)
     return RoadMap(
         place="map_features",
-        segments=tuple(_segment(key, lane, lights) for key, lane in lanes.items()),
+        segments=tuple(segments),
         areas=tuple(areas),
         side=TrafficSide.LEFT if is_left and told != "right" else TrafficSide.RIGHT,
         is_side_told=told in ("left", "right"),
         left_out=left_out,
         tells_crossings=bool(connectors),
+        doubts=doubts,
     )
 
 
-def _lights(states: object, frame: int) -> dict[str, TrafficLight]:
-    """The state by lane at a step."""
-    lights = {}
-    for key, light in states.items() if isinstance(states, dict) else ():
-        state = light.get("state") if isinstance(light, dict) else None
-        steps = state.get("object_state") if isinstance(state, dict) else None
-        if not isinstance(light, dict):
-            continue
-        steps = steps.tolist() if isinstance(steps, np.ndarray) else steps
-        shown = steps[frame] if isinstance(steps, list) and frame < len(steps) else None
-        word = str(shown or "UNKNOWN").rsplit("_", 1)[-1].upper()
-        lights[str(light.get("lane", key))] = look_up(LIGHT_OF, word, f"dynamic_map_states.{key}")
-    return lights
+def _light(key: object, light: object, frame: int) -> tuple[str, TrafficLight]:
+    """The lane of a light, and its state at a step."""
+    place = f"dynamic_map_states.{str(key)[:40]}"
+    fields = _dictionary(light, place)
+    steps = _dictionary(fields.get("state"), f"{place}.state").get("object_state")
+    steps = steps.tolist() if isinstance(steps, np.ndarray) else steps
+    if not isinstance(steps, list):
+        raise fault_at(f"{place}.state.object_state", "needs a list")
+    shown = steps[frame] if frame < len(steps) else None
+    word = read_text("" if shown is None else shown, place).rsplit("_", 1)[-1].upper()
+    return _name(fields.get("lane", key), f"{place}.lane"), look_up(LIGHT_OF, word, place)
 
 
-def _segment(key: str, lane: dict[str, Any], lights: dict[str, TrafficLight]) -> Segment:
-    place = f"map_features.{key}"
+def _segment(
+    key: str, lane: dict[str, Any], lights: dict[str, TrafficLight], doubts: Doubts
+) -> Segment:
+    place = f"map_features.{key[:40]}"
     line = read_finite(lane.get("polyline"), place, 2)
-    limits = []
-    for name, factor in (("speed_limit_kmh", 1.0 / 3.6), ("speed_limit_mph", 0.44704)):
-        value = lane.get(name)
-        value = value[0] if isinstance(value, list) and len(value) == 1 else value
-        if isinstance(value, int | float) and 0.0 < value <= 300.0:
-            limits.append(round(float(value) * factor, 3))
+    units = {"speed_limit_kmh": 1.0 / 3.6, "speed_limit_mph": 0.44704}
+    rows = ((lane.get(name), f"{place}.{name}", unit_mps) for name, unit_mps in units.items())
+    limits = doubts.read_all("speed limits", _limit, rows)
+    joints = {
+        name: doubts.read("neighbours of lanes", _names, lane.get(name), f"{place}.{name}") or ()
+        for name in ("exit_lanes", "entry_lanes", "left_neighbor", "right_neighbor")
+    }
+    switch, inner = {True: True, False: False, None: False}, lane.get("interpolating")
+    is_inner = doubts.read("fields of lanes", look_up, switch, inner, f"{place}.interpolating")
     return Segment(
         name=key,
-        crosses=lane["type"] == CONNECTOR or lane.get("interpolating") is True or key in lights,
+        crosses=lane["type"] == CONNECTOR or bool(is_inner) or key in lights,
         centerline=line,
-        width_m=_width(lane, line, place),
-        successors=_names(lane.get("exit_lanes")),
-        predecessors=_names(lane.get("entry_lanes")),
-        left_neighbors=_names(lane.get("left_neighbor")),
-        right_neighbors=_names(lane.get("right_neighbor")),
+        width_m=doubts.read("widths of lanes", _width, lane, line, place),
+        successors=joints["exit_lanes"],
+        predecessors=joints["entry_lanes"],
+        left_neighbors=joints["left_neighbor"],
+        right_neighbors=joints["right_neighbor"],
         speed_limit_mps=next(iter(limits), None),
         light=lights.get(key, TrafficLight.UNKNOWN),
     )
 
 
-def _names(value: object) -> tuple[str, ...]:
+def _limit(value: object, place: str, unit_mps: float) -> float | None:
+    """A limit in m/s; 0 stands for none."""
+    is_text = isinstance(value, str)
+    return read_speed(value, place, unit_mps) if is_text or read_number(value, place) else None
+
+
+def _name(value: object, place: str) -> str:
+    if not isinstance(value, str | int) or isinstance(value, bool):
+        raise fault_at(place, f"expected an id, got {str(value)[:40]!r}")
+    return str(value)
+
+
+def _names(value: object, place: str) -> tuple[str, ...]:
     """Ids of lanes, given as such or as dictionaries with one."""
-    given = value if isinstance(value, list) else []
-    names = [one.get("feature_id") if isinstance(one, dict) else one for one in given]
-    return tuple(str(name) for name in names if isinstance(name, str | int))
+    values = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(values, list):
+        raise fault_at(place, "needs a list")
+    names = [one.get("feature_id") if isinstance(one, dict) else one for one in values]
+    return tuple(_name(name, place) for name in names)
 
 
 def _width(lane: dict[str, Any], line: FloatArray, place: str) -> float | None:
     """The median of the widths that the file gives, else the lane's area over its length."""
     given, polygon = lane.get("width"), lane.get("polygon")
     widths = np.empty(0)
-    if isinstance(given, np.ndarray) and given.ndim == 2 and given.shape[1] == 2:
-        widths = given.sum(axis=1)
-    elif polygon is not None and len(line) >= 2:
+    if given is not None:
+        widths = read_numbers(given, f"{place}.width", 2).sum(axis=1)
+    if not len(widths) and polygon is not None and len(line) >= 2:
         length_m = max(float(np.hypot(*np.diff(line, axis=0).T).sum()), 1e-6)
-        ring = read_finite(polygon, place, 2)
+        ring = read_finite(polygon, f"{place}.polygon", 2)
         widths = np.array([shapely.Polygon(ring).area / length_m]) if len(ring) >= 3 else widths
     known = widths[(widths >= NARROWEST_M) & (widths <= WIDEST_M)]
     return float(np.median(known)) if len(known) else None

@@ -6,11 +6,12 @@ description of the format in MetaDrive's `scenario_description.py` and `type.py`
 """
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import shapely
 
 from augment.formats import writing
 from augment.formats.writing import Cell, LossReport
@@ -59,6 +60,8 @@ _HEIGHTS_M = {
     AgentType.BARRIER: 1.0,
 }
 _HEIGHT_M = 1.777
+_BESIDE_M = 0.3
+"""The edges of neighbours lie no further apart."""
 
 
 def write(cells: Sequence[Cell]) -> writing.Written:
@@ -169,7 +172,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
         "type": "TRAFFIC_LIGHT",
         "state": {"object_state": [_LIGHTS[connector.traffic_light]] * steps},
         "lane": connector.id,
-        "stop_point": np.array([*start, 0.0]),
+        "stop_point": np.array([*start]),  # MetaDrive takes two of three, ScenarioMax two alone
         "metadata": {"type": "TRAFFIC_LIGHT", "object_id": connector.id, "dataset": DATASET},
     }
 
@@ -192,8 +195,28 @@ def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
         }
         if way.speed_limit_mps is not None:
             features[way.id]["speed_limit_kmh"] = way.speed_limit_mps * 3.6
+    for number, points_m in enumerate(_road_edges(scene), start=1):
+        line = np.column_stack([points_m, np.zeros(len(points_m))])
+        features[f"Edge{number}"] = {"type": "ROAD_EDGE_BOUNDARY", "polyline": line}
     for area in scene.areas:
         if area.kind in _AREAS:
             ring = np.array([*area.boundary_m], dtype=np.float64)
             features[area.id] = {"type": _AREAS[area.kind], "polygon": ring}
     return features
+
+
+def _road_edges(scene: Scene) -> Iterator[np.ndarray]:
+    """The edges of lanes (P, 2) where no other lane or connector lies beside or across them."""
+    sides = [[one.points_m for one in writing.bounds_of(way)] for way in writing.ways_of(scene)]
+    outlines = [shapely.Polygon(np.vstack([left, right[::-1]])) for left, right in sides]
+    covers = shapely.buffer(shapely.make_valid(outlines), _BESIDE_M)
+    tree = shapely.STRtree(covers)
+    for number, lines in enumerate(sides):
+        near = [covers[other] for other in tree.query(covers[number]) if other != number]
+        for line in lines:
+            edge = shapely.difference(shapely.LineString(line), shapely.union_all(near))
+            yield from (
+                part
+                for part in map(shapely.get_coordinates, shapely.get_parts(edge))
+                if len(part) > 1
+            )

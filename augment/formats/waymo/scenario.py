@@ -17,20 +17,27 @@ import numpy as np
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import DecodeError
 from google.protobuf.message_factory import GetMessages
+from google.protobuf.unknown_fields import UnknownFieldSet
 
 from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
 from augment.formats.values import (
+    Doubts,
     FloatArray,
     fault_at,
     look_up,
     read_finite,
     read_numbers,
+    read_speed,
     read_times,
 )
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
+EXAMPLES = (
+    "holds tf.Example records, which are not read; take the data set's Scenario form, the files "
+    "under scenario/training, scenario/validation or scenario/testing"
+)
 UNSET = 0
 TYPE_OF = {
     UNSET: AgentType.GENERIC_OBJECT,
@@ -41,9 +48,11 @@ TYPE_OF = {
 }
 AREA_OF = {"crosswalk": AreaKind.CROSSWALK, "driveway": AreaKind.DRIVABLE}
 BICYCLE_LANE = 3
+LANE_TYPES = dict.fromkeys((0, 1, 2, BICYCLE_LANE))
 MPS_OF_MPH = 0.44704
 _RED, _YELLOW, _GREEN = TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN
-LIGHT_OF = dict(enumerate((_RED, _YELLOW, _GREEN, _RED, _YELLOW, _GREEN, _RED, _YELLOW), start=1))
+_COLOURS = (_RED, _YELLOW, _GREEN, _RED, _YELLOW, _GREEN, _RED, _YELLOW)
+LIGHT_OF = dict(enumerate((TrafficLight.UNKNOWN, *_COLOURS)))
 """LANE_STATE_*: arrows and round lights alike; flashing ones as what they ask for."""
 _MESSAGES = FileDescriptorSet.FromString((Path(__file__).parent / "scenario.desc").read_bytes())
 Scenario: Any = GetMessages(_MESSAGES.file)["scenario_arena.waymo.Scenario"]
@@ -68,15 +77,19 @@ class WaymoMotion(LogReader):
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One of each record."""
         for number, payload in read_records(path, only=item):
-            scenario = read_scenario(payload)
-            tracks = [_track(index, track) for index, track in enumerate(scenario.tracks)]
+            scenario, doubts = read_scenario(payload), Doubts()
+            with doubts.about("fields of messages"):
+                _check_fields(scenario)
             times_s = read_times(scenario.timestamps_seconds, "timestamps_seconds")
-            for one in tracks:
-                if len(one.states) != len(times_s):
-                    text = f"has {len(one.states)} states for {len(times_s)} times"
-                    raise fault_at(f"track {one.name}", text)
-            ego = look_up(dict(enumerate(tracks)), scenario.sdc_track_index, "sdc_track_index")
-            kinds = [track.object_type for track in scenario.tracks]
+            tracks = dict[int, LoggedTrack]()
+            for index, track in enumerate(scenario.tracks):
+                with doubts.about("objects"):
+                    tracks[index] = _track(index, track, len(times_s), doubts)
+            sdc = scenario.sdc_track_index if scenario.HasField("sdc_track_index") else None
+            ego = look_up(tracks, sdc, "sdc_track_index")
+            unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
+            if not scenario.HasField("current_time_index"):
+                doubts.assume("A current step that is not given is the first")
             name = scenario.scenario_id[:100].decode("ascii", errors="replace")
             yield Log(
                 times_s=times_s,
@@ -84,8 +97,8 @@ class WaymoMotion(LogReader):
                 ego_size_m=(ego.length_m, ego.width_m),
                 tracks=[
                     one
-                    for one, kind in zip(tracks, kinds, strict=True)
-                    if one is not ego and kind != UNSET and np.isfinite(one.states).any()
+                    for index, one in tracks.items()
+                    if one is not ego and index not in unset and np.isfinite(one.states).any()
                 ],
                 map_at=lambda frame, scenario=scenario: city_of(scenario, frame),  # type: ignore[misc]
                 world="Waymo Open Motion scenario frame",
@@ -93,7 +106,7 @@ class WaymoMotion(LogReader):
                 licence=LICENCE,
                 item=str(number),
                 frame=scenario.current_time_index,
-                notes=left_out_notes("objects", {"TYPE_UNSET": kinds.count(UNSET)}),
+                notes=[*left_out_notes("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
             )
 
 
@@ -143,23 +156,45 @@ def read_scenario(payload: bytes) -> Any:
     """Return the message of a record.
 
     Raises:
-        InvalidDocument: It is none.
+        InvalidDocument: It is none, or one of the data set's other form.
     """
+    if any(name in payload for name in (b"roadgraph_samples/", b"state/current/")):
+        raise fault_at("record", EXAMPLES)
     try:
         return Scenario.FromString(payload)
     except DecodeError as fault:
         raise fault_at("message", f"is broken: {fault}") from None
 
 
-def _track(index: int, track: Any) -> LoggedTrack:
+def _check_fields(message: Any) -> None:
+    """Raise InvalidDocument for a field that is written in another type than the format's."""
+    fields = message.DESCRIPTOR.fields_by_number
+    for unknown in UnknownFieldSet(message):
+        if unknown.field_number in fields:
+            name = f"{message.DESCRIPTOR.name}.{fields[unknown.field_number].name}"
+            raise fault_at(name, "is not of the format's type")
+    for field, value in message.ListFields():
+        if field.message_type is not None:
+            for part in value if field.is_repeated else [value]:
+                _check_fields(part)
+
+
+def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     """The track; boxes change a little from step to step, the usual one is taken."""
-    kind = look_up(TYPE_OF, track.object_type, f"tracks[{index}].object_type")
+    place = f"tracks[{index}]"
+    kind = look_up(TYPE_OF, track.object_type, f"{place}.object_type")
+    if len(track.states) != steps:
+        raise fault_at(place, f"has {len(track.states)} states for {steps} times")
     rows = [[getattr(state, name) for name in _STATE] for state in track.states]
-    columns = read_numbers(rows, f"tracks[{index}]", len(_STATE))
+    columns = read_numbers(rows, place, len(_STATE))
     valid = np.array([state.valid for state in track.states], dtype=bool)
+    whole = np.array([all(map(state.HasField, _STATE)) for state in track.states], dtype=bool)
     states = np.column_stack([columns[:, :3], np.hypot(columns[:, 3], columns[:, 4])])
-    states[~(valid & np.isfinite(states).all(axis=1))] = np.nan
-    sizes_m = np.median(columns[valid, 5:], axis=0).tolist() if valid.any() else (0.0, 0.0)
+    odd = valid & ~(whole & np.isfinite(states).all(axis=1))
+    doubts.assume("A state that is valid and not whole or finite was left out", int(odd.sum()))
+    seen = valid & ~odd
+    states[~seen] = np.nan
+    sizes_m = np.median(columns[seen, 5:], axis=0).tolist() if seen.any() else (0.0, 0.0)
     return LoggedTrack(
         name=f"{track.id:012d}", type=kind, length_m=sizes_m[0], width_m=sizes_m[1], states=states
     )
@@ -169,50 +204,57 @@ def _track(index: int, track: Any) -> LoggedTrack:
 
 
 def city_of(scenario: Any, frame: int) -> RoadMap:
-    """Return the map with the lights of one step.
-
-    Raises:
-        InvalidDocument: A point is nowhere on earth.
-    """
+    """Return the map with the lights of one step."""
     lanes, edges, areas = dict[int, Any](), dict[int, FloatArray](), []
-    left_out = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}
+    left_out, doubts = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}, Doubts()
     for feature in scenario.map_features:
-        kind = feature.WhichOneof("feature_data")
+        kind, place = feature.WhichOneof("feature_data"), f"map_features.{feature.id}"
         if kind == "lane" and feature.lane.type == BICYCLE_LANE:
             left_out["bicycle lanes"] += 1
-        elif kind == "lane" and len(feature.lane.polyline) >= 2:
+        elif kind == "lane":
             lanes[feature.id] = feature.lane
         elif kind in ("road_line", "road_edge"):
-            edges[feature.id] = _points(getattr(feature, kind).points)
+            with doubts.about("road lines"):
+                edges[feature.id] = _points(getattr(feature, kind).points, place)
         elif kind in ("speed_bump", "stop_sign"):
             left_out[f"{kind.replace('_', ' ')}s"] += 1
         elif kind in AREA_OF:
-            polygon = _points(getattr(feature, kind).points)
-            if len(np.unique(polygon, axis=0)) >= 3:
-                areas.append((AREA_OF[kind], polygon))
+            with doubts.about("areas"):
+                areas.append((AREA_OF[kind], _points(getattr(feature, kind).points, place)))
     states = [step.lane_states for step in scenario.dynamic_map_states]
-    lights = {one.lane: one.state for one in states[frame]} if frame < len(states) else {}
+    lights = {
+        one.lane: doubts.read("states of lights", look_up, LIGHT_OF, one.state, "lane_states")
+        for one in (states[frame] if frame < len(states) else ())
+    }
     controlled = {one.lane for step in states for one in step}
+    rows = ((*lane, edges, lights, controlled, doubts) for lane in lanes.items())
     return RoadMap(
         place="map_features",
-        segments=tuple(
-            _segment(key, lane, edges, lights.get(key, 0), key in controlled)
-            for key, lane in lanes.items()
-        ),
+        segments=tuple(doubts.read_all("lanes", _segment, rows)),
         areas=tuple(areas),
         left_out=left_out,
         tells_crossings=False,
+        doubts=doubts,
     )
 
 
-def _points(points: Iterable[Any]) -> FloatArray:
-    return read_finite([(point.x, point.y) for point in points], "map_features", 2)
+def _points(points: Iterable[Any], place: str) -> FloatArray:
+    if not all(point.HasField("x") and point.HasField("y") for point in points):
+        raise fault_at(place, "has a point without x or y")
+    return read_finite([(point.x, point.y) for point in points], place, 2)
 
 
 def _segment(
-    key: int, lane: Any, edges: Mapping[int, FloatArray], light: int, is_controlled: bool
+    key: int,
+    lane: Any,
+    edges: Mapping[int, FloatArray],
+    lights: Mapping[int, TrafficLight | None],
+    controlled: set[int],
+    doubts: Doubts,
 ) -> Segment:
-    line = _points(lane.polyline)
+    place = f"map_features.{key}"
+    line = _points(lane.polyline, place)
+    look_up(LANE_TYPES, lane.type, f"{place}.type")
     left, right = (
         edge_of(
             line,
@@ -225,11 +267,10 @@ def _segment(
         for boundaries in (lane.left_boundaries, lane.right_boundaries)
     )
     is_whole = _is_whole_edge(line, left) and _is_whole_edge(line, right)
-    limit = lane.speed_limit_mph
-    has_limit = np.isfinite(limit) and limit > 0.0
+    limit = lane.speed_limit_mph or None  # 0 stands for none
     return Segment(
         name=key,
-        crosses=lane.interpolating or is_controlled,
+        crosses=lane.interpolating or key in controlled,
         centerline=line,
         left=left if is_whole else None,
         right=right if is_whole else None,
@@ -238,8 +279,8 @@ def _segment(
         predecessors=tuple(lane.entry_lanes),
         left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
         right_neighbors=tuple(one.feature_id for one in lane.right_neighbors),
-        speed_limit_mps=round(limit * MPS_OF_MPH, 3) if has_limit else None,
-        light=LIGHT_OF.get(light, TrafficLight.UNKNOWN),
+        speed_limit_mps=doubts.read("speed limits", read_speed, limit, place, MPS_OF_MPH),
+        light=lights.get(key) or TrafficLight.UNKNOWN,
     )
 
 

@@ -9,7 +9,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--item I]`."""
+    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--item I] [--ego-at LANE,S]`."""
 
     help = "Import one moment of a recording, or a scene in the own JSON. Formats: " + "; ".join(
         f"{reader.name}, {reader.title}" for reader in READERS.values()
@@ -29,6 +29,11 @@ class Command(TerminalCommand):
             "help": "which part of a file with several: the number of a record, a planning "
             "problem, a lidar_pc token (default: the first)"
         },
+        "--ego-at": {
+            "metavar": "LANE,S",
+            "help": "put an ego on a lane, as the source calls it, S metres along (default: the "
+            "recorded one)",
+        },
         "--slug": {
             "required": True,
             "help": "the scene's name: lower-case letters, digits, hyphens",
@@ -41,7 +46,9 @@ class Command(TerminalCommand):
             source=options["source"],
             path=options["path"],
             frame=options["frame"],
-            item=options["item"],
+            item=f"{options['item'] or ''}@{put}"
+            if (put := options["ego_at"])
+            else options["item"],
             slug=options["slug"],
         )
         counts = ", ".join(

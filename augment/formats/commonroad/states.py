@@ -1,0 +1,203 @@
+"""States and shapes of CommonRoad XML, as its schemas of 2018b and 2020a allow them.
+
+A position may be a point, or shapes or lanelets that it lies in, whose centre is taken; a value
+may be an interval, whose middle is. A heading that is not given is that of the two parts of the
+velocity (a point mass), else of the motion.
+"""
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import shapely
+from shapely.affinity import rotate, translate
+
+from augment.formats.commonroad.network import read_points
+from augment.formats.reading import speeds
+from augment.formats.values import Doubts, FloatArray, fault_at, read_number
+
+MOST_STEPS = 100_000
+MOVED_M = 0.05
+"""A shorter way tells no heading."""
+State = tuple[float, float, float, float]
+"""x, y, heading, speed; NaN for what is not given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateReader:
+    """Reads the states of one file.
+
+    Attributes:
+        root: The file, for lanelets that a position names.
+        step_s: Between its steps.
+        doubts: Takes what is assumed.
+    """
+
+    root: Element
+    step_s: float
+    doubts: Doubts
+
+    def read(
+        self, owner: Element, place: str, *, stands: bool = False
+    ) -> tuple[list[int], FloatArray]:
+        """Return the steps of somebody's states, ascending, and the states (K, 4).
+
+        Args:
+            owner: With an initialState, and maybe a trajectory, of which states that can't be
+                read are left out.
+            place: Where it stands.
+            stands: Whether the initial state holds all the time.
+
+        Raises:
+            InvalidDocument: There is no initial state, or it breaks the format.
+        """
+        first = owner.find("initialState")
+        if first is None:
+            raise fault_at(place, "needs an initialState")
+        later = [] if stands else owner.findall("trajectory/*")
+        by_step = dict([self._state(first, place)])
+        by_step |= dict(
+            self.doubts.read_all("states", self._state, ((one, place) for one in later))
+        )
+        steps = sorted(by_step)
+        states = np.array([by_step[step] for step in steps])
+        states[:, 3] = 0.0 if stands else states[:, 3]
+        slow = np.isnan(states[:, 3])
+        motion = "A {} that is not given is that of the motion, 0 without one".format
+        self.doubts.assume(motion("speed"), slow.sum())
+        states[slow, 3] = speeds(np.array(steps) * self.step_s, states[:, :2])[slow]
+        self.doubts.assume(motion("heading"), np.isnan(states[:, 2]).sum())
+        _fill_headings(states)
+        return steps, states
+
+    def _state(self, element: Element, place: str) -> tuple[int, State]:
+        step = self._value(element, "time", place)
+        if np.isnan(step) and element.tag == "initialState":
+            self.doubts.assume("An initial state without a time is one of step 0")
+            step = 0.0
+        if step % 1.0 or not 0.0 <= step <= MOST_STEPS:
+            raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
+        x_m, y_m = self._center(element.find("position"), f"{place}.position")
+        names = ("orientation", "velocity", "velocityY")
+        heading_rad, speed_mps, aside_mps = (self._value(element, one, place) for one in names)
+        if np.isnan(heading_rad) and np.isfinite(aside_mps):
+            # Of a point mass these are the parts along x and y of the file's frame.
+            if speed_mps or aside_mps:
+                heading_rad = float(np.arctan2(aside_mps, speed_mps))
+            speed_mps = float(np.hypot(speed_mps, aside_mps))
+        return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
+
+    def _value(self, element: Element, name: str, place: str) -> float:
+        """A number, the middle of an interval (of a time, its start); NaN where it is absent."""
+        child, place = element.find(name), f"{place}.{name}"
+        if child is None:
+            return np.nan
+        numbers = [read_number(part.text, place) for part in (list(child) or [child])]
+        tags = [part.tag for part in child]
+        if tags == ["intervalStart", "intervalEnd"]:
+            self.doubts.assume("An interval counts as its middle, of times as its start")
+        elif tags not in ([], ["exact"]):
+            raise fault_at(place, "needs an exact value, or an interval's start and end")
+        return numbers[0] if name == "time" else sum(numbers) / len(numbers)
+
+    def _center(self, position: Element | None, place: str) -> tuple[float, float]:
+        if position is None or not len(position):
+            raise fault_at(place, "needs a point, shapes or lanelets")
+        if position[0].tag == "point":
+            x_m, y_m = read_points(position, place)[0].tolist()
+            return x_m, y_m
+        self.doubts.assume("A position that is a shape counts as its centre")
+        shapes = [self._cover(shape, place) for shape in position]
+        center = shapely.centroid(shapely.GeometryCollection(shapes))
+        return center.x, center.y
+
+    def _cover(self, shape: Element, place: str) -> shapely.Geometry:
+        """What a shape or lanelet covers in the file's frame."""
+        if shape.tag != "lanelet":
+            return cover(shape, place)
+        bounds = [
+            read_points(bound, place).tolist()
+            for side in ("leftBound", "rightBound")
+            for bound in self.root.iterfind(f"lanelet[@id='{shape.get('ref', '')[:20]}']/{side}")
+        ]
+        if len(bounds) != 2 or not all(len(points) > 1 for points in bounds):
+            raise fault_at(place, "names a lanelet that is not there, or has no inside")
+        return shapely.Polygon(bounds[0] + bounds[1][::-1])
+
+
+def _fill_headings(states: FloatArray) -> None:
+    """Give each state (K, 4) a heading: of its motion, else of the state before or after."""
+    rows = np.arange(len(states))
+    moved = states[np.minimum(rows + 1, rows[-1]), :2] - states[np.maximum(rows - 1, 0), :2]
+    moving = np.isnan(states[:, 2]) & (np.hypot(*moved.T) > MOVED_M)
+    states[moving, 2] = np.arctan2(moved[moving, 1], moved[moving, 0])
+    known = np.flatnonzero(np.isfinite(states[:, 2]))
+    last = (
+        known[np.maximum(np.searchsorted(known, rows, side="right") - 1, 0)] if len(known) else 0
+    )
+    states[:, 2] = np.nan_to_num(states[last, 2])
+
+
+def read_box(shape: Element, place: str, doubts: Doubts) -> tuple[float, float, float, float]:
+    """Return the box around an obstacle's shapes in its own frame.
+
+    Returns:
+        How far its centre lies ahead of the obstacle's place and to its left, length and width.
+
+    Raises:
+        InvalidDocument: There is no shape, or it breaks the format.
+    """
+    shapes = [*shape]
+    while any(one.tag in ("shapeGroup", "shape") for one in shapes):
+        shapes = [part for one in shapes for part in (one if "shape" in one.tag else [one])]
+    covered = shapely.GeometryCollection([cover(one, place) for one in shapes])
+    if not shapes or covered.is_empty:
+        raise fault_at(place, "needs a shape")
+    if len(shapes) > 1 or shapes[0].tag not in ("rectangle", "circle", "truckShape"):
+        doubts.assume("Of a polygon, or of several shapes, the box around them is taken")
+    x_m, y_m, to_x_m, to_y_m = covered.bounds
+    return (x_m + to_x_m) / 2.0, (y_m + to_y_m) / 2.0, to_x_m - x_m, to_y_m - y_m
+
+
+def cover(shape: Element, place: str) -> shapely.Geometry:
+    """Return what a shape covers around the origin of its frame.
+
+    Raises:
+        InvalidDocument: It is none of the format's shapes, or breaks it.
+    """
+
+    def size(name: str, at: str = "", least: float = 0.001) -> float:
+        return read_number(shape.findtext(f"{at}{name}"), f"{place}.{name}", least, 1_000.0)
+
+    def find(name: str) -> float:
+        return read_number(shape.findtext(name, "0"), f"{place}.{name}")
+
+    center = (
+        {axis: find(f"center/{axis}") for axis in "xy"} if shape.find("center") is not None else {}
+    )
+    match shape.tag:
+        case "polygon":
+            points = read_points(shape, place)
+            if len(points) < 3:
+                raise fault_at(place, "a polygon needs three points")
+            return shapely.Polygon(points)
+        case "circle":
+            return shapely.Point(*center.values() or (0.0, 0.0)).buffer(size("radius"))
+        case "rectangle" | "truckShape" | "semiTrailerTruckShape":
+            truck = {"truckShape": "", "semiTrailerTruckShape": "truckShape/"}.get(shape.tag)
+            at = "" if truck is None else f"{truck}truckDims/"
+            shift_m = find(f"{truck or ''}originXShift")
+            half_m, wide_m = size("length", at) / 2.0, size("width", at) / 2.0
+            box: shapely.Geometry = shapely.box(
+                -half_m - shift_m, -wide_m, half_m - shift_m, wide_m
+            )
+            if truck:  # straight behind its hitch
+                hitch_m = -half_m - shift_m + size("distFromRearToRearAxle", at)
+                hitch_m += size("distFromRearAxleToHitch", at, -1_000.0)
+                front_m = hitch_m + size("distFromFrontToHitch", "trailerDims/")
+                wide_m = size("width", "trailerDims/") / 2.0
+                rear_m = front_m - size("length", "trailerDims/")
+                box = shapely.union(box, shapely.box(rear_m, -wide_m, front_m, wide_m))
+            turned = rotate(box, find("orientation"), origin=(0.0, 0.0), use_radians=True)
+            return translate(turned, *center.values())
+    raise fault_at(place, f"{shape.tag[:40]!r} is no shape of the format")
