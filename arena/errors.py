@@ -58,6 +58,22 @@ class DatabaseBusy(ArenaError):
         )
 
 
+class StillUnderWay(ArenaError):
+    """The same request came before and is not answered yet; nothing was done for this one."""
+
+    retry_after_s = 2
+
+    def __init__(self) -> None:
+        super().__init__("The same request came before and is not answered yet.")
+
+
+class KeyReused(ArenaError):
+    """The key of a request was used for another one; nothing was done."""
+
+    def __init__(self) -> None:
+        super().__init__("This Idempotency-Key came with another request before: send a new one.")
+
+
 class InvalidVote(ArenaError):
     """Parts of a vote or report do not go together.
 

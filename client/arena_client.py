@@ -23,9 +23,11 @@ from typing import Any
 from urllib.parse import urlencode
 
 PREFIX = "/api/v1/"
-BUSY = (429, 503)
-KEYED = (PREFIX + "votes", PREFIX + "reports")
-"""Idempotent requests: their body has a key."""
+BUSY = (409, 429, 503)
+"""Statuses that pass where `Retry-After` comes with them; of 409 a request that is under way."""
+
+KEY = "Idempotency-Key"
+"""By it the server knows a request that was repeated, and carries it out once."""
 
 AGAIN_S = 1.0
 
@@ -81,7 +83,7 @@ class Arena:
 
     def post(self, path: str, **body: object) -> Any:
         """Send JSON and return the answer."""
-        headers = {"Content-Type": "application/json"}
+        headers = {"Content-Type": "application/json", KEY: str(uuid.uuid4())}
         data = json.dumps(body).encode()
         return json.loads(self._send("POST", self._address(path, {}), data, headers))
 
@@ -95,7 +97,7 @@ class Arena:
             for file in [given] if isinstance(given, str | Path) else given:
                 parts.append(_part(mark, name, Path(file).read_bytes(), file))
         data = b"".join([*parts, f"--{mark}--\r\n".encode()])
-        headers = {"Content-Type": f"multipart/form-data; boundary={mark}"}
+        headers = {"Content-Type": f"multipart/form-data; boundary={mark}", KEY: mark}
         return json.loads(self._send("POST", self._address(path, {}), data, headers))
 
     def download(self, path: str, **query: object) -> bytes:
@@ -159,7 +161,6 @@ class Arena:
         sent = dict(headers or {})
         if self.token:
             sent["Authorization"] = f"Bearer {self.token}"
-        is_repeatable = method == "GET" or address.endswith(KEYED)
         ends_at = time.monotonic() + self.patience_s
         while True:
             request = urllib.request.Request(address, data, sent, method=method)
@@ -173,7 +174,7 @@ class Arena:
                     raise ApiError(error.code, _error_in(error)) from None
             except (OSError, http.client.HTTPException):  # no answer, or not all of it
                 wait_s = AGAIN_S
-                if not is_repeatable or time.monotonic() + wait_s > ends_at:
+                if time.monotonic() + wait_s > ends_at:
                     raise
             time.sleep(wait_s)
 

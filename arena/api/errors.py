@@ -30,6 +30,8 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (errors.InvalidVote, 422, "invalid"),
     (errors.TooFast, 429, "too_fast"),
     (errors.DatabaseBusy, 503, "busy"),
+    (errors.StillUnderWay, 409, "under_way"),
+    (errors.KeyReused, 422, "key_reused"),
     (Conflict, 409, "conflict"),
     (AugmentError, 400, "refused"),
     (Http404, 404, "not_found"),

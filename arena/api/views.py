@@ -1,6 +1,7 @@
 """The base of every resource: roles, parsing, errors, caching, and work left to a worker."""
 
 import inspect
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial, wraps
 from typing import Any, TypeVar, cast
@@ -20,6 +21,7 @@ from rest_framework import serializers
 from rest_framework.exceptions import ValidationError
 from rest_framework.parsers import BaseParser
 from rest_framework.permissions import SAFE_METHODS
+from rest_framework.renderers import JSONRenderer
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
@@ -27,6 +29,7 @@ from rest_framework.views import APIView
 from arena.api.access import RoleAllowed
 from arena.api.fields import SoundJSONParser, StrictSerializer
 from arena.exports.formats import Export
+from arena.site.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)
@@ -162,6 +165,11 @@ def _send(warnings: list[str], send: Callable[[int], object], pk: int) -> None:
 
 
 JSON = "application/json"
+KEY = OpenApiParameter(
+    "Idempotency-Key",
+    location=OpenApiParameter.HEADER,
+    description="Sent again with it within a day, the same body has the same answer.",
+)
 ERRORS = {
     401: "Not signed in, or the token is not valid.",
     403: "Not for this role, or the CSRF token is missing.",
@@ -252,6 +260,9 @@ def operation(
     def decorate(method: Callable[..., Any]) -> Callable[..., HttpResponseBase]:
         @wraps(method)
         def call(view: Any, request: Request, **path: Any) -> HttpResponseBase:
+            return _answer_once(request, partial(act, view, request, **path))
+
+        def act(view: Any, request: Request, **path: Any) -> HttpResponseBase:
             if takes is not None:
                 path["given"] = validate(takes, request.data)
             elif query is not None:
@@ -266,12 +277,30 @@ def operation(
             **_texts(method),
             request=takes,
             responses={status: answers},
-            parameters=[] if query is None else [query],
+            parameters=[KEY] if query is None else [query],
             operation_id=name,
         )(call)
         return described
 
     return decorate
+
+
+def _answer_once(request: Request, act: Callable[[], HttpResponseBase]) -> HttpResponseBase:
+    """Answer a POST with a key once, and then the same."""
+    key = request.headers.get(KEY.name, "")
+    if not key or request.method in SAFE_METHODS:
+        return act()
+
+    def pack(answer: HttpResponseBase) -> tuple[int, bytes] | None:
+        if not isinstance(answer, Response) or answer.status_code >= 300:
+            return None
+        return answer.status_code, JSONRenderer().render(answer.data)
+
+    body = digest_body([request.path, digest_body(request.data)])
+    answer = answer_once(f"api {request.user.pk} {key}", body, act, pack)
+    if isinstance(answer, StoredAnswer):
+        return Response(json.loads(answer.content), status=answer.status)
+    return answer
 
 
 def _texts(method: Callable[..., Any]) -> dict[str, Any]:

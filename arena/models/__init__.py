@@ -2,7 +2,7 @@
 
 from arena.models.boards import Board, BoardTable
 from arena.models.files import BenchmarkFile, ScenarioFile, StudyFile
-from arena.models.people import ApiToken, Person, fresh_token
+from arena.models.people import ApiToken, Person, Receipt, fresh_token
 from arena.models.ratings import (
     EarlyLook,
     ImportedVote,

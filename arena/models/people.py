@@ -107,3 +107,13 @@ class ApiToken(Coded):
         if self.revoked_at is not None:
             return self.State.REVOKED
         return self.State.EXPIRED if self.expires_at <= now else self.State.ALIVE
+
+
+class Receipt(models.Model):
+    """What a POST was answered that came with a key; kept a day, so that it counts once."""
+
+    key_hash = models.CharField(max_length=64, unique=True)
+    body_hash = models.CharField(max_length=64)
+    received_at = models.DateTimeField(db_index=True)
+    status = models.PositiveSmallIntegerField(null=True, help_text="null while it is under way")
+    answer = models.BinaryField(default=b"", help_text="sealed with the key")

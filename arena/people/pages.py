@@ -39,6 +39,7 @@ from arena.people.queries import (
 from arena.site.access import (
     ADMIN,
     BACKEND,
+    CREATED,
     ENTRANT,
     EXPERT,
     FORM_METHODS,
@@ -261,7 +262,8 @@ def find_account(code: uuid.UUID) -> User:
 def _link_page(request: HttpRequest, user: User) -> HttpResponse:
     token = services.make_welcome_token(user, actor=user_of(request))
     address = request.build_absolute_uri(reverse("welcome", args=[token]))
-    return render(request, "people/link.html", {"made": user, "address": address})
+    context = {"made": user, "address": address}
+    return render(request, "people/link.html", context, status=CREATED)
 
 
 # --- One's own tokens --------------------------------------------------------------------------
@@ -290,7 +292,8 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
         "is_staff": roles and roles[0] in STAFF,
         "is_admin": ADMIN in roles,
     }
-    return render(request, "api/tokens.html", context, status=422 if form.errors else 200)
+    status = 422 if form.errors else CREATED if fresh else 200
+    return render(request, "api/tokens.html", context, status=status)
 
 
 @act_for(ADMIN, RESEARCHER, EXPERT, ENTRANT, back="api-tokens")

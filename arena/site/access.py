@@ -1,18 +1,22 @@
 """Who may open which page, and what becomes of an act that a service refuses."""
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import Concatenate, ParamSpec, cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
-from django.shortcuts import redirect
+from django.http.response import HttpResponseRedirectBase
+from django.middleware.csrf import CSRF_TOKEN_LENGTH
+from django.shortcuts import redirect, render
 from django.urls import NoReverseMatch
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
+from arena.errors import StillUnderWay
 from arena.people.queries import role_of
+from arena.site.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import AugmentError
 
 P = ParamSpec("P")
@@ -28,12 +32,19 @@ BENCHMARK_READERS = (*STAFF, ENTRANT)
 
 BACKEND = "arena.people.queries.AccountBackend"
 FORM_METHODS = ["GET", "HEAD", "POST"]
+CSRF_FIELD = "csrfmiddlewaretoken"
+CREATED = 201
+"""The status of a page that shows this once what a form made, such as a link."""
+
 GONE = 410
 """The status of a link that is over."""
 
 
 def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
-    """Refuse other roles with 403; Django's middleware stops who is not signed in."""
+    """Refuse other roles with 403, and carry out once what a form sends.
+
+    Django's middleware stops who is not signed in.
+    """
 
     def wrap(view: View[P]) -> View[P]:
         @wraps(view)
@@ -42,7 +53,7 @@ def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
         ) -> HttpResponseBase:
             if role_of(request.user) not in roles:
                 raise PermissionDenied
-            return view(request, *args, **kwargs)
+            return _answer_once(request, partial(view, request, *args, **kwargs))
 
         return guarded
 
@@ -83,6 +94,43 @@ def act_for(
         return allow_only(*roles)(require_POST(act))
 
     return wrap
+
+
+def _answer_once(request: HttpRequest, act: Callable[[], HttpResponseBase]) -> HttpResponseBase:
+    """Answer a form as it was shown and filled in once; sent again, it shows what it made.
+
+    Every page that is shown has a CSRF token of its own, which says which form it is.
+    """
+    token = request.POST.get(CSRF_FIELD, "")
+    if request.method != "POST" or len(token) != CSRF_TOKEN_LENGTH:
+        return act()
+    sent = [(name, values) for name, values in request.POST.lists() if name != CSRF_FIELD]
+    body = digest_body(sent) + digest_body(request.FILES)
+    context: dict[str, object] = {"is_whole": not request.FILES, "sent": sent}
+    try:
+        key = f"form {request.user.pk} {request.get_full_path()} {token} {body}"
+        answer = answer_once(key, digest_body(key), act, _pack)
+    except StillUnderWay:
+        return render(request, "sent.html", context, status=409)
+    if not isinstance(answer, StoredAnswer):
+        return answer
+    if answer.status == CREATED:
+        return HttpResponse(answer.content, status=CREATED)
+    made = answer.content.decode()
+    return (
+        render(request, "sent.html", context | {"made": made})
+        if answer.is_late
+        else redirect(made)
+    )
+
+
+def _pack(answer: HttpResponseBase) -> tuple[int, bytes] | None:
+    """Return where a form led to, or the page that shows what it made this once."""
+    if isinstance(answer, HttpResponseRedirectBase):
+        return answer.status_code, answer.url.encode()
+    if isinstance(answer, HttpResponse) and answer.status_code == CREATED:
+        return CREATED, answer.content
+    return None
 
 
 def _lead_to(page: str, code: object) -> HttpResponse:

@@ -1,4 +1,4 @@
-// A form is sent once: pressed again while the answer is on its way, it would launch a second job.
+// A form is sent once. The server counts it once anyway; a second press would lose the first answer's message.
 const AGAIN_MS = 10_000;
 let pressed = new WeakSet();
 

@@ -22,7 +22,7 @@ from arena.exports.formats import attach
 from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, BACKEND, CREATED, GONE, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
 from arena.studies.forms import AuthorForm
@@ -157,7 +157,8 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None
         fresh = links.invite(study=study, expert=expert, actor=user_of(request))
         address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
         made.append({"invitation": fresh.invitation, "address": address})
-    return render(request, "studies/links.html", {"study": study, "links": made})
+    context = {"study": study, "links": made}
+    return render(request, "studies/links.html", context, status=CREATED)
 
 
 @act_for(ADMIN, back="study")

@@ -1,0 +1,262 @@
+"""What is sent three times at once, on any page and by any operation, is made once."""
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.apps import apps
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.db import connection
+from django.test import Client
+from django.urls import reverse
+from django.utils import timezone
+
+from arena.api.urls import urlpatterns as OPERATIONS
+from arena.models import ApiToken, Receipt
+from arena.site import receipts
+from arena.site.urls import urlpatterns as PAGES
+from arena.studies.services.opening import close_study
+from augment.models import Augmentation, EndpointModel, GenerationJob, Scenario
+from augment.services.running import jobs
+from augment.services.running.jobs import JobRequest
+from tests import study_rows
+from tests.api.asking import error_of
+from tests.api.test_making import CAR, STREET
+from tests.api.tokens import secret_of
+from tests.jobs.models import Model, add_llama, ran
+from tests.jobs.rows import add_scenario, only_row
+from tests.web.addresses import address
+from tests.web.cast import World, people, signed_in, world
+
+pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow]
+
+SWEPT = {"number": "add[0].x_m", "low": 19, "high": 21, "count": 2, "planner": "idm"}
+HERE = "http://127.0.0.1:1/v1"
+UNTOLD = ("receipt", "event")
+"""Rows that every act may add to."""
+
+Body = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cast:
+    """A study that is closed, an answer that can be changed further, a scenario with a range."""
+
+    here: World
+    answer: Augmentation
+    ranged: Scenario
+
+    def __post_init__(self) -> None:
+        close_study(study=self.here.study)
+
+    def url(self, name: str) -> str:
+        if name.endswith(("follow-up", "follow-ups")):
+            return reverse(name, args=[self.answer.code])
+        if "family" in name:
+            return reverse(name, args=[self.ranged.code])
+        return address(name, self.here)
+
+    def job(self) -> Body:
+        return {"name": "Twice", "contestants": ["llama"], "scenarios": ["far"]}
+
+    def page_forms(self) -> dict[str, tuple[dict[str, int], Body]]:
+        """By page: how many rows its form makes, and what is sent."""
+        judge = str(EndpointModel.objects.get(model="llama3.1").code)
+        return {
+            "api-tokens": ({"apitoken": 1}, {"name": "Mine", "role": "admin", "days": "7"}),
+            "boards": ({"board": 1}, {"name": "Town", "study": str(self.here.study.code)}),
+            "endpoint-new": (
+                {"endpoint": 1},
+                {"label": "x", "base_url": HERE, "max_concurrency": 4},
+            ),
+            "family-draw": ({"scenario": 1}, {"count": "1", "seed": "3"}),
+            "first-step": ({"person": 5}, {}),
+            "follow-up": ({"generationjob": 1}, {"instruction": "Further.", "cap_calls": "2"}),
+            "invite": ({"invitation": 2}, {}),
+            "job-new": ({"generationjob": 1}, self.job() | {"cap_calls": "5"}),
+            "judge-start": ({"judgerun": 1}, {"judge": judge, "sure": "1"}),
+            "people": ({"user": 1}, {"username": "ada", "role": "expert"}),
+            "scene-send": ({"sceneupload": 1}, {"file": STREET, "format": ""}),
+            "study-again": ({"studydraft": 1}, {}),
+            "study-new": ({"studydraft": 1}, {"name": "Round 3", "keep": "1"}),
+            "study-rate": ({"snapshot": 1}, {}),
+            "sweep-start": ({"sweep": 1}, SWEPT | {"offsets": "paper"}),
+        }
+
+    def api_bodies(self) -> dict[str, tuple[dict[str, int], Body]]:
+        """By operation: how many rows it makes, and what is sent."""
+        model = {"slug": "new", "variant": "otm", "endpoint": "local", "model": "llama3.1"}
+        edit = {"scene": "street-1-scene", "instruction": "A car.", "reference": CAR}
+        return {
+            "api-contestants": ({"contestant": 1}, model),
+            "api-endpoint-models": ({"endpointmodel": 1, "probe": 1}, {"model": "new"}),
+            "api-endpoints": ({"endpoint": 1}, {"label": "far", "base_url": HERE}),
+            "api-family": ({"scenario": 1}, {"count": 1, "seed": 5}),
+            "api-follow-ups": ({"generationjob": 1}, {"instruction": "Nearer.", "cap_calls": 2}),
+            "api-jobs": ({"generationjob": 1}, self.job()),
+            "api-people": ({"user": 1}, {"username": "bob", "role": "expert"}),
+            "api-probe": ({"probe": 1}, {}),
+            "api-scenarios": ({"scenario": 1}, edit | {"type": "construction_zone"}),
+            "api-snapshots": ({"snapshot": 1}, {"rounds": 100}),
+            "api-sweeps": ({"sweep": 1}, SWEPT),
+            "api-uploads": ({"sceneupload": 1}, {"file": STREET}),
+        }
+
+
+@pytest.fixture
+def cast() -> Cast:
+    here = world()
+    for matchup in here.study.matchups.all():
+        study_rows.vote(matchup, "left")
+    add_llama(price="2")
+    EndpointModel.objects.update(vision=True)
+    ranged = add_scenario("far")
+    assert ranged.intent is not None
+    ranged.intent["requests"][0]["spot"]["distance"] = {"low_m": 20.0, "high_m": 40.0}
+    ranged.save()
+    asked = JobRequest(name="Far", contestants=["llama"], scenarios=["far"])
+    answer = ran(only_row(jobs.launch(asked)), Model())
+    return Cast(here=here, answer=answer, ranged=ranged)
+
+
+@pytest.fixture
+def admin() -> Client:
+    return signed_in(people()["admin"])
+
+
+def as_files(body: Body) -> Body:
+    """The body with its bytes as files, which are read to their end when they are sent."""
+    return {
+        name: SimpleUploadedFile("street.json", value) if isinstance(value, bytes) else value
+        for name, value in body.items()
+    }
+
+
+def count_rows() -> Counter[str]:
+    models = [apps.get_model("auth", "User"), *apps.get_app_config("arena").get_models()]
+    models += apps.get_app_config("augment").get_models()
+    numbers = {str(model._meta.model_name): model._default_manager.count() for model in models}
+    return Counter({name: numbers[name] for name in numbers if name not in UNTOLD})
+
+
+def send_thrice(send: Callable[[], Any]) -> tuple[list[Any], Counter[str]]:
+    """Send at once, by three connections; returns the answers, and how many rows are new."""
+
+    def send_apart(_: int) -> Any:
+        try:
+            return send()
+        finally:
+            connection.close()
+
+    before = count_rows()
+    with ThreadPoolExecutor(3) as pool:
+        answers = list(pool.map(send_apart, range(3)))
+    return answers, count_rows() - before
+
+
+def check_growth(name: str, made: Counter[str], expected: dict[str, int], answers: Any) -> None:
+    told = (
+        name,
+        made,
+        answers[0].status_code,
+        re.findall(r'class="error"[^>]*>([^<]*)', answers[0].content.decode())
+        or answers[0].content[-300:],
+    )
+    assert {kind: made[kind] for kind in expected} == expected, told
+    assert expected or max(made.values(), default=0) <= 1, told
+
+
+def test_every_form_counts_once(cast: Cast, admin: Client) -> None:
+    forms = cast.page_forms()
+    admin.raise_request_exception = False
+    for number, pattern in enumerate(PAGES):
+        name, url = pattern.name or "", cast.url(pattern.name or "")
+        expected, body = forms.pop(name, ({}, {}))
+
+        def send(url: str = url, body: Body = body, token: str = f"{number:064d}") -> Any:
+            client = Client(raise_request_exception=False)
+            client.cookies = admin.cookies
+            return client.post(url, as_files(body) | {"csrfmiddlewaretoken": token})
+
+        if name not in ("logout", "edit-check"):  # which sends JSON and makes nothing
+            answers, made = send_thrice(send)
+            check_growth(name, made, expected, answers)
+    assert not forms
+
+
+def test_every_operation_counts_once(cast: Cast) -> None:
+    bodies = cast.api_bodies()
+    headers = {"Authorization": f"Bearer {secret_of(people()['admin'])}"}
+    for pattern in OPERATIONS:
+        if not hasattr(getattr(pattern.callback, "view_class", None), "post"):
+            continue
+        name, url = pattern.name or "", cast.url(pattern.name or "")
+        expected, body = bodies.pop(name, ({}, {}))
+        is_form = any(isinstance(value, bytes) for value in body.values())
+
+        def send(
+            url: str = url, body: Body = body, key: str = name, is_form: bool = is_form
+        ) -> Any:
+            client = Client(headers=headers | {"Idempotency-Key": key})
+            if is_form:
+                return client.post(url, as_files(body))
+            return client.post(url, body, content_type="application/json")
+
+        answers, made = send_thrice(send)
+        check_growth(name, made, expected, answers)
+        assert len({answer.content for answer in answers}) == 1, name
+        assert not expected or {answer.status_code for answer in answers} <= {201, 202}, name
+    assert not bodies
+
+
+def test_a_form_sent_again_shows_what_it_made_and_can_be_sent_once_more(
+    cast: Cast, admin: Client
+) -> None:
+    page = admin.get(reverse("job-new")).content.decode()
+    token = re.search(r'name="csrfmiddlewaretoken" value="(\w+)"', page)
+    form = cast.job() | {"csrfmiddlewaretoken": token and token[1]}
+    first = admin.post(reverse("job-new"), form)
+    shown = admin.post(reverse("job-new"), form).content.decode()
+    assert "This was sent already" in shown
+    assert f'href="{first["Location"]}"' in shown
+    hidden = re.findall(r'type="hidden" name="(\w+)" value="([^"]*)"', shown)
+    assert admin.post(reverse("job-new"), dict(hidden)).status_code == 302
+    assert GenerationJob.objects.filter(name="Twice").count() == 2
+    changed = form | {"name": "Another"}
+    assert admin.post(reverse("job-new"), changed).status_code == 302, "it is another form"
+
+
+def test_a_key_is_kept_a_day_and_its_answer_sealed(cast: Cast) -> None:
+    headers = {"Authorization": f"Bearer {secret_of(people()['admin'])}", "Idempotency-Key": "k"}
+    client, person = Client(headers=headers), {"username": "bob", "role": "expert"}
+
+    def send(path: str, body: Body) -> Any:
+        return client.post(f"/api/v1/{path}", body, content_type="application/json")
+
+    made = send("people", person)
+    receipt = Receipt.objects.get()
+    assert made.json()["link"].encode()[-20:] not in bytes(receipt.answer)
+    assert send("people", person).content == made.content
+    error_of(send("people", person | {"role": "admin"}), 422, "key_reused")
+    error_of(send("jobs", cast.job()), 422, "key_reused")
+    Receipt.objects.update(received_at=timezone.now() - timedelta(hours=25))
+    assert send("people", person).status_code != 201, "the name is taken"
+    assert not Receipt.objects.exists(), "what made nothing may be sent again"
+
+
+def test_a_request_that_is_still_under_way_is_not_carried_out_again(
+    admin: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(receipts, "WAIT_S", 0.0)
+    form = {"name": "Mine", "role": "admin", "days": "7", "csrfmiddlewaretoken": 64 * "a"}
+    admin.post(reverse("api-tokens"), form)
+    Receipt.objects.update(status=None)
+    waiting = admin.post(reverse("api-tokens"), form)
+    assert (waiting.status_code, ApiToken.objects.count()) == (409, 1)
+    Receipt.objects.update(received_at=timezone.now() - timedelta(hours=1))
+    assert admin.post(reverse("api-tokens"), form).status_code == 201, "its server died"
