@@ -159,6 +159,7 @@ def enqueue(kind: WorkKind[Any], pks: Iterable[int]) -> int:
                 work.apply_async(
                     (kind.name, pk),
                     queue=kind.queue,
+                    priority=kind.priority,
                     shadow=f"work.{kind.name}",  # in logs
                     connection=broker,
                     retry=False,

@@ -26,6 +26,7 @@ from augment.models import (
     Endpoint,
     GenerationJob,
     Scenario,
+    Simulation,
 )
 from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.progress import count_rows
@@ -100,11 +101,31 @@ def generate(
     return job
 
 
-def start_drives() -> None:
-    """Have a few scenarios driven by the workers, before the change and with the reference."""
+def start_drives() -> list[int]:
+    """Have a few scenarios driven by the workers, before the change and with the reference.
+
+    Returns:
+        The keys of the drives.
+    """
     rows = Scenario.objects.filter(slug__in=demo.scenarios_of(DRIVEN_PER_TYPE))
     waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
+    return waiting
+
+
+def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
+    """Wait until they are over.
+
+    Raises:
+        DemoFailed: They take longer than STUCK_S.
+    """
+    give_up_at = time.monotonic() + STUCK_S
+    under_way = Simulation.objects.filter(pk__in=drives, state__in=Simulation.UNDER_WAY)
+    while left := under_way.count():
+        look()
+        if time.monotonic() > give_up_at:
+            raise DemoFailed(f"{left} of {len(drives)} drives are not over.")
+        time.sleep(0.2)
 
 
 def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:

@@ -158,6 +158,7 @@ class WorkKind(ABC, Generic[Row]):
     Attributes:
         model: The rows.
         queue: Where its messages wait.
+        priority: 0 for what somebody waits for, which is taken first; up to 9.
         lost_limit: So many workers in a row may be lost over one row; then it fails, so that no
             row kills one worker after the other.
         related: What is read together with a row.
@@ -165,6 +166,7 @@ class WorkKind(ABC, Generic[Row]):
 
     model: type[Row]
     queue = "drawing"
+    priority = 0
     lost_limit = 2
     related: tuple[str, ...] = ()
 

@@ -17,7 +17,11 @@ from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
+from augment.services.endpoints.probing import PROBES
+from augment.services.judging.simulations import DRIVES
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.workers import Presence, do_round, workforce
+from augment.services.scenarios.submissions import SUBMISSIONS
 from tests.jobs.rows import launch, only_row
 from tests.processes import Process, wait_until
 
@@ -127,3 +131,17 @@ def test_a_redis_that_refuses_is_not_called_missing(refusing: str, says: str) ->
     assert only_row(job).sent_at is None
     assert not do_round(tasks.recover, Presence("here 1"))
     assert says in workforce().fault
+
+
+@pytest.mark.redis
+@pytest.mark.parametrize("refusing", [("PING",)], indirect=True)
+def test_what_somebody_waits_for_is_taken_before_drives_and_jobs(refusing: str) -> None:
+    for kind in (DRIVES, SUBMISSIONS, AUGMENTATIONS, PROBES):
+        tasks.enqueue(kind, [1])
+    with current_app.connection_for_write() as broker:
+        for queue, *taken in (
+            ("drawing", "submission", "simulation"),
+            ("models", "probe", "augmentation"),
+        ):
+            messages = broker.SimpleQueue(queue)
+            assert [messages.get(block=False).payload[0][0] for _ in taken] == taken

@@ -4,10 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
+from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import SharedRating, Snapshot
+from arena.models import SharedRating, Snapshot, Study
+from arena.results.services.boards import make_board, share_board
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.vote_files import import_votes
 from augment.models import Event
@@ -47,6 +49,26 @@ def test_a_link_shows_the_table_and_its_data_to_anybody_until_it_is_taken_back(
     assert stranger.get(address).status_code == 404
     said = Event.objects.filter(verb__contains="shar").order_by("pk")
     assert [event.verb for event in said] == ["share results", "stop sharing results"]
+
+
+def test_an_expert_who_still_judges_a_contestant_is_shown_no_shared_result(
+    rated: Snapshot,
+) -> None:
+    eva, study = signed_in(User.objects.get(username="eva")), rated.study
+    board = make_board(name="City", study=study)
+    share_board(board, is_shared=True)
+    board.refresh_from_db()
+    link = SharedRating.objects.create(snapshot=rated)
+    address = reverse("shared-results", args=[link.token])
+    links = [address, f"{address}table.json", reverse("shared-board", args=[board.token])]
+    assert [eva.get(link).status_code for link in links] == [200, 200, 200]
+    again = Study.objects.create(
+        name="Round 2", seed=1, rules={}, questions=["instruction"], state="open"
+    )
+    again.contestants.add(*study.contestants.all())
+    again.experts.add(*study.experts.all())
+    assert [eva.get(link).status_code for link in links] == [403, 403, 403]
+    assert [Client().get(link).status_code for link in links] == [200, 200, 200]
 
 
 def test_an_open_study_is_not_shared() -> None:

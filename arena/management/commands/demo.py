@@ -61,8 +61,12 @@ class Command(TerminalCommand):
                 demo.generate(scenarios, self.stdout.write, look)
                 folder = settings.VAR_DIR / "demo"
                 text, files = demo.vote_and_rate(scenarios, folder)
-                demo.start_drives()
+                drives = demo.start_drives()
                 self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
+                if drives:
+                    self.stdout.write(f"{len(drives)} drives are under way.")
+                if not serve:
+                    demo.finish_drives(drives, look)
                 self._show(web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch(missing_stand_ins)

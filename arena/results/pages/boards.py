@@ -18,6 +18,7 @@ from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
 from arena.results.exports.board_files import board_folder, rows_of, write_table
 from arena.results.pages.plots import plot
+from arena.results.queries.access import refuse_open_judge
 from arena.results.services.boards import LONGEST_NAME, make_board, publish_table, share_board
 from arena.site.access import ADMIN, STAFF, act_for, form_for, keep_secret, page_for, user_of
 from arena.site.acts import refusals_in, tell_errors
@@ -157,7 +158,7 @@ def share(request: HttpRequest, code: uuid.UUID, *, is_shared: bool) -> None:
 @require_safe
 def shared_board(request: HttpRequest, token: str) -> HttpResponse:
     """The same tables without the studies behind them."""
-    board = get_object_or_404(Board, token=token)
+    board = _shared(request, token)
     return keep_secret(render(request, "boards/shared.html", _shown(request, board)))
 
 
@@ -165,10 +166,16 @@ def shared_board(request: HttpRequest, token: str) -> HttpResponse:
 @require_safe
 def shared_board_file(request: HttpRequest, token: str, number: int, form: str) -> HttpResponse:
     """A table as it was published."""
-    return keep_secret(_file(get_object_or_404(Board, token=token), number, form))
+    return keep_secret(_file(_shared(request, token), number, form))
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _shared(request: HttpRequest, token: str) -> Board:
+    board = get_object_or_404(Board, token=token)
+    refuse_open_judge(request.user, board.studies.all())
+    return board
 
 
 def _shown(request: HttpRequest, board: Board) -> dict[str, Any]:

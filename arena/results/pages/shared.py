@@ -11,6 +11,7 @@ from arena.models import Snapshot, Study
 from arena.results.exports.tables import for_experts, leaderboard_table
 from arena.results.exports.writers import FORMATS
 from arena.results.pages.tabs import describe, fill_table
+from arena.results.queries.access import refuse_open_judge
 from arena.site.access import keep_secret
 
 DATA = {form: FORMATS[form] for form in ("csv", "json")}
@@ -20,7 +21,7 @@ DATA = {form: FORMATS[form] for form in ("csv", "json")}
 @require_safe
 def shared_page(request: HttpRequest, token: str) -> HttpResponse:
     """The sentence, the table, how it came about, and links to its data."""
-    snapshot = _shared(token)
+    snapshot = _shared(request, token)
     told = describe(snapshot, is_staff=False)
     context = {"study": snapshot.study, "snapshot": snapshot, "token": token}
     context |= told | fill_table(snapshot, told["table"])
@@ -31,14 +32,15 @@ def shared_page(request: HttpRequest, token: str) -> HttpResponse:
 @require_safe
 def shared_file(request: HttpRequest, token: str, form: str) -> HttpResponse:
     """The data of the page, as CSV or JSON."""
-    snapshot = _shared(token)
+    snapshot = _shared(request, token)
     stem = f"{slugify(snapshot.study.name) or 'study'}-leaderboard"
     table = for_experts(leaderboard_table(snapshot))
     return keep_secret(download(DATA, form, stem, table))
 
 
-def _shared(token: str) -> Snapshot:
+def _shared(request: HttpRequest, token: str) -> Snapshot:
     """The rating of a link that holds; of a study that is closed, as it was when it was shared."""
+    refuse_open_judge(request.user, Study.objects.filter(snapshots__shared__token=token))
     rows = Snapshot.objects.select_related("study__vote_file")
     closed = rows.filter(study__state=Study.State.CLOSED, state=Snapshot.State.READY)
     return get_object_or_404(closed, shared__token=token)

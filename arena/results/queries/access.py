@@ -3,7 +3,8 @@
 from enum import StrEnum
 from uuid import UUID
 
-from django.contrib.auth.models import User
+from django.contrib.auth.models import AnonymousUser, User
+from django.core.exceptions import PermissionDenied
 from django.db.models import Case, Q, QuerySet, When
 
 from arena.errors import NoSnapshot, NotYours, StudyStillOpen
@@ -42,7 +43,8 @@ def results_access(*, user: User, study: Study, role: str | None = None) -> Resu
     """
     staff = (role or role_of(user)) in STAFF
     if study.state == Study.State.CLOSED:
-        reads = staff or (votes_in(user, study) and not _still_judges(user, study))
+        this = Study.objects.filter(pk=study.pk)
+        reads = staff or (votes_in(user, study) and not _still_judges(user, this))
         return ResultsAccess.FULL if reads else ResultsAccess.NONE
     if not staff or study.state != Study.State.OPEN:
         return ResultsAccess.NONE
@@ -121,7 +123,17 @@ def names_in_log(study: Study) -> dict[str, str]:
     return names
 
 
-def _still_judges(user: User, study: Study) -> bool:
-    """Whether an open study of this expert has a contestant of this one."""
+def refuse_open_judge(user: User | AnonymousUser, studies: QuerySet[Study]) -> None:
+    """Do nothing for whoever may be shown published results of these studies.
+
+    Raises:
+        PermissionDenied: An expert, signed in, still judges a contestant of theirs.
+    """
+    if isinstance(user, User) and role_of(user) not in STAFF and _still_judges(user, studies):
+        raise PermissionDenied
+
+
+def _still_judges(user: User, studies: QuerySet[Study]) -> bool:
+    """Whether an open study of this expert has a contestant of these."""
     is_open = user.studies.filter(state=Study.State.OPEN)
-    return is_open.filter(contestants__in=study.contestants.all()).exists()
+    return is_open.filter(contestants__in=studies.values("contestants")).exists()

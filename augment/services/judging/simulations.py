@@ -106,6 +106,7 @@ class Drives(WorkKind[Simulation]):
     """
 
     model = Simulation
+    priority = 9
     lost_limit = 5
     related = ("scenario__base_scene", "augmentation", "swept")
 

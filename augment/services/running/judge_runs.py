@@ -185,6 +185,7 @@ class Judgements(WorkKind[PairJudgement]):
 
     model = PairJudgement
     queue = "models"
+    priority = 6
     related = ("run__endpoint", "left__scenario")
 
     def __init__(self, client: AbstractContextManager[ChatClient] | None = None) -> None:

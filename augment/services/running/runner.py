@@ -80,6 +80,7 @@ class Augmentations(WorkKind[Augmentation]):
 
     model = Augmentation
     queue = "models"
+    priority = 6
     lost_limit = 5
     related = ("job", "scenario__base_scene", "contestant__endpoint", "follows")
 
