@@ -110,7 +110,7 @@ class ApiToken(Coded):
 
 
 class Receipt(models.Model):
-    """What a POST was answered that came with a key; kept a day, so that it counts once."""
+    """The answer to a POST that came with a key; kept a day, so that it counts once."""
 
     key_hash = models.CharField(max_length=64, unique=True)
     body_hash = models.CharField(max_length=64)

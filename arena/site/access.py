@@ -125,7 +125,7 @@ def _answer_once(request: HttpRequest, act: Callable[[], HttpResponseBase]) -> H
 
 
 def _pack(answer: HttpResponseBase) -> tuple[int, bytes] | None:
-    """Return where a form led to, or the page that shows what it made this once."""
+    """Return the address that a form led to, or the page that shows this once what it made."""
     if isinstance(answer, HttpResponseRedirectBase):
         return answer.status_code, answer.url.encode()
     if isinstance(answer, HttpResponse) and answer.status_code == CREATED:

@@ -36,7 +36,7 @@ class StoredAnswer:
 
     Attributes:
         status: Of HTTP.
-        content: What `pack` made of it.
+        content: As `pack` made it.
         is_late: Whether it was there before this request came.
     """
 
@@ -51,7 +51,7 @@ def answer_once(
     act: Callable[[], Answer],
     pack: Callable[[Answer], tuple[int, bytes] | None],
 ) -> Answer | StoredAnswer:
-    """Carry out a request, or return what the first one with its key was answered.
+    """Carry out a request, or return the answer that the first one with its key had.
 
     Args:
         key: Whose and which it is.
@@ -81,15 +81,15 @@ def answer_once(
             raise StillUnderWay
         is_late = False
         time.sleep(LOOK_EVERY_S)
-    kept = None
+    packed = None
     try:
         answer = act()
-        kept = pack(answer)
+        packed = pack(answer)
     finally:
-        if kept is None:
+        if packed is None:
             receipt.delete()
-    if kept is not None:
-        receipt.status, receipt.answer = kept[0], _seal(kept[1], key, receipt)
+    if packed is not None:
+        receipt.status, receipt.answer = packed[0], _seal(packed[1], key, receipt)
         receipt.save(update_fields=["status", "answer"])
     return answer
 
@@ -108,7 +108,7 @@ def _digest(text: str) -> str:
 
 
 def _describe(value: object) -> str:
-    """Return what stands for a value that JSON has not: a file by its content."""
+    """Return a text for a value that JSON has not: of a file its content's hash."""
     if not isinstance(value, UploadedFile):
         return str(value)
     content = sha256()
