@@ -77,7 +77,6 @@ class Cast:
             "family-draw": ({"scenario": 1}, {"count": "1", "seed": "3"}),
             "first-step": ({"person": 5}, {}),
             "follow-up": ({"generationjob": 1}, {"instruction": "Further.", "cap_calls": "2"}),
-            "invite": ({"invitation": 2}, {}),
             "job-new": ({"generationjob": 1}, self.job() | {"cap_calls": "5"}),
             "judge-start": ({"judgerun": 1}, {"judge": judge, "sure": "1"}),
             "people": ({"user": 1}, {"username": "ada", "role": "expert"}),

@@ -63,7 +63,7 @@ def test_an_expert_who_still_judges_a_contestant_is_shown_no_shared_result(
     links = [address, f"{address}table.json", reverse("shared-board", args=[board.token])]
     assert [eva.get(link).status_code for link in links] == [200, 200, 200]
     again = Study.objects.create(
-        name="Round 2", seed=1, rules={}, questions=["instruction"], state="open"
+        name="Round 2", seed=1, votes_per_expert=1, questions=["instruction"]
     )
     again.contestants.add(*study.contestants.all())
     again.experts.add(*study.experts.all())
