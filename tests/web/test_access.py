@@ -71,10 +71,8 @@ ACTIONS = _table(
             "scene-send upload-show scenarios-write study-write set-intent results-open "
             "benchmark-write board-publish board-share board-unshare family-draw"
         ),
-        ADMIN: (
-            "invite person-link scenario-delete scene-delete sweep-remove job-cancel study-close "
-            "study-cancel"
-        ),
+        ADMIN: ("scenario-delete scene-delete sweep-remove job-cancel study-close study-cancel"),
+        (201, 403, 403): "invite person-link",
         (302, 302, 302): "theme language",
         (422, 422, 403): "edit-check",
         (302, 404, 403): "upload-remove",
