@@ -13,11 +13,10 @@ from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import made_of
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
-from arena.results.exports.sheets import SHEET_FORMATS, contact_sheet, find_cells, sample_sheet
+from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
 from arena.results.exports.writers import CHARTS, RATING_FILES
 from arena.results.queries.access import snapshot_to_export
-from arena.results.queries.votes import is_imported
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
@@ -118,14 +117,6 @@ def _write_votes(options: Chosen, say: Say) -> ExportedFile:
     return _write_rating(options, say)
 
 
-def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
-    """Write all pictures of the study, side by side."""
-    snapshot = _snapshot(options | {"format": "pdf"})
-    if is_imported(snapshot.study):
-        raise Conflict("Votes from a file have no pictures, so there is no contact sheet.")
-    return ExportedFile(contact_sheet(snapshot), "pdf", False)
-
-
 # --- Of a job ------------------------------------------------------------------------------------
 
 
@@ -223,12 +214,6 @@ KINDS: dict[str, ExportKind] = {
         _option("--chart", "which", choices=CHARTS, required=True)
         | _format(RATING_FILES["pairs"].formats, default="svg")
         | _OF_RATING,
-    ),
-    "contact-sheet": ExportKind(
-        "study",
-        "every contestant's picture of every scenario with the votes on it, as PDF",
-        _write_contact_sheet,
-        _OF_RATING,
     ),
     "displacement": ExportKind(
         "job",

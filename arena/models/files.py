@@ -74,7 +74,7 @@ class StudyFile(WrittenFile):
 
     class Kind(models.TextChoices):
         STUDY = "study", "The whole study"
-        CONTACT_SHEET = "contact-sheet", "Contact sheet"
+        RATING = "rating", "Everything of the newest rating"
         INTERPLAN = "interplan", "Scenarios for interPlan"
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="files")
@@ -87,7 +87,8 @@ class StudyFile(WrittenFile):
             ready_is_stored("ready_study_file_is_stored"),
             models.CheckConstraint(
                 name="study_file_kind_is_known",
-                condition=Q(kind__in=["study", "contact-sheet", "interplan"]),
+                # Earlier releases wrote contact sheets; their rows stay.
+                condition=Q(kind__in=["study", "rating", "interplan", "contact-sheet"]),
             ),
         )
         indexes = (models.Index(F("study"), F("kind"), name="study_file_of_study"),)

@@ -222,18 +222,13 @@ def box_around(spot: Spot, half_width: float, half_height: float) -> Box:
     return x - half_width, y - half_height, x + half_width, y + half_height
 
 
-def shrink(png: bytes, widest: int) -> NDArray[np.uint8]:
-    """Return the colours (H, W, 3) of a picture, by a whole factor so small that it is no wider.
+def shrink_png(png: bytes, widest: int) -> bytes:
+    """Return a picture as a PNG of few colours, by a whole factor so small that it is no wider.
 
     Args:
         png: The bytes of a picture that `bev` drew, or any other PNG.
-        widest: In pixels, 1 or more; a picture that is no wider stays as it is.
+        widest: In pixels, 1 or more; a picture that is no wider keeps its size.
     """
-    return np.asarray(_smaller(png, widest))
-
-
-def shrink_png(png: bytes, widest: int) -> bytes:
-    """Return the same as a PNG of few colours; the same bytes for the same picture."""
     few = _smaller(png, widest).quantize(
         _SMALL_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
     )

@@ -1,10 +1,8 @@
-"""The order of the grid of evidence, what stands beside its pictures, and the contact sheet."""
+"""The order of the grid of evidence, and what stands beside its pictures."""
 
 import re
-from pathlib import Path
 
 import pytest
-from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
@@ -98,9 +96,3 @@ def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, reader:
     assert len(pictures_in(first)) == 2
     for address in pictures_in(first):
         assert b"".join(reader.get(address))[:4] == b"\x89PNG"
-
-
-def test_the_command_writes_the_whole_sheet(rated: Snapshot, tmp_path: Path) -> None:
-    out = tmp_path / "sheet.pdf"
-    call_command("export", "contact-sheet", rated.study.name, out=str(out))
-    assert out.read_bytes().count(b"/Subtype /Image") == 18

@@ -93,17 +93,18 @@ def test_a_making_that_fails_says_why(closed: Study) -> None:
     assert StudyFile.objects.get().state == "ready", "and the failed one is gone"
 
 
-def test_the_contact_sheet_has_every_scenario(closed: Study) -> None:
+def test_a_worker_writes_the_zip_of_the_newest_rating(closed: Study) -> None:
     admin = signed_in(people()["admin"])
-    assert write(admin, closed, "contact-sheet").state == "ready"
-    assert content_of(admin, closed, "contact-sheet").startswith(b"%PDF")
+    assert write(admin, closed, "rating").state == "ready"
+    address = reverse("results-export", args=[closed.code, "all", "zip"])
+    assert content_of(admin, closed, "rating") == admin.get(address).content
 
 
 def test_an_open_study_gives_away_no_results(closed: Study) -> None:
     Study.objects.update(state=Study.State.OPEN)
     accounts = people()
     admin, expert = signed_in(accounts["admin"]), signed_in(accounts["expert"])
-    for kind in ("study", "contact-sheet"):
+    for kind in ("study", "rating"):
         for name in ("study-write", "study-file"):
             address = reverse(name, args=[closed.code, kind])
             answer = admin.post(address) if name == "study-write" else admin.get(address)
@@ -117,17 +118,17 @@ def test_an_open_study_gives_away_no_results(closed: Study) -> None:
         assert one.get(address).status_code == 403
 
 
-def test_whoever_looked_early_may_have_the_sheet_but_not_the_whole(closed: Study) -> None:
+def test_whoever_looked_early_may_have_the_rating_but_not_the_whole(closed: Study) -> None:
     Study.objects.update(state=Study.State.OPEN)
     admin = people()["admin"]
     EarlyLook.objects.create(study=closed, user=admin)
     client = signed_in(admin)
-    assert write(client, closed, "contact-sheet").state == "ready"
+    assert write(client, closed, "rating").state == "ready"
     client.post(reverse("study-write", args=[closed.code, "study"]))
     assert not StudyFile.objects.filter(kind="study").exists()
     assert "It is written once the study is closed" in shown(client, closed)
     other = signed_in(User.objects.get(username="the-researcher"))
-    address = reverse("study-file", args=[closed.code, "contact-sheet"])
+    address = reverse("study-file", args=[closed.code, "rating"])
     assert other.get(address).status_code == 403, "each looks on their own account"
 
 
@@ -136,7 +137,7 @@ def test_what_became_impossible_meanwhile_is_not_written(closed: Study) -> None:
     admin = people()["admin"]
     EarlyLook.objects.create(study=closed, user=admin)
     client = signed_in(admin)
-    client.post(reverse("study-write", args=[closed.code, "contact-sheet"]))
+    client.post(reverse("study-write", args=[closed.code, "rating"]))
     cancel_study(study=closed)
     row = StudyFile.objects.get()
     STUDY_FILES.perform(row.pk)

@@ -1,35 +1,25 @@
-"""Sheets of pictures: samples of a job for a paper's figure, and a study's contact sheet."""
+"""Sheets of pictures: samples of a job for a paper's figure."""
 
 from __future__ import annotations
 
 import io
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
 
-from arena.models import Snapshot
-from arena.results.exports.drawing import (
-    INK,
-    NO_METADATA,
-    SIMULATED,
-    SOFT,
-    house_style,
-    write_figure,
-)
-from arena.results.exports.tables import Row, leaderboard_table, shown_name
-from arena.results.queries.scores import PictureShown, pictures_by_scenario
+from arena.results.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
+from arena.results.exports.tables import shown_name
 from augment.errors import UnknownName
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running.progress import cells_of
-from augment.services.scenarios.pictures import shrunken_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import SubFigure
 
 SHEET_FORMATS = ("pdf", "png")
 
@@ -54,9 +44,6 @@ class Tile:
     pixels: Any | None = None
     word: str = ""
     note: str = ""
-
-
-# --- Samples of a job --------------------------------------------------------------------------
 
 
 def find_cells(
@@ -131,63 +118,6 @@ def _explain(cell: Augmentation | None) -> str:
     if cell.state in Augmentation.SHOWABLE:
         return f"{cell.get_state_display()}: unchanged scene"
     return f"no picture: {cell.get_state_display().lower()}"
-
-
-# --- The contact sheet -------------------------------------------------------------------------
-
-_PAGE_IN = (11.69, 8.27)
-"""A4, lying."""
-_ACROSS, _LINES = 5, 4
-"""So many pictures stand across a page, and in so many lines."""
-_SHRUNK_PX = 600
-
-
-def contact_sheet(snapshot: Snapshot) -> bytes:
-    """Draw every contestant's picture of every scenario with the votes on it, as A4 pages."""
-    from matplotlib.backends.backend_pdf import PdfPages
-
-    content = io.BytesIO()
-    with house_style(), PdfPages(content, metadata=NO_METADATA["pdf"]) as pages:
-        scenarios = snapshot.study.scenarios.defer("reference").order_by("type", "slug")
-        for figure in _pages(snapshot, list(scenarios)):
-            pages.savefig(figure)
-    return content.getvalue()
-
-
-def _pages(snapshot: Snapshot, scenarios: Sequence[Scenario]) -> Iterator[Figure]:
-    """Yield one figure a page, with as many scenarios as fit."""
-    from matplotlib.figure import Figure
-
-    rows = leaderboard_table(snapshot).rows
-    shown = pictures_by_scenario(snapshot, [scenario.pk for scenario in scenarios])
-    at_once = max(1, _LINES // math.ceil(len(rows) / _ACROSS))
-    name = shown_name(snapshot.study.name, snapshot.includes_simulated)
-    head = f"{name}: rating {str(snapshot.code)[:8]}. Above each picture: votes won, tied, lost."
-    for start in range(0, max(len(scenarios), 1), at_once):
-        figure = Figure(figsize=_PAGE_IN, layout="constrained")
-        figure.suptitle(head, fontsize=9, fontweight="bold")
-        parts = figure.subfigures(at_once, 1, squeeze=False).flat
-        for part, scenario in zip(parts, scenarios[start : start + at_once], strict=False):
-            caption = f"{scenario.slug}: {' '.join(scenario.wording.split())}"
-            tiles = [_judged_tile(row, shown[scenario.pk].get(row.slug)) for row in rows]
-            _draw_tiles(part, _wrap(caption, 170), tiles, _ACROSS)
-        yield figure
-
-
-def _judged_tile(row: Row, picture: PictureShown | None) -> Tile:
-    name = textwrap.shorten(row.model, width=30, placeholder="…")
-    if picture is None:
-        return Tile(title=name, is_simulated=row.simulated, word="no votes")
-    score = picture.score
-    return Tile(
-        title=f"{name}: {score.wins}, {score.ties}, {score.losses}",
-        is_simulated=row.simulated,
-        pixels=shrunken_picture(picture.image, _SHRUNK_PX),
-        word="no picture",
-    )
-
-
-# --- What both share ---------------------------------------------------------------------------
 
 
 def _wrap(caption: str, width: int) -> str:

@@ -6,11 +6,11 @@ from django.core.files import File
 from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
-from arena.exports.files import zip_folder
+from arena.exports.files import zip_bytes, zip_folder
 from arena.jobs.exports.files import made_of
 from arena.models import StudyFile
-from arena.results.exports.sheets import contact_sheet
 from arena.results.exports.study_folder import write_study
+from arena.results.exports.writers import bundle_files
 from arena.results.queries.access import snapshot_to_export
 from arena.results.services.written_files import FileWork, Kind, MadeFile, why_not
 from arena.studies.services.planning import shown_augmentations
@@ -33,9 +33,9 @@ class StudyFiles(FileWork[StudyFile]):
             origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
             rows, many = shown_augmentations(study), study.shows_all_samples
             return made_of(export_rows(rows, origin, "interplan", many=many), slug)
-        if row.kind == Kind.CONTACT_SHEET:
-            content = contact_sheet(snapshot_to_export(study))
-            return MadeFile(name=f"{slug}-contact-sheet.pdf", content=ContentFile(content))
+        if row.kind == Kind.RATING:
+            content = zip_bytes(bundle_files(snapshot_to_export(study)))
+            return MadeFile(name=f"{slug}-rating.zip", content=ContentFile(content))
         write_study(study, folder / "study", say=lambda line: None)
         packed = folder / "study.zip"
         with packed.open("wb") as file:

@@ -1,13 +1,13 @@
 """What the votes of a rating say of its pictures and pairs, and which votes come first by that."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from django.db.models import Count, F, Max, QuerySet, Value
 
-from arena.models import Matchup, Snapshot, Vote
+from arena.models import Snapshot, Vote
 from arena.results.queries.search import VoteSearch, find_votes
 from arena.results.queries.votes import counted_votes
 
@@ -49,13 +49,6 @@ class Pair(NamedTuple):
         return cls(scenario, sample, min(one, other), max(one, other))
 
 
-class PictureShown(NamedTuple):
-    """A contestant's picture as a showing had it, by its name in the storage."""
-
-    image: str
-    score: VoteScore
-
-
 def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:
     """The votes of a rating by pair, as seen from the lower contestant; one query."""
     pairs: defaultdict[Pair, VoteScore] = defaultdict(VoteScore)
@@ -63,32 +56,6 @@ def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:
         pair = Pair.of(count.scenario, count.sample, count.left, count.right)
         pairs[pair] = count.add_to(pairs[pair], pair.low)
     return dict(pairs)
-
-
-def pictures_by_scenario(
-    snapshot: Snapshot, scenarios: Sequence[int]
-) -> dict[int, dict[str, PictureShown]]:
-    """The pictures on these scenarios by contestant's slug, as last shown; two queries."""
-    scores: defaultdict[tuple[int, int], VoteScore] = defaultdict(VoteScore)
-    shown: defaultdict[tuple[int, int], int] = defaultdict(int)
-    rows = counted_votes(snapshot).filter(matchup__scenario__in=scenarios)
-    for count in _count_votes(rows, snapshot):
-        for contestant in (count.left, count.right):
-            key = (count.scenario, contestant)
-            scores[key] = count.add_to(scores[key], contestant)
-            shown[key] = max(shown[key], count.matchup)
-    related = Matchup.objects.select_related("left__contestant", "right__contestant")
-    unread = ("left__modification", "right__modification")
-    matchups = related.defer(*unread).in_bulk(list(set(shown.values())))
-    pictures: dict[int, dict[str, PictureShown]] = {scenario: {} for scenario in scenarios}
-    for (scenario, contestant), pk in shown.items():
-        row = matchups[pk]
-        is_left = row.left.contestant_id == contestant
-        augmentation = row.left if is_left else row.right
-        image = (row.left_image if is_left else row.right_image) or augmentation.image
-        score = scores[scenario, contestant]
-        pictures[scenario][augmentation.contestant.slug] = PictureShown(image, score)
-    return pictures
 
 
 def sort_votes(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str]]:

@@ -29,7 +29,7 @@ Kind = StudyFile.Kind
 FOLDERS = (BenchmarkFile.FOLDER, ScenarioFile.FOLDER, StudyFile.FOLDER)
 """Where the contents lie, among the pictures; a backup leaves them out."""
 
-SHOWS_RESULTS = (Kind.STUDY, Kind.CONTACT_SHEET)
+SHOWS_RESULTS = (Kind.STUDY, Kind.RATING)
 """Kinds for those alone who may read the study's results."""
 
 
@@ -135,13 +135,13 @@ def why_not(study: Study, kind: str) -> str:
             return "It is written once the study is closed: what still changes is no whole."
         if is_cancelled:
             return "A cancelled study is not written as a whole; its votes can be exported."
-    elif is_imported(study):
-        return "Votes from a file have no pictures."
-    elif kind == Kind.CONTACT_SHEET:
+    elif kind == Kind.RATING:
         if is_cancelled:
             return "The study was cancelled: it has no results."
         if not study.snapshots.filter(state=Snapshot.State.READY).exists():
-            return "Rate the study first: the sheet has the votes of a rating."
+            return "Rate the study first: the file has the tables and charts of a rating."
+    elif is_imported(study):
+        return "Votes from a file have no pictures."
     return ""
 
 

@@ -219,7 +219,7 @@ def export_place(study: Study, user: User) -> dict[str, Any]:
     """Return what there is to take away: whether results may be read, and files with obstacles."""
     may_read = results_access(user=user, study=study) is ResultsAccess.FULL
     rows, files = study_files_of(study), []
-    for kind in [StudyFile.Kind.STUDY] if is_imported(study) else StudyFile.Kind:
+    for kind in SHOWS_RESULTS if is_imported(study) else StudyFile.Kind:
         obstacle = why_not(study, kind)
         if kind in SHOWS_RESULTS and not may_read:
             obstacle = obstacle or "It shows results, which you have not opened."

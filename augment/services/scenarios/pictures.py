@@ -12,13 +12,12 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.db import transaction
 from django.utils import timezone
-from numpy.typing import NDArray
 
 from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw, draw_empty, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
-from augment.render.canvas import shrink, shrink_png
+from augment.render.canvas import shrink_png
 from augment.render.film import film_of
 from augment.render.legend import change_keys, scene_keys
 from augment.scene import codec
@@ -129,14 +128,6 @@ def film_document(picture: str) -> dict[str, Any] | None:
     ground, window = document.get("ground"), document.get("window")
     is_film = isinstance(ground, str) and isinstance(window, str) and is_stored_name(ground)
     return document if is_film else None
-
-
-def shrunken_picture(name: str, widest: int) -> NDArray[np.uint8] | None:
-    """The colours (H, W, 3) of a stored picture, no wider than so many pixels; None without it."""
-    if not name or not default_storage.exists(name):
-        return None
-    with default_storage.open(name) as file:
-        return shrink(file.read(), widest)
 
 
 def store(png: bytes, *, folder: str = FOLDER) -> str:
