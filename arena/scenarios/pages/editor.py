@@ -168,7 +168,8 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with what the checks find in a drawing, and what it asks for; nothing is kept."""
     scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
     try:
-        sent = _document(request.body)
+        is_json = request.content_type == "application/json"  # a form is read already
+        sent = _document(request.body) if is_json else None
         if not isinstance(sent, dict):
             raise Conflict("A JSON object is needed.")
     except Conflict as error:
