@@ -1,6 +1,7 @@
 """How often 95 % intervals contain the truth, over simulated studies: `docs/rating.md`.
 
     python -m bench.coverage_study [STUDIES] [--write]
+    python -m bench.coverage_study [STUDIES] --raters [--write]   # judgements of experts
 
 Each world is simulated with the paper's nine ratings, for coverage, and with nine equals, of whom
 no pair should be told apart. 400 studies a row take about half an hour of one processor.
@@ -8,18 +9,22 @@ no pair should be told apart. 400 studies a row take about half an hour of one p
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from arena.rating import models
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
+from arena.rating.comparisons import TIE, WIN, BoolArray, Comparisons, FloatArray, count_pairs
+from arena.rating.influence import bradley_terry, without_each_expert
 from arena.rating.models import DidNotConverge, Meetings, to_elo
+from arena.rating.panel import judge_rater
 from arena.rating.ranking import FEWEST_TO_JUDGE, judge_pairs
+from arena.rating.reliability import Evidence, evidence_of_repeats, raters, repeat_consistency
 from arena.rating.rules import Unit
 from arena.rating.sandwich import pulls_of_model, spread_of
+from arena.rating.snapshot_document import PanelRater
 from bench.worlds import World, paper_ratings
 
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
@@ -128,6 +133,105 @@ def lines(studies: int) -> Iterator[str]:
         yield "| " + " | ".join(cells) + " |"
 
 
+# --- Judgements of experts -----------------------------------------------------------------------
+
+KINDS = ("honest", "coin", "always equal", "alternating", "reversed", "always left", "hasty")
+PANEL = World(ratings=paper_ratings(), scenario_sd=100.0, expert_sd=40.0)
+
+
+def rater_lines(studies: int) -> Iterator[str]:
+    """Yield how often an expert of each kind is looked at, and called reliable: before, now."""
+    yield from _head("checks", "votes", *KINDS)
+    for checks, votes in product((0.0, 0.05), (30, 100, 300)):
+        world, cells = replace(PANEL, votes_per_expert=votes), []
+        for kind in KINDS:
+            found = [
+                words for seed in range(studies) for words in _judge(world, kind, checks, seed)
+            ]
+            shares = [
+                float(np.mean([words[way] == word for words in found]))
+                for word in ("look here", "reliable")
+                for way in (0, 1)
+            ]
+            cells.append("{:.0%}, {:.0%}; {:.0%}, {:.0%}".format(*shares))
+        yield "| " + " | ".join((f"{checks:.0%}", str(votes), *cells)) + " |"
+
+
+def _judge(world: World, kind: str, checks: float, seed: int) -> Iterator[tuple[str, str]]:
+    """Yield by the earlier rule and by today's, of all who are honest, or of expert 0."""
+    rng = np.random.default_rng(seed)
+    votes, repeated, again = world.with_repeats(rng, 0.05)
+    score = votes.score.copy()
+    rows, own = np.flatnonzero(votes.expert == 0), votes.expert[repeated] == 0
+    if kind == "reversed":
+        score[rows], again[own] = 1.0 - score[rows], 1.0 - again[own]
+    elif kind != "honest":
+        answers = _careless(kind, len(rows) + own.sum(), rng)
+        score[rows] = answers[: len(rows)]
+        # Repeats have their sides swapped; the left one is the other contestant then.
+        again[own] = 1.0 - answers[len(rows) :]
+    shown = round(checks * world.votes_per_expert)
+    chance = {"reversed": 0.05, "alternating": 0.5, "always left": 0.5, "always equal": 0.0}
+    chance |= dict.fromkeys(("coin", "hasty"), 1 / 3)
+    votes = replace(votes, score=score)
+    strengths = bradley_terry(votes)
+    without = np.full((world.experts, len(world.ratings)), np.nan)
+    if strengths is not None:
+        without = without_each_expert(votes, strengths)
+    ms = np.where((votes.expert == 0) & (kind == "hasty"), 600.0, 4000.0)
+    repeats = repeat_consistency(score[repeated], again, votes.expert[repeated])
+    lines = raters(votes, ms=ms, without=without)
+    steadiness = evidence_of_repeats(repeats, {line.expert: line.ties for line in lines})
+    for line in lines if kind == "honest" else lines[:1]:
+        passed = int(rng.binomial(shown, chance.get(kind, 0.95)))
+        rater = PanelRater(
+            **{one.name: getattr(line, one.name) for one in fields(line)}
+            | {"evidence": line.evidence + steadiness.get(line.expert, Evidence())},
+            judge="",
+            name="",
+            moves=None,
+            repeats=repeats.by_expert.get(line.expert, (0, 0)),
+            checks=(shown, passed),
+        )
+        yield _judge_by_shares(rater), judge_rater(rater).reliability.value
+
+
+def _careless(kind: str, number: int, rng: np.random.Generator) -> FloatArray:
+    """(N,) what the left ones score."""
+    if kind in ("coin", "hasty"):
+        return np.asarray(rng.integers(0, 3, number) / 2.0)
+    if kind == "alternating":
+        return np.asarray(np.arange(number) % 2, dtype=np.float64)
+    return np.full(number, TIE if kind == "always equal" else WIN)
+
+
+def _judge_by_shares(rater: PanelRater) -> str:
+    """The rule until November 2026: each raw share against a threshold of its own."""
+    (checks, passed), (repeats, alike) = rater.checks, rater.repeats
+    left, favourites, fast = rater.left, rater.favourites, rater.fast or 0.0
+    lower, upper = left.lower or 0.0, 1.0 if left.upper is None else left.upper
+    one_sided = 0.0 if left.value is None else max(left.value, 1.0 - left.value)
+    if (
+        (checks - passed > 1 and passed < 0.8 * checks)
+        or fast >= 0.25
+        or (repeats >= 5 and alike < 0.4 * repeats)
+        or (one_sided >= 0.7 and (lower > 0.5 or upper < 0.5))
+        or (favourites.upper is not None and favourites.upper < 0.5)
+    ):
+        return "look here"
+    if (
+        rater.votes < 20
+        or passed < checks
+        or fast >= 0.1
+        or (repeats >= 5 and alike < 0.6 * repeats)
+        or rater.ties >= 0.9
+        or (favourites.lower is not None and favourites.lower <= 0.5)
+    ):
+        return "uncertain"
+    is_good = checks or repeats >= 5 or favourites.value is not None
+    return "reliable" if is_good else "uncertain"
+
+
 def _range(values: Sequence[float], form: str) -> str:
     lowest, highest = format(min(values), form), format(max(values), form)
     return lowest if lowest == highest else f"{lowest} to {highest}"
@@ -142,15 +246,17 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("studies", type=int, nargs="?", default=400)
     parser.add_argument("--write", action="store_true", help="into docs/rating.md")
+    parser.add_argument("--raters", action="store_true", help="judgements of experts instead")
     asked = parser.parse_args()
+    name = "raters" if asked.raters else "worlds"
     printed = [f"{asked.studies} simulated studies a row.", ""]
-    for line in lines(asked.studies):
+    for line in (rater_lines if asked.raters else lines)(asked.studies):
         print(line, flush=True)
         printed.append(line)
     if asked.write:
-        before, rest = PAGE.read_text().split("<!-- worlds -->\n")
-        after = rest.partition("<!-- end of worlds -->")[2]
-        text = "\n".join(["<!-- worlds -->", *printed, "<!-- end of worlds -->"])
+        before, rest = PAGE.read_text().split(f"<!-- {name} -->\n")
+        after = rest.partition(f"<!-- end of {name} -->")[2]
+        text = "\n".join([f"<!-- {name} -->", *printed, f"<!-- end of {name} -->"])
         PAGE.write_text(before + text + after)
 
 

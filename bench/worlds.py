@@ -136,13 +136,26 @@ class World:
 
     def votes(self, rng: np.random.Generator) -> Comparisons:
         """A study: experts and scenarios are new ones each time."""
+        return self.with_repeats(rng, 0.0)[0]
+
+    def with_repeats(
+        self, rng: np.random.Generator, share: float
+    ) -> tuple[Comparisons, IntArray, FloatArray]:
+        """A study, a share of every expert's votes (R,) that is shown again, and (R,) what their
+        first contestants score then.
+        """
         panel = _Panel(self, rng)
         expert, scenario, first, second = self._planned(rng)
         if self.uneven and (self.side or self.side_sd):  # a plan shows pairs either way round
             is_turned = rng.random(len(first)) < 0.5
             first, second = np.where(is_turned, second, first), np.where(is_turned, first, second)
         score = panel.scores(expert, scenario, first, second, rng)
-        return Comparisons(
+        own = [np.flatnonzero(expert == one) for one in range(self.experts)] if share else []
+        rows = [rng.permutation(some)[: round(share * len(some))] for some in own]
+        repeated = np.concatenate(rows) if rows else np.empty(0, dtype=np.int64)
+        planned = np.stack([expert, scenario, first, second])[:, repeated]
+        again = panel.scores(planned[0], planned[1], planned[2], planned[3], rng)
+        votes = Comparisons(
             names=tuple(f"c{index}" for index in range(len(self.ratings))),
             first=first,
             second=second,
@@ -150,6 +163,7 @@ class World:
             expert=expert.copy(),
             scenario=scenario.copy(),
         )
+        return votes, repeated, again
 
     def _planned(self, rng: np.random.Generator) -> IntArray:
         """(4, V) expert, scenario, first and second contestant of every vote."""

@@ -1,34 +1,37 @@
-"""A plain judgement of an expert from what their votes say, with its reason.
+"""One judgement of an expert from all that their votes say, with its error and its reasons.
 
-It removes no vote: it says where somebody should look. The thresholds are conventions, set so that
-an expert who guesses is looked at and one who only differs from the others is not.
+It removes no vote: it says where somebody should look. Attention is 100 % for who judges as the
+other experts do and 0 % for who does not look: agreement with the others, hidden repeats and
+attention checks are pooled, each by the logarithm of its likelihood ratio. Pace, a side and failed
+checks can ask for a look by themselves.
 """
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 from arena.rating.lines import whole_percent
+from arena.rating.reliability import Evidence
 from arena.rating.snapshot_document import PanelRater
 
-FEWEST_VOTES = 20
-"""Of fewer votes nothing is said but that they are few, unless there is a reason to look."""
-FAST, TOO_FAST = 0.1, 0.25
-"""Shares of votes under a second that raise a doubt, and that ask for a look."""
-FEWEST_REPEATS = 5
-ALIKE, HARDLY_ALIKE = 0.6, 0.4
-"""Below such shares of hidden repeats answered alike; who guesses among three has a third."""
-PASSED = 0.8
-"""Two attention checks failed and a smaller share passed ask for a look; one failed is a doubt."""
+LESS, MORE = 1.5, 2.0
+"""So many errors below the others is clearly less, and above guessing clearly more."""
+LEAST_SCALE = 1.5
+"""Of less evidence, in logarithms of likelihood ratios, nothing is said."""
+PASSED = 0.95
+"""The share of attention checks that an honest expert passes."""
+ENOUGH = 5
+"""Of fewer checks or repeats a page says that they are lacking."""
+TOO_FAST = 0.25
+"""Such a share of votes under a second asks for a look."""
 ONE_SIDED = 0.7
-"""Such a share of decided votes for one side, its interval away from a half, asks for a look."""
-MOSTLY_TIES = 0.9
+"""Such a share of decided votes for one side does, three errors away from a half."""
 
 
 class Reliability(StrEnum):
     """What is to be done about an expert, the most urgent first."""
 
     LOOK = "look here"
-    UNCERTAIN = "uncertain"
+    UNKNOWN = "can't tell yet"
     RELIABLE = "reliable"
 
 
@@ -41,76 +44,65 @@ class Judgement:
 
 
 def judge_rater(rater: PanelRater) -> Judgement:
-    """Judge an expert: a reason to look counts before a doubt, and a doubt before good signs."""
-    found = {
-        Reliability.LOOK: _reasons_to_look(rater),
-        Reliability.UNCERTAIN: _doubts(rater),
-        Reliability.RELIABLE: _good_signs(rater),
+    """Judge an expert by the attention that all evidence together shows, and by side and pace.
+
+    Whose attention is closer to none, and clearly less than that of honest experts, is looked at;
+    whose is closer to theirs, and clearly more than none, is reliable.
+    """
+    (checks, passed), (repeats, alike) = rater.checks, rater.repeats
+    found = rater.evidence + _evidence_of_checks(rater)
+    reasons = _reasons_to_look(rater)
+    must_look = bool(reasons)
+    reliability = Reliability.LOOK if must_look else Reliability.UNKNOWN
+    if found.scale > 0.0:
+        attention, error = found.gain / found.scale, found.looking**0.5 / found.scale
+        reasons.append(
+            f"attention {whole_percent(attention)} % ± {whole_percent(MORE * error)}, where "
+            "guessing is 0 and the others are 100"
+        )
+        is_half = attention >= 0.5
+        if not is_half and attention + LESS * error < 1.0 and found.scale >= LEAST_SCALE:
+            reliability = Reliability.LOOK
+        elif not must_look and is_half and found.gain > MORE * found.guessing**0.5:
+            reliability = Reliability.RELIABLE
+    counts = {
+        f"passed {passed} of {checks} attention checks": checks,
+        f"answered {alike} of {repeats} hidden repeats alike": repeats,
     }
-    for reliability, reasons in found.items():
-        said = [reason for reason, holds in reasons.items() if holds]
-        if said:
-            return Judgement(reliability=reliability, reason="; ".join(said))
-    reason = "no checks, no hidden repeats, and nobody to compare with"
-    return Judgement(reliability=Reliability.UNCERTAIN, reason=reason)
+    reasons += [text for text, number in counts.items() if number]
+    if reliability is Reliability.UNKNOWN:
+        numbers = {"attention checks": checks, "hidden repeats": repeats}
+        few = [f"{what} ({n})" for what, n in numbers.items() if n < ENOUGH]
+        reasons.append(f"too few {' and '.join(few or ['votes'])} to tell")
+    return Judgement(reliability=reliability, reason="; ".join(reasons))
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _reasons_to_look(rater: PanelRater) -> dict[str, bool]:
-    (checks, passed), (repeats, alike) = rater.checks, rater.repeats
-    left, favourites = rater.left, rater.favourites
-    lower, upper = left.lower or 0.0, 1.0 if left.upper is None else left.upper
-    is_left = lower > 0.5
-    one_sided = 0.0 if left.value is None else max(left.value, 1.0 - left.value)
-    return {
-        f"failed {checks - passed} of {checks} attention checks": (
-            checks - passed > 1 and passed < PASSED * checks
-        ),
-        _of_votes(rater.fast, "of the votes took less than a second"): (
+def _evidence_of_checks(rater: PanelRater) -> Evidence:
+    """Weigh the attention checks; a single one that failed is anybody's slip."""
+    checks, passed = rater.checks
+    if checks - passed == 1:
+        checks = passed
+    guessing = min(max((1.0 - rater.ties) / 2.0, 0.1), 0.5)
+    return Evidence.of_trials(passed, checks, looking=PASSED, guessing=guessing)
+
+
+def _reasons_to_look(rater: PanelRater) -> list[str]:
+    """Return what asks for a look by itself: no time, one side, two checks failed and a fifth."""
+    checks, passed = rater.checks
+    left, decided = rater.left.value or 0.0, (1.0 - rater.ties) * rater.votes
+    share, side = max((left, "left"), (1.0 - left, "right"))
+    found = {
+        f"{whole_percent(rater.fast or 0.0)} % of the votes took less than a second": (
             (rater.fast or 0.0) >= TOO_FAST
         ),
-        f"answered {alike} of {repeats} hidden repeats alike": (
-            repeats >= FEWEST_REPEATS and alike < HARDLY_ALIKE * repeats
+        f"{whole_percent(share)} % of the decided votes for the {side}": (
+            share >= ONE_SIDED and (2.0 * share - 1.0) ** 2 * decided >= 9.0
         ),
-        _of_votes(one_sided, f"of the decided votes for the {'left' if is_left else 'right'}"): (
-            one_sided >= ONE_SIDED and (is_left or upper < 0.5)
-        ),
-        "mostly picks what the others rate lower": (
-            favourites.upper is not None and favourites.upper < 0.5
+        f"failed {checks - passed} of {checks} attention checks": (
+            checks - passed > 1 and passed < 0.8 * checks
         ),
     }
-
-
-def _doubts(rater: PanelRater) -> dict[str, bool]:
-    (checks, passed), (repeats, alike) = rater.checks, rater.repeats
-    favourites = rater.favourites
-    return {
-        f"only {rater.votes} vote{'' if rater.votes == 1 else 's'}": rater.votes < FEWEST_VOTES,
-        f"failed {checks - passed} of {checks} attention checks": passed < checks,
-        f"skipped {rater.checks_skipped} attention checks": rater.checks_skipped > 1,
-        _of_votes(rater.fast, "of the votes took less than a second"): (rater.fast or 0.0) >= FAST,
-        f"answered {alike} of {repeats} hidden repeats alike": (
-            repeats >= FEWEST_REPEATS and alike < ALIKE * repeats
-        ),
-        _of_votes(rater.ties, "of the votes call both equal"): rater.ties >= MOSTLY_TIES,
-        "picks the others’ favourite no more often than chance": (
-            favourites.lower is not None and favourites.lower <= 0.5
-        ),
-    }
-
-
-def _good_signs(rater: PanelRater) -> dict[str, bool]:
-    checks, (repeats, alike) = rater.checks[0], rater.repeats
-    return {
-        f"passed {checks} of {checks} attention checks": checks > 0,
-        f"answered {alike} of {repeats} hidden repeats alike": repeats >= FEWEST_REPEATS,
-        _of_votes(rater.favourites.value, "of the decided votes for the others’ favourite"): (
-            rater.favourites.value is not None
-        ),
-    }
-
-
-def _of_votes(share: float | None, what: str) -> str:
-    return f"{whole_percent(share or 0.0)} % {what}"
+    return [reason for reason, holds in found.items() if holds]

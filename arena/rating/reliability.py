@@ -11,10 +11,12 @@ Notation: B rounds, U units, S scenarios, V votes, E experts, C contestants; the
 three values are low won, tie, high won.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -194,8 +196,53 @@ def _estimate(
 # --- Single experts ------------------------------------------------------------------------------
 
 
+_PRIOR_VOTES = 3.0
+"""What is foreseen of a contestant on a scenario weighs as much as that on all by so many votes;
+about right where scenarios differ by 100 points."""
+_DIFFERENT = 0.45
+"""Standard deviation of how far honest experts follow the others, who are on average 1: they
+differ in their tastes, in their ties and in what they are held against."""
+_STEADIER, _PRIOR_REPEATS = 0.15, 20.0
+"""By how much more repeats are answered alike by who looks, before the others' repeats say so."""
 FAST_MS = 1000.0
 """Quicker than this nobody compares two pictures."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """How far answers speak for an expert who looks, and against one who does not.
+
+    Logarithms of likelihood ratios, and what is expected of them: pieces of evidence are added up.
+
+    Attributes:
+        gain: Above what is expected of somebody who does not look.
+        scale: The gain that is expected of somebody who judges as the others do.
+        looking, guessing: The variance of the gain if they do, and if they do not.
+    """
+
+    gain: float = 0.0
+    scale: float = 0.0
+    looking: float = 0.0
+    guessing: float = 0.0
+
+    @classmethod
+    def of_trials(cls, hits: float, trials: float, *, looking: float, guessing: float) -> Self:
+        """Of hits among trials, with the chance of a hit of who looks and who does not."""
+        weight = math.log(looking / guessing * (1.0 - guessing) / (1.0 - looking))
+        return cls(
+            gain=weight * (hits - trials * guessing),
+            scale=weight * trials * (looking - guessing),
+            looking=weight**2 * trials * looking * (1.0 - looking),
+            guessing=weight**2 * trials * guessing * (1.0 - guessing),
+        )
+
+    def __add__(self, other: "Evidence") -> "Evidence":
+        return Evidence(
+            **{
+                one.name: getattr(self, one.name) + getattr(other, one.name)
+                for one in fields(self)
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,6 +258,7 @@ class Rater:
             to this expert's, and `shared` the votes that have any.
         favourites: The share of decided votes for the contestant that the other experts' votes
             rate higher, and `decided` how many votes that is.
+        evidence: Of votes that go with the others' or against them, and of hidden repeats.
     """
 
     expert: int
@@ -223,6 +271,7 @@ class Rater:
     shared: int
     favourites: Estimate
     decided: int
+    evidence: Evidence = field(default=Evidence(), metadata={"since": 5})
 
 
 def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[Rater, ...]:
@@ -235,6 +284,7 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
             none; see `arena.rating.influence`.
     """
     agreed, others = agreement_with_others(votes)
+    evidence = evidence_of_votes(votes)
     won_left = votes.score == 1.0
     found = []
     for expert in np.unique(votes.expert).tolist():
@@ -256,9 +306,58 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
                 shared=int(shared.sum()),
                 favourites=_share_of(won_left[foreseen] == (lead[foreseen] > 0)),
                 decided=int(foreseen.sum()),
+                evidence=evidence[expert],
             )
         )
     return tuple(found)
+
+
+def evidence_of_votes(votes: Comparisons) -> dict[int, Evidence]:
+    """Hold each expert's votes against what the others' votes foresee, by expert.
+
+    Foreseen is the net score of a contestant on the same scenario by the others' votes, drawn
+    towards that on all scenarios and this towards zero. How much a vote follows it is taken from
+    the others: experts whose votes do not go together say nothing of each other.
+    """
+    lean = 2.0 * votes.score - 1.0
+    foreseen = _net_score(votes, lean, votes.first) - _net_score(votes, lean, votes.second)
+    sums = np.stack(
+        [
+            np.bincount(votes.expert, weights=one)
+            for one in (lean * foreseen, foreseen**2, lean**2, np.ones(len(lean)))
+        ]
+    )
+    product, square, size, number = sums.sum(axis=1, keepdims=True) - sums
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = np.nan_to_num(np.maximum(product, 0.0) / square)
+        weight = np.nan_to_num(slope * number / size)
+    gain, scale = weight * sums[0], weight * slope * sums[1]
+    return {
+        expert: Evidence(
+            gain=gain[expert],
+            scale=scale[expert],
+            looking=scale[expert] + (_DIFFERENT * scale[expert]) ** 2,
+            guessing=scale[expert],
+        )
+        for expert in np.unique(votes.expert).tolist()
+    }
+
+
+def _net_score(votes: Comparisons, lean: FloatArray, contestant: IntArray) -> FloatArray:
+    """(V,) what the others' votes say of a contestant of each vote, from -1 to 1."""
+    number, experts = len(lean), int(votes.expert.max(initial=0)) + 1
+    ends = np.concatenate([votes.first, votes.second, contestant])
+    values = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]).repeat(number, axis=1)
+    values[1] *= np.tile(lean, 3)
+    found = np.zeros(number)
+    for place in (ends, np.tile(votes.scenario, 3) * len(votes.names) + ends):
+        own = np.unique(place * experts + np.tile(votes.expert, 3), return_inverse=True)[1]
+        count, net = (
+            (np.bincount(place, weights=one)[place] - np.bincount(own, weights=one)[own])[-number:]
+            for one in values
+        )
+        found = (net + _PRIOR_VOTES * found) / (count + _PRIOR_VOTES)
+    return found
 
 
 def agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
@@ -339,6 +438,27 @@ def repeat_consistency(first: FloatArray, again: FloatArray, expert: IntArray) -
             for who in np.unique(expert).tolist()
         },
     )
+
+
+def evidence_of_repeats(repeats: Repeats, ties: Mapping[int, float]) -> dict[int, Evidence]:
+    """Hold repeats answered alike against those of somebody who does not look, by expert.
+
+    How much steadier is who looks is taken from the others' repeats; few of them are drawn towards
+    `_STEADIER`.
+
+    Args:
+        repeats: Of all experts; they are shown with their sides swapped.
+        ties: The share of ties of each expert, who would guess with these.
+    """
+    chance = {who: min(ties[who] ** 2 + (1.0 - ties[who]) ** 2 / 2.0, 0.9) for who in ties}
+    surplus = {who: alike - n * chance[who] for who, (n, alike) in repeats.by_expert.items()}
+    found = {}
+    for who, (number, alike) in repeats.by_expert.items():
+        others = sum(surplus.values()) - surplus[who] + _PRIOR_REPEATS * _STEADIER
+        steadier = max(others / (repeats.number - number + _PRIOR_REPEATS), 0.02)
+        looking = min(chance[who] + steadier, 0.95)
+        found[who] = Evidence.of_trials(alike, number, looking=looking, guessing=chance[who])
+    return found
 
 
 # --- Two raters ----------------------------------------------------------------------------------

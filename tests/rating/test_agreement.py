@@ -70,7 +70,7 @@ def test_shares_are_those_counted_by_hand() -> None:
     assert (experts.experts, experts.scenarios) == (3, 2)
 
 
-def test_the_sentence_names_the_best_the_ceiling_and_the_floor() -> None:
+def test_the_sentence_names_the_best_the_experts_and_the_floor() -> None:
     scores = rater_by_scores("Checks", {"a": 2.0, "b": 1.0})
     assert agreement_sentence(measure_agreement(VOTES, [scores])) == (
         "Closest to the experts: Checks, in agreement on 67 % (0 to 100) of 3 decided votes; "

@@ -8,8 +8,11 @@ from hypothesis import strategies as st
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, share, wilson
 from arena.rating.reliability import (
     DifferenceMetric,
+    Evidence,
     agreement,
     cohens_kappa,
+    evidence_of_repeats,
+    evidence_of_votes,
     krippendorff_alpha,
     raters,
     repeat_consistency,
@@ -158,6 +161,35 @@ def test_repeats_count_what_stayed_and_what_turned() -> None:
     assert found.by_expert == {0: (2, 1), 1: (2, 1)}
     with pytest.raises(ValueError, match="4 votes, 3 repeats"):
         repeat_consistency(first, again[:3], np.zeros(4, dtype=np.int64))
+
+
+def test_votes_are_held_against_what_the_others_foresee() -> None:
+    """Worked out by hand: each vote is foreseen from one vote of the other expert.
+
+    On all scenarios the other has given a one win: 1 / (1 + 3), and on this one (1 + 3 / 4) / 4;
+    b has the opposite. The slope is 1 / 0.875, and a vote weighs as much as the other's.
+    """
+    votes = judged(("e", "s1", WIN), ("f", "s1", WIN))
+    found = evidence_of_votes(votes)[0]
+    assert (found.gain, found.scale) == pytest.approx((1.0, 1.0))
+    assert (found.guessing, found.looking) == pytest.approx((1.0, 1.0 + 0.45**2))
+    against = evidence_of_votes(judged(("e", "s1", WIN), ("f", "s1", LOSS)))[0]
+    assert (against.gain, against.scale) == (0.0, 0.0), "they do not go together"
+    three = judged(*[(e, s, WIN) for e in "efg" for s in ("s1", "s2")], ("h", "s1", LOSS))
+    assert evidence_of_votes(three)[3].gain < -1.0
+
+
+def test_repeats_weigh_by_how_steady_the_others_are() -> None:
+    """10 of 10 and 2 of 10 alike, half of the votes ties: chance gives 3 / 8."""
+    first, again = np.ones(20), np.array([1.0] * 12 + [0.0] * 8)
+    repeats = repeat_consistency(first, again, np.repeat([0, 1], 10))
+    steady, other = evidence_of_repeats(repeats, {0: 0.5, 1: 0.5}).values()
+    assert steady == Evidence.of_trials(10, 10, looking=3 / 8 + 1.25 / 30, guessing=3 / 8)
+    assert other.gain < 0.0 < other.scale
+    by_hand = Evidence.of_trials(3, 4, looking=0.9, guessing=0.5)
+    weight = np.log(9.0)
+    assert (by_hand.gain, by_hand.scale) == pytest.approx((weight, 1.6 * weight))
+    assert (by_hand.looking, by_hand.guessing) == pytest.approx((0.36 * weight**2, weight**2))
 
 
 # --- Two raters --------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def decided(rating: Snapshot) -> Iterator[tuple[Augmentation, Augmentation]]:
         yield tuple(sorted(sides, key=lambda side: side.pk != row.winner_id))  # type: ignore[misc]
 
 
-def test_displacement_and_the_ceiling_are_those_counted_from_the_rows(rating: Snapshot) -> None:
+def test_displacement_and_the_experts_are_those_counted_from_the_rows(rating: Snapshot) -> None:
     lines, votes = lines_of(rating), list(decided(rating))
     slugs = [(won.contestant.slug, lost.contestant.slug) for won, lost in votes]
     known = [pair for pair in slugs if RATED[0] not in pair]
@@ -130,7 +130,7 @@ def test_the_page_says_it_first_and_every_file_has_it(rating: Snapshot) -> None:
     latex = made["latex"].decode()
     coin = lines_of(rating)["A coin"]
     assert f"({coin.decided} votes, 5 experts, {coin.scenarios} scenarios)" in latex
-    assert "Ceiling: experts with each other, " in latex
+    assert "Experts with each other: " in latex
     assert r"floor: a coin, 50 \%. (simulated)" in latex
 
 

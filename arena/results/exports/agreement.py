@@ -93,7 +93,7 @@ def _counts(line: AgreementLine) -> tuple[object, ...]:
 
 
 def _caption(lines: Sequence[AgreementLine]) -> str:
-    """What is shown, on how many votes and clusters, beside ceiling and floor."""
+    """What is shown, on how many votes and clusters, beside experts with each other and a coin."""
     experts, coin = (
         next(line for line in lines if line.role is role)
         for role in (LineRole.EXPERTS, LineRole.COIN)
@@ -101,6 +101,7 @@ def _caption(lines: Sequence[AgreementLine]) -> str:
     return (
         "Share of decided votes on which a rater agrees with the expert, with 95 % confidence "
         f"intervals clustered by expert and scenario ({coin.decided} votes, {coin.experts} "
-        f"experts, {coin.scenarios} scenarios). Ceiling: experts with each other, "
-        f"{share_text(experts.share)}; floor: a coin, {share_text(coin.share)}."
+        f"experts, {coin.scenarios} scenarios). Experts with each other: "
+        f"{share_text(experts.share)}, no ceiling, for they err as well; "
+        f"floor: a coin, {share_text(coin.share)}."
     )

@@ -48,7 +48,7 @@ def start_judge(study: Study, request: JudgeRequest, actor: User | None = None) 
 
 
 def judge_agreement(study: Study, question: str) -> Mapping[str, AgreementLine]:
-    """Return by its name how each judge agrees with all votes that count, with ceiling and floor.
+    """Return by its name how each judge agrees with all votes that count, with experts and a coin.
 
     The same is measured for a rating, whose votes are those of its time. Nothing without judges.
     """

@@ -10,7 +10,14 @@ from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_
 from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
 from arena.rating.leaderboard import Leaderboard
 from arena.rating.models import to_elo
-from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
+from arena.rating.reliability import (
+    Evidence,
+    Repeats,
+    agreement,
+    evidence_of_repeats,
+    raters,
+    repeat_consistency,
+)
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.side import side_bias
 from arena.rating.snapshot_document import BoardRemarks, PanelRater, StrengthCheck, Trust
@@ -120,7 +127,9 @@ def _panel(
         changes = rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
     panel = []
-    for line in raters(select_votes(inner, given), ms=arrays.ms[given], without=without):
+    lines = raters(select_votes(inner, given), ms=arrays.ms[given], without=without)
+    steadiness = evidence_of_repeats(repeats, {line.expert: line.ties for line in lines})
+    for line in lines:
         judge = arrays.judges[line.expert]
         checks = [vote for vote in votes.checks if vote.judge == judge]
         answered = [vote for vote in checks if vote.outcome in SCORES]
@@ -128,7 +137,8 @@ def _panel(
         aids = Counter(aid for vote in own for aid in vote.aids.split())
         panel.append(
             PanelRater(
-                **{field.name: getattr(line, field.name) for field in fields(line)},
+                **{field.name: getattr(line, field.name) for field in fields(line)}
+                | {"evidence": line.evidence + steadiness.get(line.expert, Evidence())},
                 judge=judge,
                 name=names[judge],
                 moves=changes[line.expert],
