@@ -17,6 +17,7 @@ from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
+from augment.foreign import fault_at
 from augment.formats import lctgen, sandbox
 from augment.formats.apart import ZipBounds, unpack_zip
 from augment.formats.commonroad.writer import names_in
@@ -24,7 +25,6 @@ from augment.formats.documents import parse_json, read_json, read_text_file
 from augment.formats.readers import READERS, recognise
 from augment.formats.reading import Reader
 from augment.formats.scenarionet.unpickling import read_pickle
-from augment.formats.values import fault_at
 from augment.scene.codec import MODIFICATION, SCENE_FORMAT
 from augment.scene.entities import Modification, Scene
 from augment.scene.schema import CLOSED, Codec

@@ -17,10 +17,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
+from augment.foreign import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up
 from augment.formats.documents import read_json
 from augment.formats.reading import Log, LogReader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up
 from augment.scene.entities import AgentType, AreaKind
 from augment.scene.schema import problems_of
 

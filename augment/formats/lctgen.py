@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from augment.foreign import FloatArray, fault_at, read_finite
 from augment.formats.reading import LONGEST_M
-from augment.formats.values import FloatArray, fault_at, read_finite
 from augment.geometry.frames import wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent
 

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.nuplan_map import city_around, open_tables
 from augment.formats.reading import (
     Log,
@@ -24,15 +26,6 @@ from augment.formats.reading import (
     frames_every,
     speeds,
     tracks_of,
-)
-from augment.formats.values import (
-    FURTHEST,
-    Doubts,
-    FloatArray,
-    fault_at,
-    look_up,
-    read_finite,
-    read_whole,
 )
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 
@@ -120,7 +113,7 @@ def vehicles_at(path: Path, tokens: Sequence[str]) -> dict[str, list[tuple[float
         return {
             one: [
                 (round(length_m, 3), round(width_m, 3))
-                for length_m, width_m in read_finite(
+                for length_m, width_m in foreign.read_finite(
                     base.execute(text, (bytes.fromhex(one),)).fetchall(), "lidar_box", 2
                 ).tolist()
             ]
@@ -162,7 +155,10 @@ def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
     ).fetchall()
     if not rows:
         raise fault_at("item", "the log has no frame")
-    return [(str(token).lower(), read_whole(time, "lidar_pc.timestamp")) for token, time in rows]
+    return [
+        (str(token).lower(), foreign.read_whole(time, "lidar_pc.timestamp"))
+        for token, time in rows
+    ]
 
 
 def _motion(
@@ -172,7 +168,7 @@ def _motion(
     start = base.execute(_FRAME, (bytes.fromhex(token),)).fetchone()
     if start is None:
         raise fault_at("item", f"there is no lidar_pc {token}")
-    first = read_whole(start[0], "lidar_pc.timestamp")
+    first = foreign.read_whole(start[0], "lidar_pc.timestamp")
     query = (
         "SELECT l.token, l.timestamp, e.x, e.y, e.qw, e.qx, e.qy, e.qz, e.vx, e.vy "
         "FROM lidar_pc l JOIN ego_pose e ON e.token = l.ego_pose_token "
@@ -210,7 +206,7 @@ def _numbers(
     table = pd.DataFrame([*rows], columns=columns)
     for name in numbers.split():
         values = pd.to_numeric(table[name], errors="coerce").astype(np.float64)
-        table[name] = values.where(values.abs() <= FURTHEST)
+        table[name] = values.where(values.abs() <= foreign.FURTHEST)
     whole = table[needed.split()].notna().all(axis=1)
     doubts.assume("A row with a gap or an odd number was left out", (~whole).sum())
     kept: pd.DataFrame = table[whole].reset_index(drop=True)
@@ -230,7 +226,7 @@ def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) ->
     ).fetchall()
     for kind in {str(kinds.get(row[1])) for row in rows} - {"ego", *TYPE_OF}:
         with doubts.about("objects"):
-            look_up(TYPE_OF, kind, "category.name")
+            foreign.look_up(TYPE_OF, kind, "category.name")
     rows = [row for row in rows if kinds.get(row[1]) in TYPE_OF]
     boxes = _numbers(rows, "frame token", "x_m y_m heading_rad", "vx vy length_m width_m", doubts)
     step_of = {frame: step for step, frame in enumerate(frames)}
@@ -248,9 +244,9 @@ def _lights(base: sqlite3.Connection, token: str, doubts: Doubts) -> dict[int, T
     lights = {}
     for value, status in base.execute(text, (bytes.fromhex(token),)):
         with doubts.about("lights"):
-            connector = read_whole(value, "traffic_light_status.lane_connector_id")
+            connector = foreign.read_whole(value, "traffic_light_status.lane_connector_id")
             lights[connector] = TrafficLight.UNKNOWN
-            lights[connector] = look_up(LIGHT_OF, status, "traffic_light_status.status")
+            lights[connector] = foreign.look_up(LIGHT_OF, status, "traffic_light_status.status")
     return lights
 
 

@@ -18,8 +18,8 @@ from urllib.parse import quote
 import numpy as np
 import shapely
 
+from augment.foreign import Doubts, FloatArray, fault_at, read_speed, read_whole
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import Doubts, FloatArray, fault_at, read_speed, read_whole
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 
 BICYCLE_LANE = 1

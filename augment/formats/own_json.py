@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from augment.foreign import fault_at
 from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reader, Reading
-from augment.formats.values import fault_at
 from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import (
     SCENE_FORMAT,

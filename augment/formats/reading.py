@@ -14,18 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from augment import foreign
+from augment.foreign import FASTEST_MPS, FURTHEST, Doubts, FloatArray, fault_at
 from augment.formats.road_map import RoadMap, complete_map
 from augment.formats.roads import RADIUS_M, middle_of, refuse_shape, road_around
-from augment.formats.values import (
-    FASTEST_MPS,
-    FURTHEST,
-    Doubts,
-    FloatArray,
-    fault_at,
-    look_up,
-    read_finite,
-    read_number,
-)
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import (
     EGO_LENGTH_M,
@@ -234,8 +226,8 @@ class Log:
         lane, _, along = place.rpartition(",")
         segments = {str(one.name): one for one in self.map_at(frame).segments}
         with refuse_shape(f"lane {lane}"):
-            line = middle_of(look_up(segments, lane.strip(), "lane"))
-        pose = line.pose_at(read_number(along, "lane", 0.0, line.length_m))
+            line = middle_of(foreign.look_up(segments, lane.strip(), "lane"))
+        pose = line.pose_at(foreign.read_number(along, "lane", 0.0, line.length_m))
         ego = np.full(self.ego.shape, np.nan)
         ego[frame : frame + 1] = pose.x_m, pose.y_m, pose.heading_rad, 0.0
         put = f"The ego was put on lane {lane}, {along} m along it; nobody recorded it."
@@ -372,7 +364,7 @@ def tracks_of(
     """
     if "speed_mps" not in table:
         table = table.assign(speed_mps=np.nan)
-    states = read_finite(table[[*STATE[:3]]], "places")
+    states = foreign.read_finite(table[[*STATE[:3]]], "places")
     speeds_mps = table["speed_mps"].to_numpy()
     steps = table["step"].to_numpy()
     tracks = {}

@@ -11,7 +11,7 @@ from statistics import fmean
 import numpy as np
 import shapely
 
-from augment.formats.values import Doubts, FloatArray
+from augment.foreign import Doubts, FloatArray
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 
 Name = int | str

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from augment.foreign import FURTHEST, FloatArray, fault_at
 from augment.formats.road_map import Name, RoadMap, Segment, Way, following_of, ways_through
-from augment.formats.values import FURTHEST, FloatArray, fault_at
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight, TrafficSide

@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 
 from augment.errors import ModelFault, ParameterRefused
-from augment.foreign import ForeignObject, kind_of
+from augment.foreign import Doubts, Value, kind_of, read_as, read_whole
 from augment.llm.costs import FAR_BELOW
 from augment.llm.messages import LengthName, Reply, ToolCall, shorten
 from augment.llm.vendors import says
@@ -33,6 +33,7 @@ MOST_REMARKS = 20
 MOST_TOKENS = 100_000_000
 """A count beyond is none: no model reads or writes so much at once."""
 
+_ANSWER = "answer"
 _REASONING = ("reasoning_content", "reasoning", "reasoning_details")
 _FIELDS = frozenset({"content", "refusal", "tool_calls", "function_call", *_REASONING})
 _KINDS = {"refusal": "refusal"} | dict.fromkeys(
@@ -88,34 +89,34 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
     Raises:
         ModelFault: It is no completion, or the endpoint broke it off.
     """
-    answer = ForeignObject(fields=document if isinstance(document, dict) else {})
-    notes, choices = answer.notes, answer.fields.get("choices")
+    doubts, answer = Doubts(), document if isinstance(document, dict) else {}
+    choices = answer.get("choices")
     first = choices[0] if isinstance(choices, list) and choices else None
-    choice = ForeignObject(
-        fields=first if isinstance(first, dict) else {}, path="choices.0.", notes=notes
-    )
-    message = choice.fields.get("message")
-    pieces, calls = _read_message(message if isinstance(message, dict) else {}, notes)
+    choice = first if isinstance(first, dict) else {}
+    message = choice.get("message")
+    pieces, calls = _read_message(message if isinstance(message, dict) else {}, doubts)
     texts, thoughts, refusals, unread = (
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
     )
-    reason = choice.read("finish_reason", str) or ""
-    error = read_error([part.fields.get("error") for part in (answer, choice)])
-    around = [{**answer.fields, "choices": 0, "usage": 0}, {**choice.fields, "message": 0}]
+    reason = _read(doubts, choice, "finish_reason", str, "choices.0.") or ""
+    error = read_error([answer.get("error"), choice.get("error")])
+    around = [{**answer, "choices": 0, "usage": 0}, {**choice, "message": 0}]
     if error.is_withheld or _FILTERED in _leaves(around) or says("withheld", reason):
         reason = reason if says("withheld", reason) else "content_filter"
         refusals = refusals or ([error.message] if error.message else [])
     else:
         is_usable = bool("".join(texts) or calls or refusals)
-        _insist_on_answer(choice.fields, error, [] if is_usable else unread)
+        _insist_on_answer(choice, error, [] if is_usable else unread)
+    notes = doubts.faults[_ANSWER]
     notes.extend(f"left out: {text}" for text in unread)
-    usage = ForeignObject(fields=answer.read("usage", dict) or {}, path="usage.", notes=notes)
+    usage = _read(doubts, answer, "usage", dict) or {}
     has_output = bool(calls or "".join([*texts, *thoughts, *refusals]))
-    prompt, completion, cached = _read_usage(usage, least_prompt, has_output=has_output)
+    prompt, completion, cached = _read_usage(usage, least_prompt, doubts, has_output=has_output)
+    model = _read(doubts, answer, "model", str) or ""
     return Reply(
         text="".join(texts),
-        model=shorten(answer.read("model", str) or "", 120),
+        model=shorten(model, 120),
         finish_reason=shorten(reason, 40),
         refusal=shorten("".join(refusals), LONGEST_REFUSAL) if refusals else None,
         prompt_tokens=prompt,
@@ -175,8 +176,14 @@ def fault_of_status(
 # Private
 
 
+def _read(
+    doubts: Doubts, fields: Mapping[str, object], name: str, kind: type[Value], path: str = ""
+) -> Value | None:
+    return doubts.read(_ANSWER, read_as, fields.get(name), kind, f"{path}{name}")
+
+
 def _read_message(
-    message: Mapping[str, object], notes: list[str]
+    message: Mapping[str, object], doubts: Doubts
 ) -> tuple[list[tuple[str, str]], list[ToolCall]]:
     """Return text, thoughts, refusal and what can't be read, each by its kind, and the calls."""
     thoughts = next((message[name] for name in _REASONING if message.get(name)), None)
@@ -197,15 +204,15 @@ def _read_message(
     for number, fields in enumerate(calls or [], start=1):
         path = f"tool_calls.{number}."
         fields = fields if isinstance(fields, dict) else {}
-        call = ForeignObject(fields=fields, path=path, notes=notes)
-        function = call.read("function", dict) or {}
-        name = ForeignObject(fields=function, path=path, notes=notes).read("name", str)
+        function = _read(doubts, fields, "function", dict, path) or {}
+        name = _read(doubts, function, "name", str, path)
         if not name:
             pieces.append(("unread", f"call {number} names no function"))
             continue
         # Some servers number no calls, some all alike; the answer to one must name it.
         given = fields.get("id")
-        call_id = str(given) if type(given) is int else call.read("id", str)
+        named = {"id": str(given)} if type(given) is int else fields
+        call_id = _read(doubts, named, "id", str, path)
         if not call_id or any(call_id == earlier.id for earlier in made):
             call_id = f"call_{number}"
         # A text, which may be broken; some servers send the object itself.
@@ -215,7 +222,8 @@ def _read_message(
         rest = {key: fields[key] for key in fields if key not in ("id", "type", "function")}
         extra = json.dumps(rest, sort_keys=True) if rest else ""
         if len(extra) > LONGEST_EXTRA:
-            notes.append(f"{path} carries more than {LONGEST_EXTRA} characters: left out")
+            too_much = f"{path} carries more than {LONGEST_EXTRA} characters: left out"
+            doubts.faults[_ANSWER].append(too_much)
         made.append(
             ToolCall(
                 id=shorten(call_id, LONGEST_NAME),
@@ -279,7 +287,7 @@ def _insist_on_answer(
 
 
 def _read_usage(
-    usage: ForeignObject, least_prompt: int, *, has_output: bool
+    usage: Mapping[str, object], least_prompt: int, doubts: Doubts, *, has_output: bool
 ) -> tuple[int | None, int | None, int | None]:
     """Return the tokens of prompt and answer, and those of the prompt from a cache.
 
@@ -287,20 +295,19 @@ def _read_usage(
     is then more than the prompt, or what lacks to the total or to what was sent.
     """
 
-    def count(names: tuple[str, ...], part: ForeignObject = usage) -> int | None:
-        counts = (part.count(name, most=MOST_TOKENS) for name in names)
-        return next((number for number in counts if number is not None), None)
+    def count(*names: str, part: Mapping[str, object] = usage, path: str = "usage.") -> int | None:
+        rows = ((part.get(name), f"{path}{name}", 0, MOST_TOKENS) for name in names)
+        return next(iter(doubts.read_all(_ANSWER, read_whole, rows)), None)
 
-    prompt = count(("prompt_tokens", "input_tokens"))
-    completion = count(("completion_tokens", "output_tokens"))
-    cached = count(_CACHED)
+    prompt = count("prompt_tokens", "input_tokens")
+    completion = count("completion_tokens", "output_tokens")
+    cached = count(*_CACHED)
     for name in ("prompt_tokens_details", "input_tokens_details"):
-        details = ForeignObject(
-            fields=usage.read(name, dict) or {}, path=f"usage.{name}.", notes=usage.notes
-        )
-        cached = count(_CACHED, details) if cached is None else cached
-    beside = (cached or 0) + (count(("cache_creation_input_tokens",)) or 0)
-    total, least = count(("total_tokens",)), FAR_BELOW * least_prompt
+        details = _read(doubts, usage, name, dict, "usage.") or {}
+        within = count(*_CACHED, part=details, path=f"usage.{name}.")
+        cached = within if cached is None else cached
+    beside = (cached or 0) + (count("cache_creation_input_tokens") or 0)
+    total, least = count("total_tokens"), FAR_BELOW * least_prompt
     if prompt is not None and beside:
         whole = prompt + beside
         if beside > prompt or total == whole + (completion or 0) or prompt < least <= whole:
@@ -308,7 +315,7 @@ def _read_usage(
     if completion == 0 and (has_output or not prompt):
         completion = None
     if prompt and prompt < least:
-        usage.notes.append(
+        doubts.faults[_ANSWER].append(
             f"the endpoint counted {prompt} tokens of a prompt that has at least {least_prompt}"
         )
     return prompt or None, completion, cached

@@ -128,8 +128,8 @@ class Evil:
         (pickle.dumps(np.zeros(2, dtype=[("a", "f8")])), "are not read"),
         (b"\x80\x04r\xff\xff\xff\xffN.", "can't be unpickled safely"),
         (b"\x80\x04\x82\x01.", "unregistered extension"),
-        (pickle.dumps([1, 2]), "tracks: is missing"),
-        (pickle.dumps({"tracks": {}}), "map_features: is missing"),
+        (pickle.dumps([1, 2]), "scenario: expected an object"),
+        (pickle.dumps({"tracks": {}}), "map_features: expected an object"),
     ],
 )
 def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) -> None:
@@ -143,7 +143,7 @@ def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) ->
     [
         ({"tracks": {"tank": moving(9.0, 1.0, type="TANK")}}, "unknown 'TANK'"),
         ({"tracks": {"short": moving(9.0, 1.0, steps=2)}}, "has 2 steps; the scenario has 3"),
-        ({"map_features": {"q": {"polyline": []}}}, "needs a type"),
+        ({"map_features": {"q": {"polyline": []}}}, "q.type: expected a text"),
         ({"map_features": {"q": strip(0, 1, polyline=np.zeros(4))}}, "needs 2 numbers a row"),
         ({"map_features": {"q": strip(0.0, 1e300)}}, "up to 1e+08"),
         (

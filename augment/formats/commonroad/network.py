@@ -15,18 +15,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, Value, fault_at
 from augment.formats.road_map import Name, RoadMap, Segment, crossing_segments, following_of
 from augment.formats.roads import middle_of, refuse_shape
-from augment.formats.values import (
-    Doubts,
-    FloatArray,
-    Value,
-    fault_at,
-    look_up,
-    read_finite,
-    read_speed,
-    read_whole,
-)
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import turn_type_of
 
@@ -95,7 +87,9 @@ def read_points(parent: Element, place: str) -> FloatArray:
         InvalidDocument: A coordinate is missing or no number.
     """
     points = parent.findall("point")
-    return read_finite([(one.findtext("x"), one.findtext("y")) for one in points], place, 2)
+    return foreign.read_finite(
+        [(one.findtext("x"), one.findtext("y")) for one in points], place, 2
+    )
 
 
 def network_of(root: Element, step: int) -> RoadMap:
@@ -139,7 +133,7 @@ def network_of(root: Element, step: int) -> RoadMap:
 def _with_id(
     element: Element, read: Callable[..., Value], arguments: tuple[Any, ...]
 ) -> tuple[int, Value]:
-    return read_whole(element.get("id"), f"{element.tag}.id"), read(*arguments)
+    return foreign.read_whole(element.get("id"), f"{element.tag}.id"), read(*arguments)
 
 
 # Signs and lights
@@ -157,7 +151,7 @@ def _limit(sign: Element, place: str, doubts: Doubts, left_out: Counter[str]) ->
             limits.append((value.text or "", place))
         else:
             left_out[f"sign {name[:20]}"] += 1
-    return min(doubts.read_all("speed limits", read_speed, limits), default=None)
+    return min(doubts.read_all("speed limits", foreign.read_speed, limits), default=None)
 
 
 def _light(element: Element, place: str, doubts: Doubts, step: int) -> Light:
@@ -167,10 +161,10 @@ def _light(element: Element, place: str, doubts: Doubts, step: int) -> Light:
     if direction not in ("", "all"):
         words = re.findall("[A-Z]?[a-z]+|[^a-z]+", direction)
         rows = ((_TURNS, word.capitalize(), place) for word in words)
-        turns = {*doubts.read_all("directions of lights", look_up, rows)} or turns
+        turns = {*doubts.read_all("directions of lights", foreign.look_up, rows)} or turns
     with doubts.about("states of lights"):
         active = element.findtext("active", "true").strip()
-        if look_up({"true": True, "1": True, "false": False, "0": False}, active, place):
+        if foreign.look_up({"true": True, "1": True, "false": False, "0": False}, active, place):
             colour = _colour(element, step, place)
     if colour is None:
         doubts.assume("A light that is off, or has no cycle, is of unknown state")
@@ -182,10 +176,10 @@ def _colour(element: Element, step: int, place: str) -> TrafficLight | None:
     cycle: list[TrafficLight] = []
     for part in element.findall("cycle/*"):
         if part.tag == "timeOffset":
-            step -= read_whole(part.text, f"{place}.timeOffset")
+            step -= foreign.read_whole(part.text, f"{place}.timeOffset")
             continue
-        colour = look_up(COLOURS, part.findtext("color", "").strip(), place)
-        steps = read_whole(part.findtext("duration"), f"{place}.duration")
+        colour = foreign.look_up(COLOURS, part.findtext("color", "").strip(), place)
+        steps = foreign.read_whole(part.findtext("duration"), f"{place}.duration")
         if not 0 <= steps <= 100_000:
             raise fault_at(place, f"a duration of {steps} steps is none")
         cycle += [colour] * steps
@@ -229,7 +223,7 @@ def _show_lights(
 
 def _references(parent: Element, path: str, doubts: Doubts) -> tuple[int, ...]:
     rows = ((one.get("ref", ""), f"{parent.tag}.{path}") for one in parent.findall(path))
-    return tuple(doubts.read_all("references", read_whole, rows))
+    return tuple(doubts.read_all("references", foreign.read_whole, rows))
 
 
 def _lanelet(
@@ -240,20 +234,20 @@ def _lanelet(
         raise fault_at(place, "needs a leftBound and a rightBound")
     edges = read_points(left, place), read_points(right, place)
     own = ((one.text or "", place) for one in element.findall("speedLimit"))
-    known = doubts.read_all("speed limits", read_speed, own)
+    known = doubts.read_all("speed limits", foreign.read_speed, own)
     signed = [limits.get(sign) for sign in _references(element, "trafficSignRef", doubts)]
     known += [limit for limit in signed if limit is not None]
     kinds = {(kind.text or "").strip() for kind in element.findall("laneletType")}
     for kind in sorted(kinds):
         with doubts.about("types of lanelets"):
-            look_up(_TYPES, kind, place)
+            foreign.look_up(_TYPES, kind, place)
     for beside in (*element.findall("adjacentLeft"), *element.findall("adjacentRight")):
         with doubts.about("neighbours of lanelets"):
-            look_up(_WAYS, beside.get("drivingDir"), place)
+            foreign.look_up(_WAYS, beside.get("drivingDir"), place)
     # The format pairs the points of the bounds; the middle of each pair is on the centreline.
     is_paired = len(edges[0]) == len(edges[1])
     segment = Segment(
-        name=read_whole(element.get("id"), place),
+        name=foreign.read_whole(element.get("id"), place),
         centerline=(edges[0] + edges[1]) / 2.0 if is_paired else None,
         left=edges[0],
         right=edges[1],

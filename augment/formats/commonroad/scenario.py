@@ -13,20 +13,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.commonroad.network import network_of
 from augment.formats.commonroad.states import StateReader, read_box
 from augment.formats.documents import read_xml
 from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, LogReader
 from augment.formats.road_map import left_out_notes
-from augment.formats.values import (
-    WHAT,
-    Doubts,
-    FloatArray,
-    fault_at,
-    look_up,
-    read_number,
-    read_whole,
-)
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 
 VERSIONS = ("2018b", "2020a", "2024")
@@ -120,7 +113,7 @@ class CommonRoad(LogReader):
         egos = {str(one.id): one for one in (*problems, *obstacles) if one.kind in DRIVERS}
         chosen = problems or vehicles or [_NOBODY]
         if item is not None:
-            chosen = [look_up(egos, item, "item")]
+            chosen = [foreign.look_up(egos, item, "item")]
         notes = [*left_out_notes("objects", left_out), *doubts.notes]
         if step_s > LONGEST_GAP_S:
             notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
@@ -155,19 +148,19 @@ _NOBODY = Obstacle(
 
 def _root(path: Path) -> tuple[Element, float]:
     """The file and the seconds between its steps."""
-    root = read_xml(path, what=WHAT)
+    root = read_xml(path, what=foreign.WHAT)
     version = root.get("commonRoadVersion", "")
     if root.tag != "commonRoad" or version not in VERSIONS:
         text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"
         raise fault_at(path.name, f"{text} {' or '.join(VERSIONS)}")
-    step_s = read_number(root.get("timeStepSize"), "timeStepSize", 0.001, 10.0)
+    step_s = foreign.read_number(root.get("timeStepSize"), "timeStepSize", 0.001, 10.0)
     return root, step_s
 
 
 def _problem(element: Element, states: StateReader) -> Obstacle:
     place = f"planningProblem {element.get('id', '')[:20]}"
     steps, rows = states.read(element, place)
-    size_m, number = (EGO_LENGTH_M, EGO_WIDTH_M), read_whole(element.get("id"), place)
+    size_m, number = (EGO_LENGTH_M, EGO_WIDTH_M), foreign.read_whole(element.get("id"), place)
     return Obstacle(id=number, kind=PROBLEM, size_m=size_m, steps=steps, states=rows)
 
 
@@ -178,10 +171,10 @@ def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> 
     if kind in SCENERY or element.tag in SCENERY:
         left_out[kind or element.tag] += 1
         return None
-    look_up(TYPE_OF, kind, place)
+    foreign.look_up(TYPE_OF, kind, place)
     role = element.findtext("role", element.tag.removesuffix("Obstacle")).strip()  # in 2018b
     stands, doubts = (
-        look_up({"static": True, "dynamic": False}, role, f"{place}.role"),
+        foreign.look_up({"static": True, "dynamic": False}, role, f"{place}.role"),
         states.doubts,
     )
     if element.find("occupancySet") is not None:
@@ -193,5 +186,5 @@ def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> 
     cos, sin = np.cos(rows[:, 2]), np.sin(rows[:, 2])
     rows[:, 0] += box[0] * cos - box[1] * sin
     rows[:, 1] += box[0] * sin + box[1] * cos
-    number = read_whole(element.get("id"), place)
+    number = foreign.read_whole(element.get("id"), place)
     return Obstacle(id=number, kind=kind, size_m=box[2:], steps=steps, states=rows, stands=stands)

@@ -12,9 +12,9 @@ import numpy as np
 import shapely
 from shapely.affinity import rotate, translate
 
+from augment.foreign import Doubts, FloatArray, fault_at, read_number
 from augment.formats.commonroad.network import read_points
 from augment.formats.reading import speeds
-from augment.formats.values import Doubts, FloatArray, fault_at, read_number
 
 MOST_STEPS = 100_000
 MOVED_M = 0.05

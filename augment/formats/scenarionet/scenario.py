@@ -13,22 +13,11 @@ from typing import Any
 import numpy as np
 import shapely
 
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
 from augment.formats.scenarionet.unpickling import read_pickle
-from augment.formats.values import (
-    Doubts,
-    FloatArray,
-    fault_at,
-    look_up,
-    read_finite,
-    read_number,
-    read_numbers,
-    read_speed,
-    read_text,
-    read_times,
-    read_whole,
-)
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
 
 _SCENARIOS = "sd_*.pkl"
@@ -101,7 +90,7 @@ class ScenarioNet(LogReader):
             yield _log(path, None)
             return
         files = {file.name: file for file in sorted(path.rglob(_SCENARIOS))}
-        chosen = files.values() if item is None else [look_up(files, item, "item")]
+        chosen = files.values() if item is None else [foreign.look_up(files, item, "item")]
         yield from (_log(file, file.name) for file in chosen)
 
 
@@ -109,32 +98,32 @@ class ScenarioNet(LogReader):
 
 
 def _log(path: Path, item: str | None) -> Log:
-    description = read_pickle(path)
+    description = foreign.read_as(read_pickle(path), dict, "scenario")
     for name in ("tracks", "map_features", "metadata"):
-        if not isinstance(description, dict) or not isinstance(description.get(name), dict):
-            raise fault_at(name, "is missing, or is no dictionary")
+        foreign.read_as(description.get(name), dict, name)
     metadata, doubts = description["metadata"], Doubts()
     given = metadata.get("ts", metadata.get("timestep"))
     if given is None:
         length = description.get("length")
         given = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
-    times_s = read_times(given, "metadata.ts")
+    times_s = foreign.read_times(given, "metadata.ts")
     tracks, left_out = dict[str, LoggedTrack](), Counter[str]()
     for key, track in description["tracks"].items():
         with doubts.about("objects"):
-            kind = read_text(_dictionary(track, f"tracks.{key}").get("type"), f"tracks.{key}.type")
+            track = foreign.read_as(track, dict, f"tracks.{key}")
+            kind = foreign.read_as(track.get("type"), str, f"tracks.{key}.type")
             if kind in LEFT_OUT:
                 left_out[kind] += 1
                 continue
             tracks[str(key)] = _track(str(key), track, len(times_s), doubts)
-    ego = look_up(tracks, str(metadata.get("sdc_id")), "metadata.sdc_id")
+    ego = foreign.look_up(tracks, str(metadata.get("sdc_id")), "metadata.sdc_id")
     del tracks[ego.name]
     if ego.width_m > ego.length_m:
         doubts.assume("The ego's length and width were swapped and put right")
     current = metadata.get("current_time_index")
-    frame = doubts.read("current times", read_whole, current, "current_time_index")
+    frame = doubts.read("current times", foreign.read_whole, current, "current_time_index")
     texts = {
-        name: doubts.read("names", read_text, values.get(name), name) or ""
+        name: doubts.read("names", foreign.read_as, values.get(name), str, name) or ""
         for values, name in (
             *((metadata, name) for name in ("dataset", "map", "provenance", "traffic_side")),
             *((description, name) for name in ("version", "id")),
@@ -160,8 +149,8 @@ def _log(path: Path, item: str | None) -> Log:
 
 def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     place = f"tracks.{key[:40]}"
-    kind = look_up(TYPE_OF, _dictionary(track, place).get("type"), f"{place}.type")
-    state = _dictionary(track.get("state"), f"{place}.state")
+    kind = foreign.look_up(TYPE_OF, track.get("type"), f"{place}.type")
+    state = foreign.read_as(track.get("state"), dict, f"{place}.state")
     columns = {
         name: _column(state.get(name), steps, f"{place}.state.{name}", needed)
         for name, needed in _COLUMNS.items()
@@ -172,8 +161,8 @@ def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     odd = seen & ~np.isfinite(states).all(axis=1)
     doubts.assume("A state that is valid and not finite was left out", int(odd.sum()))
     states[~seen | odd] = np.nan
-    finer = doubts.read("finer types", _dictionary, track.get("metadata"), place) or {}
-    finest = doubts.read("finer types", read_text, finer.get("type"), place) or ""
+    finer = doubts.read("finer types", foreign.read_as, track.get("metadata"), dict, place) or {}
+    finest = doubts.read("finer types", foreign.read_as, finer.get("type"), str, place) or ""
     sizes_m = [0.0, 0.0]
     for number, name in enumerate(("length", "width")):
         with doubts.about("sizes"):
@@ -189,15 +178,9 @@ def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     )
 
 
-def _dictionary(value: object, place: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise fault_at(place, "is missing, or is no dictionary")
-    return value
-
-
 def _column(value: object, steps: int, place: str, needed: int) -> FloatArray:
     """The rows (T, C) of each step."""
-    rows = read_numbers(value, place, needed)
+    rows = foreign.read_numbers(value, place, needed)
     if len(rows) != steps:
         raise fault_at(place, f"has {len(rows)} steps; the scenario has {steps}")
     return rows
@@ -210,20 +193,20 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
     """The map with the lights of one step."""
     doubts = Doubts()
     states = description.get("dynamic_map_states")
-    states = doubts.read("lights", _dictionary, states, "dynamic_map_states") or {}
+    states = doubts.read("lights", foreign.read_as, states, dict, "dynamic_map_states") or {}
     lights = dict(doubts.read_all("lights", _light, ((*light, frame) for light in states.items())))
     lanes, areas, left_out = dict[str, dict[str, Any]](), [], Counter[str]()
     for key, value in description["map_features"].items():
         place = f"map_features.{str(key)[:40]}"
         with doubts.about("parts of the map"):
-            feature = _dictionary(value, place)
-            kind = read_text(feature.get("type"), f"{place}: needs a type")
+            feature = foreign.read_as(value, dict, place)
+            kind = foreign.read_as(feature.get("type"), str, f"{place}.type")
             if kind in LANES:
                 limit = feature.get("speed_limit_kmh")
                 limit = limit.tolist() if isinstance(limit, np.ndarray) else limit
                 lanes[str(key)] = feature | {"speed_limit_kmh": limit}
             elif kind in AREA_OF and feature.get("polygon") is not None:
-                areas.append((AREA_OF[kind], read_finite(feature["polygon"], place, 2)))
+                areas.append((AREA_OF[kind], foreign.read_finite(feature["polygon"], place, 2)))
             elif not kind.startswith(PASSED_OVER):
                 left_out["bicycle lanes" if kind == BICYCLE_LANE else kind] += 1
     connectors = {key for key, lane in lanes.items() if lane["type"] == CONNECTOR}
@@ -234,7 +217,7 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
     rows = ((*lane, lights, doubts) for lane in lanes.items())
     segments = doubts.read_all("lanes", _segment, rows)
     with doubts.about("sides of traffic"):  # told by our own writer alone
-        look_up(dict.fromkeys(("", "left", "right")), told, "metadata.traffic_side")
+        foreign.look_up(dict.fromkeys(("", "left", "right")), told, "metadata.traffic_side")
     is_left = told == "left" or city_name.lower().startswith(LEFT_HAND)
     return RoadMap(
         place="map_features",
@@ -251,21 +234,19 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
 def _light(key: object, light: object, frame: int) -> tuple[str, TrafficLight]:
     """The lane of a light, and its state at a step."""
     place = f"dynamic_map_states.{str(key)[:40]}"
-    fields = _dictionary(light, place)
-    steps = _dictionary(fields.get("state"), f"{place}.state").get("object_state")
-    steps = steps.tolist() if isinstance(steps, np.ndarray) else steps
-    if not isinstance(steps, list):
-        raise fault_at(f"{place}.state.object_state", "needs a list")
+    fields = foreign.read_as(light, dict, place)
+    state = foreign.read_as(fields.get("state"), dict, f"{place}.state")
+    steps = _list(state.get("object_state"), f"{place}.state.object_state")
     shown = steps[frame] if frame < len(steps) else None
-    word = read_text("" if shown is None else shown, place).rsplit("_", 1)[-1].upper()
-    return _name(fields.get("lane", key), f"{place}.lane"), look_up(LIGHT_OF, word, place)
+    word = foreign.read_as("" if shown is None else shown, str, place).rsplit("_", 1)[-1].upper()
+    return _name(fields.get("lane", key), f"{place}.lane"), foreign.look_up(LIGHT_OF, word, place)
 
 
 def _segment(
     key: str, lane: dict[str, Any], lights: dict[str, TrafficLight], doubts: Doubts
 ) -> Segment:
     place = f"map_features.{key[:40]}"
-    line = read_finite(lane.get("polyline"), place, 2)
+    line = foreign.read_finite(lane.get("polyline"), place, 2)
     units = {"speed_limit_kmh": 1.0 / 3.6, "speed_limit_mph": 0.44704}
     rows = ((lane.get(name), f"{place}.{name}", unit_mps) for name, unit_mps in units.items())
     limits = doubts.read_all("speed limits", _limit, rows)
@@ -274,7 +255,9 @@ def _segment(
         for name in ("exit_lanes", "entry_lanes", "left_neighbor", "right_neighbor")
     }
     switch, inner = {True: True, False: False, None: False}, lane.get("interpolating")
-    is_inner = doubts.read("fields of lanes", look_up, switch, inner, f"{place}.interpolating")
+    is_inner = doubts.read(
+        "fields of lanes", foreign.look_up, switch, inner, f"{place}.interpolating"
+    )
     return Segment(
         name=key,
         crosses=lane["type"] == CONNECTOR or bool(is_inner) or key in lights,
@@ -292,7 +275,11 @@ def _segment(
 def _limit(value: object, place: str, unit_mps: float) -> float | None:
     """A limit in m/s; 0 stands for none."""
     is_text = isinstance(value, str)
-    return read_speed(value, place, unit_mps) if is_text or read_number(value, place) else None
+    return (
+        foreign.read_speed(value, place, unit_mps)
+        if is_text or foreign.read_number(value, place)
+        else None
+    )
 
 
 def _name(value: object, place: str) -> str:
@@ -301,11 +288,14 @@ def _name(value: object, place: str) -> str:
     return str(value)
 
 
+def _list(value: object, place: str) -> list[Any]:
+    """A list, or a table as one."""
+    return foreign.read_as(value.tolist() if isinstance(value, np.ndarray) else value, list, place)
+
+
 def _names(value: object, place: str) -> tuple[str, ...]:
     """Ids of lanes, given as such or as dictionaries with one."""
-    values = value.tolist() if isinstance(value, np.ndarray) else value
-    if not isinstance(values, list):
-        raise fault_at(place, "needs a list")
+    values = _list(value, place)
     names = [one.get("feature_id") if isinstance(one, dict) else one for one in values]
     return tuple(_name(name, place) for name in names)
 
@@ -315,10 +305,10 @@ def _width(lane: dict[str, Any], line: FloatArray, place: str) -> float | None:
     given, polygon = lane.get("width"), lane.get("polygon")
     widths = np.empty(0)
     if given is not None:
-        widths = read_numbers(given, f"{place}.width", 2).sum(axis=1)
+        widths = foreign.read_numbers(given, f"{place}.width", 2).sum(axis=1)
     if not len(widths) and polygon is not None and len(line) >= 2:
         length_m = max(float(np.hypot(*np.diff(line, axis=0).T).sum()), 1e-6)
-        ring = read_finite(polygon, f"{place}.polygon", 2)
+        ring = foreign.read_finite(polygon, f"{place}.polygon", 2)
         widths = np.array([shapely.Polygon(ring).area / length_m]) if len(ring) >= 3 else widths
     known = widths[(widths >= NARROWEST_M) & (widths <= WIDEST_M)]
     return float(np.median(known)) if len(known) else None

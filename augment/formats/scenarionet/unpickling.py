@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.formats.values import fault_at
+from augment.foreign import fault_at
 
 _KIND = re.compile(r"[<>=|]?(?:[?]|[biuf](?:1|2|4|8)|[US][0-9]{1,4}|b1|O|O8)")
 _FAULTS = (

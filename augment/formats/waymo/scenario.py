@@ -19,18 +19,10 @@ from google.protobuf.message import DecodeError
 from google.protobuf.message_factory import GetMessages
 from google.protobuf.unknown_fields import UnknownFieldSet
 
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
-from augment.formats.values import (
-    Doubts,
-    FloatArray,
-    fault_at,
-    look_up,
-    read_finite,
-    read_numbers,
-    read_speed,
-    read_times,
-)
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
@@ -80,13 +72,13 @@ class WaymoMotion(LogReader):
             scenario, doubts = read_scenario(payload), Doubts()
             with doubts.about("fields of messages"):
                 _check_fields(scenario)
-            times_s = read_times(scenario.timestamps_seconds, "timestamps_seconds")
+            times_s = foreign.read_times(scenario.timestamps_seconds, "timestamps_seconds")
             tracks = dict[int, LoggedTrack]()
             for index, track in enumerate(scenario.tracks):
                 with doubts.about("objects"):
                     tracks[index] = _track(index, track, len(times_s), doubts)
             sdc = scenario.sdc_track_index if scenario.HasField("sdc_track_index") else None
-            ego = look_up(tracks, sdc, "sdc_track_index")
+            ego = foreign.look_up(tracks, sdc, "sdc_track_index")
             unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
             if not scenario.HasField("current_time_index"):
                 doubts.assume("A current step that is not given is the first")
@@ -182,11 +174,11 @@ def _check_fields(message: Any) -> None:
 def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     """The track; boxes change a little from step to step, the usual one is taken."""
     place = f"tracks[{index}]"
-    kind = look_up(TYPE_OF, track.object_type, f"{place}.object_type")
+    kind = foreign.look_up(TYPE_OF, track.object_type, f"{place}.object_type")
     if len(track.states) != steps:
         raise fault_at(place, f"has {len(track.states)} states for {steps} times")
     rows = [[getattr(state, name) for name in _STATE] for state in track.states]
-    columns = read_numbers(rows, place, len(_STATE))
+    columns = foreign.read_numbers(rows, place, len(_STATE))
     valid = np.array([state.valid for state in track.states], dtype=bool)
     whole = np.array([all(map(state.HasField, _STATE)) for state in track.states], dtype=bool)
     states = np.column_stack([columns[:, :3], np.hypot(columns[:, 3], columns[:, 4])])
@@ -223,7 +215,9 @@ def city_of(scenario: Any, frame: int) -> RoadMap:
                 areas.append((AREA_OF[kind], _points(getattr(feature, kind).points, place)))
     states = [step.lane_states for step in scenario.dynamic_map_states]
     lights = {
-        one.lane: doubts.read("states of lights", look_up, LIGHT_OF, one.state, "lane_states")
+        one.lane: doubts.read(
+            "states of lights", foreign.look_up, LIGHT_OF, one.state, "lane_states"
+        )
         for one in (states[frame] if frame < len(states) else ())
     }
     controlled = {one.lane for step in states for one in step}
@@ -241,7 +235,7 @@ def city_of(scenario: Any, frame: int) -> RoadMap:
 def _points(points: Iterable[Any], place: str) -> FloatArray:
     if not all(point.HasField("x") and point.HasField("y") for point in points):
         raise fault_at(place, "has a point without x or y")
-    return read_finite([(point.x, point.y) for point in points], place, 2)
+    return foreign.read_finite([(point.x, point.y) for point in points], place, 2)
 
 
 def _segment(
@@ -254,7 +248,7 @@ def _segment(
 ) -> Segment:
     place = f"map_features.{key}"
     line = _points(lane.polyline, place)
-    look_up(LANE_TYPES, lane.type, f"{place}.type")
+    foreign.look_up(LANE_TYPES, lane.type, f"{place}.type")
     left, right = (
         edge_of(
             line,
@@ -279,7 +273,7 @@ def _segment(
         predecessors=tuple(lane.entry_lanes),
         left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
         right_neighbors=tuple(one.feature_id for one in lane.right_neighbors),
-        speed_limit_mps=doubts.read("speed limits", read_speed, limit, place, MPS_OF_MPH),
+        speed_limit_mps=doubts.read("speed limits", foreign.read_speed, limit, place, MPS_OF_MPH),
         light=lights.get(key) or TrafficLight.UNKNOWN,
     )
 
