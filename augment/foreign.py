@@ -39,6 +39,11 @@ def fault_at(place: str, text: str) -> InvalidDocument:
     return InvalidDocument(WHAT, [(place, text)])
 
 
+def name_all(meanings: Mapping[Value, str]) -> dict[str, Value]:
+    """Return what each name of a format means, from the names of each meaning."""
+    return {name: meaning for meaning, names in meanings.items() for name in names.split()}
+
+
 def look_up(table: Mapping[Key, Value], key: object, place: str) -> Value:
     """Return what a name of the format means.
 
@@ -206,6 +211,12 @@ class Doubts:
     ) -> list[Value]:
         """Return what can be read, each from the arguments in a row."""
         return [made for row in rows if (made := self.read(kind, read, *row)) is not None]
+
+    def doubt_unknown(
+        self, kind: str, table: Mapping[Key, Any], names: Iterable[object], place: str
+    ) -> None:
+        """Count each name that a table does not have as a fault."""
+        self.read_all(kind, look_up, ((table, name, place) for name in names))
 
     def assume(self, sentence: str, times: SupportsInt = 1) -> None:
         """Count an assumption, told as a sentence without its full stop."""

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.foreign import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up
+from augment.foreign import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up, name_all
 from augment.formats.documents import read_json
 from augment.formats.reading import Log, LogReader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
@@ -40,33 +40,33 @@ MOTION_EGO = "AV"
 STEP_S = 0.1
 MOST_STEPS = 10_000
 
-_CATEGORIES = {
-    AgentType.VEHICLE: "REGULAR_VEHICLE LARGE_VEHICLE BOX_TRUCK TRUCK TRUCK_CAB VEHICULAR_TRAILER "
-    "RAILED_VEHICLE",
-    AgentType.BUS: "BUS SCHOOL_BUS ARTICULATED_BUS",
-    AgentType.BICYCLE: "BICYCLE BICYCLIST MOTORCYCLE MOTORCYCLIST WHEELED_DEVICE WHEELED_RIDER",
-    AgentType.PEDESTRIAN: "PEDESTRIAN OFFICIAL_SIGNALER STROLLER WHEELCHAIR",
-    AgentType.TRAFFIC_CONE: "CONSTRUCTION_CONE",
-    AgentType.BARRIER: "CONSTRUCTION_BARREL",
-    AgentType.CONSTRUCTION_SIGN: "SIGN STOP_SIGN MOBILE_PEDESTRIAN_CROSSING_SIGN "
-    "MESSAGE_BOARD_TRAILER",
-    AgentType.GENERIC_OBJECT: "TRAFFIC_LIGHT_TRAILER BOLLARD ANIMAL DOG",
-}
-TYPE_OF = {name: kind for kind, names in _CATEGORIES.items() for name in names.split()}
+TYPE_OF = name_all(
+    {
+        AgentType.VEHICLE: "REGULAR_VEHICLE LARGE_VEHICLE BOX_TRUCK TRUCK TRUCK_CAB "
+        "VEHICULAR_TRAILER RAILED_VEHICLE",
+        AgentType.BUS: "BUS SCHOOL_BUS ARTICULATED_BUS",
+        AgentType.BICYCLE: "BICYCLE BICYCLIST MOTORCYCLE MOTORCYCLIST WHEELED_DEVICE "
+        "WHEELED_RIDER",
+        AgentType.PEDESTRIAN: "PEDESTRIAN OFFICIAL_SIGNALER STROLLER WHEELCHAIR",
+        AgentType.TRAFFIC_CONE: "CONSTRUCTION_CONE",
+        AgentType.BARRIER: "CONSTRUCTION_BARREL",
+        AgentType.CONSTRUCTION_SIGN: "SIGN STOP_SIGN MOBILE_PEDESTRIAN_CROSSING_SIGN "
+        "MESSAGE_BOARD_TRAILER",
+        AgentType.GENERIC_OBJECT: "TRAFFIC_LIGHT_TRAILER BOLLARD ANIMAL DOG",
+    }
+)
 """As nuPlan has it: two wheels are a bicycle, strollers and wheelchairs go with pedestrians. A
 table without a rest: a category that is not in it is refused by name."""
-MOTION_TYPE_OF = {
-    "vehicle": AgentType.VEHICLE,
-    "pedestrian": AgentType.PEDESTRIAN,
-    "motorcyclist": AgentType.BICYCLE,
-    "cyclist": AgentType.BICYCLE,
-    "riderless_bicycle": AgentType.BICYCLE,
-    "bus": AgentType.BUS,
-    "construction": AgentType.TRAFFIC_CONE,
-    "static": AgentType.GENERIC_OBJECT,
-    "background": AgentType.GENERIC_OBJECT,
-    "unknown": AgentType.GENERIC_OBJECT,
-}
+MOTION_TYPE_OF = name_all(
+    {
+        AgentType.VEHICLE: "vehicle",
+        AgentType.PEDESTRIAN: "pedestrian",
+        AgentType.BICYCLE: "motorcyclist cyclist riderless_bicycle",
+        AgentType.BUS: "bus",
+        AgentType.TRAFFIC_CONE: "construction",
+        AgentType.GENERIC_OBJECT: "static background unknown",
+    }
+)
 _QUATERNION, _PLACE = ["qx", "qy", "qz", "qw"], ["tx_m", "ty_m", "tz_m"]
 _RIGID = dict.fromkeys((*_QUATERNION, *_PLACE), "double")
 _POSE_COLUMNS = {"timestamp_ns": "int64", **_RIGID}
@@ -236,9 +236,7 @@ def _known_rows(
 ) -> "pd.DataFrame":
     """The rows of kinds that are known."""
     is_odd = ~table[column].isin(list(types))
-    for kind in table[column][is_odd].unique():
-        with doubts.about("kinds of objects"):
-            look_up(types, kind, column)
+    doubts.doubt_unknown("kinds of objects", types, table[column][is_odd].unique(), column)
     known: pd.DataFrame = table[~is_odd].reset_index(drop=True)
     return known
 

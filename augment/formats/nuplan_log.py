@@ -109,16 +109,13 @@ def vehicles_at(path: Path, tokens: Sequence[str]) -> dict[str, list[tuple[float
         "WHERE c.name = 'vehicle') ORDER BY rowid"
     )
     with open_tables(path) as base:
-        known = [one for one in tokens if base.execute(_FRAME, (bytes.fromhex(one),)).fetchone()]
-        return {
-            one: [
-                (round(length_m, 3), round(width_m, 3))
-                for length_m, width_m in foreign.read_finite(
-                    base.execute(text, (bytes.fromhex(one),)).fetchall(), "lidar_box", 2
-                ).tolist()
-            ]
-            for one in known
-        }
+        sizes_m = {}
+        for token in tokens:
+            if base.execute(_FRAME, (bytes.fromhex(token),)).fetchone():
+                rows = base.execute(text, (bytes.fromhex(token),)).fetchall()
+                table = foreign.read_finite(rows, "lidar_box", 2).round(3)
+                sizes_m[token] = [(length_m, width_m) for length_m, width_m in table.tolist()]
+        return sizes_m
 
 
 # Private
@@ -155,10 +152,8 @@ def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
     ).fetchall()
     if not rows:
         raise fault_at("item", "the log has no frame")
-    return [
-        (str(token).lower(), foreign.read_whole(time, "lidar_pc.timestamp"))
-        for token, time in rows
-    ]
+    place = "lidar_pc.timestamp"
+    return [(str(token).lower(), foreign.read_whole(time, place)) for token, time in rows]
 
 
 def _motion(
@@ -224,9 +219,8 @@ def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) ->
         f"WHERE lidar_pc_token IN ({', '.join('?' * len(frames))})",
         list(frames),
     ).fetchall()
-    for kind in {str(kinds.get(row[1])) for row in rows} - {"ego", *TYPE_OF}:
-        with doubts.about("objects"):
-            foreign.look_up(TYPE_OF, kind, "category.name")
+    names = {str(kinds.get(row[1])) for row in rows} - {"ego"}
+    doubts.doubt_unknown("objects", TYPE_OF, names, "category.name")
     rows = [row for row in rows if kinds.get(row[1]) in TYPE_OF]
     boxes = _numbers(rows, "frame token", "x_m y_m heading_rad", "vx vy length_m width_m", doubts)
     step_of = {frame: step for step, frame in enumerate(frames)}

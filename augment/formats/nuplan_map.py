@@ -265,12 +265,11 @@ def _lanes(layers: _Layers) -> tuple[list[Segment], int]:
     for (fid, left, right, limit, group, index, kind), _ in layers.read("lanes_polygons", columns):
         with doubts.about("lanes"):
             name, place = _name(fid), f"lane {fid}"
-            if (
-                name in layers.lines
-                and doubts.read("types of lanes", read_whole, kind, place) == 1
-            ):
+            if name not in layers.lines:
+                continue
+            if doubts.read("types of lanes", read_whole, kind, place) == BICYCLE_LANE:
                 bicycle_lanes += 1
-            elif name in layers.lines:
+            else:
                 row = doubts.read("lane indices", read_whole, index, place)
                 key = (name, None) if group is None or row is None else (group, row)
                 lanes[key] = _segment(layers, name, (left, right), limit)

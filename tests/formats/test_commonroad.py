@@ -239,46 +239,35 @@ def test_every_way_to_name_a_light_gives_it_to_what_it_governs(
     assert ("governs no lane" in notes) == (light == TrafficLight.NONE or 'id="51"' in odd)
 
 
+POINT = "<point><x>0</x><y>11</y></point>"
+BOX = "<length>2</length><width>1</width><orientation>1</orientation>"
+DISC = "<circle><radius>2</radius><center><x>0</x><y>12</y></center></circle>"
+CORNERS = ((-3, 10), (3, 10), (0, 16))
+TRIANGLE = "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in CORNERS)
+SPEED, UP = "<velocity>5</velocity>", "<orientation>1.5708</orientation>"
+SPEEDS = "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd></velocity>"
+
+
 # Where the state of step 1 lies, which way it goes and how fast, as commonroad-io has it.
 @pytest.mark.parametrize(
-    ("state", "expected"),
+    ("position", "values", "expected"),
     [
+        (POINT, "<velocity>3</velocity><velocityY>4</velocityY>", (11, 0, 0.9273, 5)),
+        (POINT, SPEED, (11, 0, 1.5708, 5)),
+        (POINT, UP, (11, 0, 1.5708, 10)),
         (
-            "<point><x>0</x><y>11</y></point>|<velocity>3</velocity><velocityY>4</velocityY>",
-            (11, 0, 0.9273, 5),
-        ),
-        ("<point><x>0</x><y>11</y></point>|<velocity>5</velocity>", (11, 0, 1.5708, 5)),
-        (
-            "<point><x>0</x><y>11</y></point>|<orientation>1.5708</orientation>",
-            (11, 0, 1.5708, 10),
-        ),
-        (
-            "<rectangle><length>2</length><width>1</width><orientation>1</orientation><center><x>1</x>"
-            "<y>12</y></center></rectangle>|<velocity>-5</velocity><orientation>1.5708</orientation>",
+            f"<rectangle>{BOX}<center><x>1</x><y>12</y></center></rectangle>",
+            f"<velocity>-5</velocity>{UP}",
             (12, 1, 1.5708, 5),
         ),
-        (
-            "<circle><radius>2</radius><center><x>0</x><y>12</y></center></circle>|"
-            "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd></velocity>"
-            "<orientation>1.5708</orientation>",
-            (12, 0, 1.5708, 5),
-        ),
-        (
-            "<polygon><point><x>-3</x><y>10</y></point><point><x>3</x><y>10</y></point>"
-            "<point><x>0</x><y>16</y></point></polygon>|<velocity>5</velocity>"
-            "<orientation>1.5708</orientation>",
-            (12, 0, 1.5708, 5),
-        ),
-        (
-            "<lanelet ref='2'/>|<velocity>5</velocity><orientation>1.5708</orientation>",
-            (30, 0, 1.5708, 5),
-        ),
+        (DISC, SPEEDS + UP, (12, 0, 1.5708, 5)),
+        (f"<polygon>{TRIANGLE}</polygon>", SPEED + UP, (12, 0, 1.5708, 5)),
+        ("<lanelet ref='2'/>", SPEED + UP, (30, 0, 1.5708, 5)),
     ],
 )
 def test_a_state_may_be_given_in_every_way_of_the_format(
-    tmp_path: Path, state: str, expected: tuple[float, ...]
+    tmp_path: Path, position: str, values: str, expected: tuple[float, ...]
 ) -> None:
-    position, values = state.split("|")
     values = re.sub("<(velocityY?|orientation)>([-.0-9]+)<", r"<\1><exact>\2</exact><", values)
     text = f"<state><position>{position}</position><time><exact>1</exact></time>{values}</state>"
     made = re.sub("<trajectory>.*</trajectory>", f"<trajectory>{text}</trajectory>", newer())

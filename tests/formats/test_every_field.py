@@ -44,8 +44,8 @@ UNUSED = {
     "av2-motion": f"{_AV2} city end_timestamp focal_track_id num_timestamps object_category "
     "scenario_id start_timestamp",
     "nuplan": "boundaries.boundary_type_fid category.description ego_pose.log_token "
-    "ego_pose.timestamp "
-    "ego_pose.vz ego_pose.z intersections.boundary_type_fid lane_connectors.intersection_fid "
+    "ego_pose.timestamp ego_pose.vz ego_pose.z intersections.boundary_type_fid "
+    "lane_connectors.intersection_fid "
     "lane_connectors.lane_group_connector_fid lane_connectors.turn_type_fid "
     "lane_group_connectors.boundary_type_fid lane_group_connectors.geom "
     "lane_groups_polygons.boundary_type_fid lane_groups_polygons.geom "
@@ -131,12 +131,9 @@ def table_variants(
     table = read(file)
     for index, column in enumerate(table.column_names):
         good = table[column]
-        for made in (
-            pa.array(["odd"] * len(good))
-            if good.type != pa.string()
-            else pa.array([[1]] * len(good)),
-            pa.array([None, *good.to_pylist()[1:]], type=good.type),
-        ):
+        odd = ["odd"] if good.type != pa.string() else [[1]]
+        gap = pa.array([None, *good.to_pylist()[1:]], type=good.type)
+        for made in (pa.array(odd * len(good)), gap):
             write(table.set_column(index, column, made), file)
             yield column
     write(table, file)

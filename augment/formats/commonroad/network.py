@@ -37,12 +37,9 @@ AREA_OF = {
     "busStop": AreaKind.DRIVABLE,
     "parking": AreaKind.CARPARK,
 }
-LEFT_OUT = {
-    "bicycleLane": "bicycle lanes",
-    "border": "borders",
-    "restricted": "restricted lanes",
-    "restricted_area": "restricted lanes",
-}
+LEFT_OUT = {"bicycleLane": "bicycle lanes", "border": "borders"} | dict.fromkeys(
+    ("restricted", "restricted_area"), "restricted lanes"
+)
 _DRIVEN = (
     "urban interstate country highway busLane exitRamp mainCarriageWay accessRamp driveWay "
     "intersection unknown"
@@ -87,9 +84,8 @@ def read_points(parent: Element, place: str) -> FloatArray:
         InvalidDocument: A coordinate is missing or no number.
     """
     points = parent.findall("point")
-    return foreign.read_finite(
-        [(one.findtext("x"), one.findtext("y")) for one in points], place, 2
-    )
+    rows = [(point.findtext("x"), point.findtext("y")) for point in points]
+    return foreign.read_finite(rows, place, 2)
 
 
 def network_of(root: Element, step: int) -> RoadMap:
@@ -143,10 +139,8 @@ def _limit(sign: Element, place: str, doubts: Doubts, left_out: Counter[str]) ->
     """The limit of a sign that is one; other signs are left out."""
     limits = []
     for element in sign.findall("trafficSignElement"):
-        name, value = (
-            element.findtext("trafficSignID", "").strip(),
-            element.find("additionalValue"),
-        )
+        name = element.findtext("trafficSignID", "").strip()
+        value = element.find("additionalValue")
         if name in SPEED_SIGNS.split() and value is not None:
             limits.append((value.text or "", place))
         else:
@@ -238,12 +232,10 @@ def _lanelet(
     signed = [limits.get(sign) for sign in _references(element, "trafficSignRef", doubts)]
     known += [limit for limit in signed if limit is not None]
     kinds = {(kind.text or "").strip() for kind in element.findall("laneletType")}
-    for kind in sorted(kinds):
-        with doubts.about("types of lanelets"):
-            foreign.look_up(_TYPES, kind, place)
-    for beside in (*element.findall("adjacentLeft"), *element.findall("adjacentRight")):
-        with doubts.about("neighbours of lanelets"):
-            foreign.look_up(_WAYS, beside.get("drivingDir"), place)
+    doubts.doubt_unknown("types of lanelets", _TYPES, sorted(kinds), place)
+    beside = (*element.findall("adjacentLeft"), *element.findall("adjacentRight"))
+    ways = [one.get("drivingDir") for one in beside]
+    doubts.doubt_unknown("neighbours of lanelets", _WAYS, ways, place)
     # The format pairs the points of the bounds; the middle of each pair is on the centreline.
     is_paired = len(edges[0]) == len(edges[1])
     segment = Segment(

@@ -7,7 +7,7 @@ ego begins.
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -23,26 +23,18 @@ from augment.formats.road_map import left_out_notes
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 
 VERSIONS = ("2018b", "2020a", "2024")
-TYPE_OF = {
-    "car": AgentType.VEHICLE,
-    "truck": AgentType.VEHICLE,
-    "bus": AgentType.BUS,
-    "taxi": AgentType.VEHICLE,
-    "priorityVehicle": AgentType.VEHICLE,
-    "parkedVehicle": AgentType.VEHICLE,
-    "train": AgentType.VEHICLE,
-    "bicycle": AgentType.BICYCLE,
-    "motorcycle": AgentType.BICYCLE,
-    "pedestrian": AgentType.PEDESTRIAN,
-    "constructionZone": AgentType.BARRIER,
-    "pillar": AgentType.GENERIC_OBJECT,
-    "unknown": AgentType.GENERIC_OBJECT,
-}
-SCENERY = frozenset(
+TYPE_OF = foreign.name_all(
     {
-        *("building", "roadBoundary", "medianStrip", "median_strip", "vegetation"),
-        *("environmentObstacle", "phantomObstacle"),
+        AgentType.VEHICLE: "car truck taxi priorityVehicle parkedVehicle train",
+        AgentType.BUS: "bus",
+        AgentType.BICYCLE: "bicycle motorcycle",
+        AgentType.PEDESTRIAN: "pedestrian",
+        AgentType.BARRIER: "constructionZone",
+        AgentType.GENERIC_OBJECT: "pillar unknown",
     }
+)
+SCENERY = (
+    "building roadBoundary medianStrip median_strip vegetation environmentObstacle phantomObstacle"
 )
 """What stands beside the road and is no road user."""
 ASSUMED = (
@@ -160,23 +152,21 @@ def _root(path: Path) -> tuple[Element, float]:
 def _problem(element: Element, states: StateReader) -> Obstacle:
     place = f"planningProblem {element.get('id', '')[:20]}"
     steps, rows = states.read(element, place)
-    size_m, number = (EGO_LENGTH_M, EGO_WIDTH_M), foreign.read_whole(element.get("id"), place)
-    return Obstacle(id=number, kind=PROBLEM, size_m=size_m, steps=steps, states=rows)
+    number = foreign.read_whole(element.get("id"), place)
+    return replace(_NOBODY, id=number, kind=PROBLEM, steps=steps, states=rows)
 
 
 def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> Obstacle | None:
     """What stands or drives; None for what is left out."""
     kind = element.findtext("type", "").strip()
     place = f"obstacle {element.get('id', '')[:20]}"
-    if kind in SCENERY or element.tag in SCENERY:
+    if {kind, element.tag} & {*SCENERY.split()}:
         left_out[kind or element.tag] += 1
         return None
     foreign.look_up(TYPE_OF, kind, place)
     role = element.findtext("role", element.tag.removesuffix("Obstacle")).strip()  # in 2018b
-    stands, doubts = (
-        foreign.look_up({"static": True, "dynamic": False}, role, f"{place}.role"),
-        states.doubts,
-    )
+    stands = foreign.look_up({"static": True, "dynamic": False}, role, f"{place}.role")
+    doubts = states.doubts
     if element.find("occupancySet") is not None:
         doubts.assume("Where somebody may be after t0 is no motion, and was left out")
     steps, rows = states.read(element, place, stands=stands)

@@ -6,6 +6,7 @@ velocity (a point mass), else of the motion.
 """
 
 from dataclasses import dataclass
+from functools import partial
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -56,9 +57,8 @@ class StateReader:
             raise fault_at(place, "needs an initialState")
         later = [] if stands else owner.findall("trajectory/*")
         by_step = dict([self._state(first, place)])
-        by_step |= dict(
-            self.doubts.read_all("states", self._state, ((one, place) for one in later))
-        )
+        rows = ((element, place) for element in later)
+        by_step |= dict(self.doubts.read_all("states", self._state, rows))
         steps = sorted(by_step)
         states = np.array([by_step[step] for step in steps])
         states[:, 3] = 0.0 if stands else states[:, 3]
@@ -127,15 +127,13 @@ class StateReader:
 
 def _fill_headings(states: FloatArray) -> None:
     """Give each state (K, 4) a heading: of its motion, else of the state before or after."""
+    import pandas as pd
+
     rows = np.arange(len(states))
     moved = states[np.minimum(rows + 1, rows[-1]), :2] - states[np.maximum(rows - 1, 0), :2]
     moving = np.isnan(states[:, 2]) & (np.hypot(*moved.T) > MOVED_M)
     states[moving, 2] = np.arctan2(moved[moving, 1], moved[moving, 0])
-    known = np.flatnonzero(np.isfinite(states[:, 2]))
-    last = (
-        known[np.maximum(np.searchsorted(known, rows, side="right") - 1, 0)] if len(known) else 0
-    )
-    states[:, 2] = np.nan_to_num(states[last, 2])
+    states[:, 2] = pd.Series(states[:, 2]).ffill().bfill().fillna(0.0)
 
 
 def read_box(shape: Element, place: str, doubts: Doubts) -> tuple[float, float, float, float]:
@@ -153,7 +151,7 @@ def read_box(shape: Element, place: str, doubts: Doubts) -> tuple[float, float, 
     covered = shapely.GeometryCollection([cover(one, place) for one in shapes])
     if not shapes or covered.is_empty:
         raise fault_at(place, "needs a shape")
-    if len(shapes) > 1 or shapes[0].tag not in ("rectangle", "circle", "truckShape"):
+    if len(shapes) > 1 or shapes[0].tag not in ("rectangle", "circle"):
         doubts.assume("Of a polygon, or of several shapes, the box around them is taken")
     x_m, y_m, to_x_m, to_y_m = covered.bounds
     return (x_m + to_x_m) / 2.0, (y_m + to_y_m) / 2.0, to_x_m - x_m, to_y_m - y_m
@@ -166,15 +164,11 @@ def cover(shape: Element, place: str) -> shapely.Geometry:
         InvalidDocument: It is none of the format's shapes, or breaks it.
     """
 
-    def size(name: str, at: str = "", least: float = 0.001) -> float:
-        return read_number(shape.findtext(f"{at}{name}"), f"{place}.{name}", least, 1_000.0)
+    def find(name: str, default: str | None = "0", **bounds: float) -> float:
+        return read_number(shape.findtext(name, default), f"{place}.{name}", **bounds)
 
-    def find(name: str) -> float:
-        return read_number(shape.findtext(name, "0"), f"{place}.{name}")
-
-    center = (
-        {axis: find(f"center/{axis}") for axis in "xy"} if shape.find("center") is not None else {}
-    )
+    find_size = partial(find, default=None, least=0.001, most=1_000.0)
+    x_m, y_m = find("center/x"), find("center/y")
     match shape.tag:
         case "polygon":
             points = read_points(shape, place)
@@ -182,22 +176,11 @@ def cover(shape: Element, place: str) -> shapely.Geometry:
                 raise fault_at(place, "a polygon needs three points")
             return shapely.Polygon(points)
         case "circle":
-            return shapely.Point(*center.values() or (0.0, 0.0)).buffer(size("radius"))
-        case "rectangle" | "truckShape" | "semiTrailerTruckShape":
-            truck = {"truckShape": "", "semiTrailerTruckShape": "truckShape/"}.get(shape.tag)
-            at = "" if truck is None else f"{truck}truckDims/"
-            shift_m = find(f"{truck or ''}originXShift")
-            half_m, wide_m = size("length", at) / 2.0, size("width", at) / 2.0
-            box: shapely.Geometry = shapely.box(
-                -half_m - shift_m, -wide_m, half_m - shift_m, wide_m
-            )
-            if truck:  # straight behind its hitch
-                hitch_m = -half_m - shift_m + size("distFromRearToRearAxle", at)
-                hitch_m += size("distFromRearAxleToHitch", at, -1_000.0)
-                front_m = hitch_m + size("distFromFrontToHitch", "trailerDims/")
-                wide_m = size("width", "trailerDims/") / 2.0
-                rear_m = front_m - size("length", "trailerDims/")
-                box = shapely.union(box, shapely.box(rear_m, -wide_m, front_m, wide_m))
+            return shapely.Point(x_m, y_m).buffer(find_size("radius"))
+        case "rectangle":
+            half_m, wide_m = find_size("length") / 2.0, find_size("width") / 2.0
+            shift_m = find("originXShift")
+            box = shapely.box(-half_m - shift_m, -wide_m, half_m - shift_m, wide_m)
             turned = rotate(box, find("orientation"), origin=(0.0, 0.0), use_radians=True)
-            return translate(turned, *center.values())
+            return translate(turned, x_m, y_m)
     raise fault_at(place, f"{shape.tag[:40]!r} is no shape of the format")

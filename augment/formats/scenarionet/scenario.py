@@ -43,28 +43,22 @@ CONNECTOR, BICYCLE_LANE = "LANE_SURFACE_UNSTRUCTURE", "LANE_BIKE_LANE"
 LANES = frozenset(
     {"LANE_SURFACE_STREET", "LANE_FREEWAY", "LANE_UNKNOWN", "LANE_BUS_LANE", CONNECTOR}
 )
-AREA_OF = {
-    "CROSSWALK": AreaKind.CROSSWALK,
-    "ROAD_EDGE_SIDEWALK": AreaKind.WALKWAY,
-    "BOUNDARY_SIDEWALK": AreaKind.WALKWAY,
-    "SIDEWALK": AreaKind.WALKWAY,
-    "DRIVEWAY": AreaKind.DRIVABLE,
-}
+AREA_OF = {"CROSSWALK": AreaKind.CROSSWALK, "DRIVEWAY": AreaKind.DRIVABLE} | dict.fromkeys(
+    ("ROAD_EDGE_SIDEWALK", "BOUNDARY_SIDEWALK", "SIDEWALK"), AreaKind.WALKWAY
+)
 PASSED_OVER = ("ROAD_LINE_", "ROAD_EDGE_", "BOUNDARY_")
 """Lines on the road and along it, which are no part of a scene."""
 MEANINGLESS_KMH = 100.0
 """What converters from nuScenes write for every connector."""
 LEFT_HAND = ("singapore", "sg-", "sg_")
-LIGHT_OF = {
-    "GO": TrafficLight.GREEN,
-    "GREEN": TrafficLight.GREEN,
-    "CAUTION": TrafficLight.YELLOW,
-    "YELLOW": TrafficLight.YELLOW,
-    "STOP": TrafficLight.RED,
-    "RED": TrafficLight.RED,
-    "UNKNOWN": TrafficLight.UNKNOWN,
-    "": TrafficLight.UNKNOWN,
-}
+LIGHT_OF = {"": TrafficLight.UNKNOWN} | foreign.name_all(
+    {
+        TrafficLight.GREEN: "GO GREEN",
+        TrafficLight.YELLOW: "CAUTION YELLOW",
+        TrafficLight.RED: "STOP RED",
+        TrafficLight.UNKNOWN: "UNKNOWN",
+    }
+)
 _COLUMNS = {"position": 2, "heading": 1, "velocity": 2, "valid": 1}
 """How many numbers a step needs."""
 
@@ -216,8 +210,9 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
             lanes[key] = lanes[key] | {"speed_limit_kmh": None}
     rows = ((*lane, lights, doubts) for lane in lanes.items())
     segments = doubts.read_all("lanes", _segment, rows)
-    with doubts.about("sides of traffic"):  # told by our own writer alone
-        foreign.look_up(dict.fromkeys(("", "left", "right")), told, "metadata.traffic_side")
+    # Told by our own writer alone.
+    sides = dict.fromkeys(("", "left", "right"))
+    doubts.doubt_unknown("sides of traffic", sides, [told], "metadata.traffic_side")
     is_left = told == "left" or city_name.lower().startswith(LEFT_HAND)
     return RoadMap(
         place="map_features",
