@@ -8,7 +8,7 @@ a connection that is tried once: where no broker answers, there is a sentence in
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import timedelta
 from functools import partial
 from threading import Event, Thread
@@ -23,7 +23,7 @@ from django.db import connection
 from django.db.models import Q, QuerySet
 from kombu.exceptions import OperationalError
 
-from augment.errors import QueueRefused, QueueUnreachable
+from augment.errors import QueueFault, QueueRefused, QueueUnreachable
 from augment.models import GenerationJob
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
@@ -73,7 +73,8 @@ def work(self: Any, kind: str, pk: int) -> None:
     KINDS[kind].perform(pk, worker=worker[:120])
     enqueue(KINDS[kind], KINDS[kind].released_by(pk))
     if kind == AUGMENTATIONS.name:
-        enqueue_measures(GenerationJob.objects.filter(augmentations=pk))
+        with suppress(QueueFault):  # who looks at the job asks again
+            enqueue_measures(GenerationJob.objects.filter(augmentations=pk))
 
 
 @shared_task(name="augment.draw", acks_late=True, ignore_result=True)

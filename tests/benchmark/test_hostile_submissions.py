@@ -89,7 +89,8 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
     crowded = modification_to_document(Modification(added=tuple(crowd)))
     (made / "crowd.json").write_text(json.dumps(crowded))
     for name, key in {"huge": 10**5000, "nul": "a\0b"}.items():
-        parts = {"tracks": {key: {"type": "?"}}, "map_features": {}, "metadata": {}}
+        metadata = {"sdc_id": "x\0y"} if name == "nul" else {}
+        parts = {"tracks": {key: {"type": "?"}}, "map_features": {}, "metadata": metadata}
         (made / f"{name}.pkl").write_bytes(pickle.dumps(parts | {"length": 2}))
     os.symlink("/etc/passwd", made / "link.json")
     found = check(made, ("million", "nan", "bomb", "crowd", "nul", "huge", "link", "path"))
@@ -98,7 +99,7 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
     assert "finite number" in found["nan"].reason
     assert "memory" in found["bomb"].reason
     assert "1100 agents; at most 1010 are taken" in found["crowd"].reason
-    assert r"tracks.a\x00b.type: unknown '?'" in found["nul"].reason
+    assert r"metadata.sdc_id: unknown 'x\x00y'" in found["nul"].reason
     assert "makes its reader fail: ValueError: Exceeds the limit" in found["huge"].reason
     assert found["link"].reason.endswith("link.json: is a link")
 

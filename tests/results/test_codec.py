@@ -61,6 +61,7 @@ def test_what_a_version_brought_is_a_key_of_it_also_when_it_is_empty() -> None:
     assert results_document(Results(version=1))["board"].keys() == document["board"].keys() - {
         "order",
         "p_values",
+        "seems_above",
     }
     assert (read_results(document), read_results({})) == (Results(version=VERSION), Results())
     assert results_document(Results()) == {}

@@ -30,6 +30,7 @@ from arena.results.services.stored_rows import (
 from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256
 from augment.models import Augmentation, Contestant, GenerationJob
+from augment.services.judging.analyses import measure_job
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 from augment.services.scenarios.pictures import film_document, film_name
 
@@ -136,6 +137,8 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
         raise ArenaError(f"The study {study.name!r} is open; close it before it is exported.")
     if study.state == Study.State.CANCELLED:
         raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
+    for job in GenerationJob.objects.filter(pk__in=close_over(study).jobs):
+        measure_job(job)  # measures are stored, which frozen rows don't allow
     with new_folder(out) as folder, frozen_rows():
         _fill(study, folder, say)
 
