@@ -51,7 +51,7 @@ def home(request: HttpRequest) -> HttpResponse:
             return _entrant(request)
         case "researcher":
             use_english(request)
-            return _researcher(request)
+            return render(request, "home/researcher.html", _studies_by_state())
         case "admin":
             use_english(request)
             return _admin(request)
@@ -82,10 +82,6 @@ def _entrant(request: HttpRequest) -> HttpResponse:
     own = submissions_for(user_of(request))
     benchmarks = Benchmark.objects.filter(retired_at=None)
     return render(request, "home/entrant.html", {"own": own[:5], "benchmarks": benchmarks})
-
-
-def _researcher(request: HttpRequest) -> HttpResponse:
-    return render(request, "home/researcher.html", _studies_by_state())
 
 
 def _admin(request: HttpRequest) -> HttpResponse:

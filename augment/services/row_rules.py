@@ -37,12 +37,16 @@ LONGEST_TRACE = 1 << 26
 """Of a drive to look at, unpacked: some hundred times what 15 s take."""
 
 
+def _check_document(read: Callable[[Any], object], document: Any) -> None:
+    if document is not None:
+        read(document)
+
+
 def _check_scene(row: models.BaseScene) -> None:
     check_slug(row.slug, what="scene")
     scene_from_document(row.document)
     notes_of(row.notes)
-    if row.recording is not None:
-        recording_from_document(row.recording)
+    _check_document(recording_from_document, row.recording)
 
 
 def _check_scenario(row: models.Scenario) -> None:
@@ -50,8 +54,7 @@ def _check_scenario(row: models.Scenario) -> None:
     label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
-    if row.intent is not None:
-        intent_from_document(row.intent)
+    _check_document(intent_from_document, row.intent)
     if row.reference is not None:
         check_reference(scene_of(row), modification_from_document(row.reference))
 
@@ -71,8 +74,7 @@ def _check_endpoint(row: models.Endpoint) -> None:
 def _check_contestant(row: models.Contestant) -> None:
     check_slug(row.slug, what="contestant")
     one_line("name", row.name, what="contestant")
-    if row.card is not None:
-        CARD.from_parts(row.card)
+    _check_document(CARD.from_parts, row.card)
     options_from_document(row.options)
     for role, chosen in row.roles.items():
         ModelRole(role)
@@ -87,24 +89,12 @@ def _check_job(row: models.GenerationJob) -> None:
 
 def _check_augmentation(row: models.Augmentation) -> None:
     check_picture_name("image", row.image)
-    if row.modification is not None:
-        modification_from_document(row.modification)
+    _check_document(modification_from_document, row.modification)
 
 
 def _check_submission(row: models.Submission) -> None:
     check_stored_name("stored", row.stored)
-    if row.report is not None:
-        report_from_document(row.report)
-
-
-def _check_reading(row: models.IntentReading) -> None:
-    if row.document is not None:
-        intent_from_document(row.document)
-
-
-def _check_swept(row: models.SweepValue) -> None:
-    if row.modification is not None:
-        modification_from_document(row.modification)
+    _check_document(report_from_document, row.report)
 
 
 def _check_drive(row: models.Simulation) -> None:
@@ -128,12 +118,12 @@ RULES: Mapping[type[Model], Callable[[Any], None]] = {
     models.Endpoint: _check_endpoint,
     models.EndpointModel: models.EndpointModel.clean,
     models.GenerationJob: _check_job,
-    models.IntentReading: _check_reading,
+    models.IntentReading: lambda row: _check_document(intent_from_document, row.document),
     models.Scenario: _check_scenario,
     models.SceneUpload: lambda row: check_stored_name("stored", row.stored),
     models.Simulation: _check_drive,
     models.Submission: _check_submission,
-    models.SweepValue: _check_swept,
+    models.SweepValue: lambda row: _check_document(modification_from_document, row.modification),
     models.UploadMoment: lambda row: check_stored_name("picture", row.picture),
 }
 """What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""

@@ -135,6 +135,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def _closing(labelling: LabellingRound) -> Confirmation:
     labels = FaultLabel.objects.filter(task__labelling=labelling).count()
     missing = labelling.tasks.count() - labels
+    back = reverse("faults", args=[labelling.job.code])
     return Confirmation(
         title=f"Close the labelling “{labelling.name}”?",
         facts=(
@@ -143,10 +144,6 @@ def _closing(labelling: LabellingRound) -> Confirmation:
             "It takes no more labels. This can’t be taken back.",
         ),
         button="Close the labelling",
-        back=reverse("faults", args=[labelling.job.code]),
-        crumbs=_crumbs(labelling.job),
+        back=back,
+        crumbs=(*crumbs_of(labelling.job), ("Fault labels", back)),
     )
-
-
-def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
-    return (*crumbs_of(job), ("Fault labels", reverse("faults", args=[job.code])))

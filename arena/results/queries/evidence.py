@@ -127,9 +127,6 @@ def _list_vote(
     sample = vote.shown_right.sample if snapshot.study.shows_all_samples else 0
     contestants = vote.shown_left.contestant_id, vote.shown_right.contestant_id
     pair = scores.get(Pair.of(vote.matchup.scenario_id, sample, *contestants))
-    return ListedVote(given=vote, mark=mark, judge=_judge_of(vote, snapshot), pair=pair)
-
-
-def _judge_of(vote: Vote, snapshot: Snapshot) -> str:
     person = vote.expert.person
-    return snapshot.results.judges.get(str(person.code), person.pseudonym)
+    judge = snapshot.results.judges.get(str(person.code), person.pseudonym)
+    return ListedVote(given=vote, mark=mark, judge=judge, pair=pair)

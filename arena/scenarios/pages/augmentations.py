@@ -128,7 +128,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
-            name = reference_picture(_scenario(code))
+            name = reference_picture(find_scenario(code))
         case _ if kind in set(SceneView):
             scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
             name = scene_picture(scene, SceneView(kind))
@@ -151,7 +151,7 @@ def _labelled_picture(code: uuid.UUID) -> HttpResponse:
 @page_for(*STAFF)
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
-    scenario = _scenario(code)
+    scenario = find_scenario(code)
     problem, shown = "", None
     try:
         shown = _preview(request, scenario)
@@ -177,7 +177,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:
-        shown = _preview(request, _scenario(code))
+        shown = _preview(request, find_scenario(code))
     except AugmentError as error:
         raise Http404 from error
     images = shown.messages[-1].images
@@ -186,7 +186,8 @@ def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResp
     return HttpResponse(images[number], content_type="image/png")
 
 
-def _scenario(code: uuid.UUID) -> Scenario:
+def find_scenario(code: uuid.UUID) -> Scenario:
+    """Return a scenario without its scene's recording, or raise 404."""
     rows = Scenario.objects.select_related("base_scene").defer("base_scene__recording")
     return get_object_or_404(rows, code=code)
 

@@ -10,6 +10,7 @@ from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.scenarios import services
+from arena.scenarios.pages.augmentations import find_scenario
 from arena.site.access import STAFF, act_for, form_for, user_of
 from arena.site.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
 from arena.site.forms import offer, read_code, read_json
@@ -130,7 +131,7 @@ def _named(request: HttpRequest, scene: BaseScene, name: str) -> Scenario | None
 @form_for(*STAFF)
 def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Change the drawing and the sentence of a scenario, as far as nothing needs them yet."""
-    scenario = _scenario(code)
+    scenario = find_scenario(code)
     form = ScenarioForm(request.POST or _stored(scenario))
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
@@ -198,11 +199,6 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     told = {"sentence": sentence, "statements": editing.statements_of(draft.intent)}
     parts = ("modification", "problem", "is_against_intent", "presets", "ways")
     return JsonResponse({"lines": lines} | told | {name: getattr(checked, name) for name in parts})
-
-
-def _scenario(code: uuid.UUID) -> Scenario:
-    rows = Scenario.objects.select_related("base_scene").defer("base_scene__recording")
-    return get_object_or_404(rows, code=code)
 
 
 def _editor(

@@ -73,7 +73,7 @@ def studies_page(request: HttpRequest) -> HttpResponse:
 @page_for(*STAFF)
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How far each expert is, their links, and the rules."""
-    study = _find_study(code)
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if is_imported(study):
         return redirect("results", code=code)
     study_plan, (line,) = plan_of(study), queries.progress_of([study])
@@ -100,10 +100,6 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "author_form": AuthorForm(study=study),
     }
     return render(request, "studies/study.html", context)
-
-
-def _find_study(code: uuid.UUID) -> Study:
-    return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
 
 
 @page_for(*STAFF)
@@ -258,7 +254,7 @@ def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
 
 def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     """Return the study, for whoever may have this file of it."""
-    study = _find_study(code)
+    study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if kind not in StudyFile.Kind.values:
         raise Http404
     access = results_access(user=user_of(request), study=study)
