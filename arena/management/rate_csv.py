@@ -15,7 +15,14 @@ from arena.exports.cells import csv_text
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rate
 from arena.rating.lines import HEADS as PAPERS_HEADS
-from arena.rating.lines import align_cells, caption_text, escape, latex_table, notes_by_reason
+from arena.rating.lines import (
+    PLACES_LEFT,
+    align_cells,
+    caption_text,
+    escape,
+    latex_table,
+    notes_by_reason,
+)
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
@@ -212,9 +219,9 @@ class RatedCsv:
         found = (
             f"in closed form ({_CLUSTERED[board.unit]})"
             if board.intervals is Intervals.CLOSED_FORM
-            else f"by {board.rounds} resamples ({board.unit.value})"
+            else f"by {board.rounds} resamples ({board.unit.value}), seed {board.seed}"
         )
-        return f"{METHOD_TEXTS[board.method]}; 95 % intervals {found}, seed {board.seed}"
+        return f"{METHOD_TEXTS[board.method]}; 95 % intervals {found}"
 
     @property
     def missing(self) -> list[str]:
@@ -325,7 +332,12 @@ def _write_latex(rated: RatedCsv) -> str:
         heads=heads,
         notes=rated.missing,
         caption=caption_text(
-            rated.method, votes=board.votes, experts=board.experts, scenarios=board.scenarios
+            rated.method,
+            votes=board.votes,
+            settled=0,
+            experts=board.experts if Unit.EXPERT in board.unit.kinds else 0,
+            scenarios=board.scenarios if Unit.SCENARIO in board.unit.kinds else 0,
+            more=PLACES_LEFT if "95% ranks" in heads else "",
         ),
     )
 

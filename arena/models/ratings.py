@@ -107,6 +107,11 @@ class Snapshot(Work):
         """What was asked in the votes that it rates; older ones know of one question."""
         return str(self.filters.get("question", Question.INSTRUCTION))
 
+    @property
+    def votes_cast(self) -> int:
+        """How many counted votes people gave; earlier ratings count settled ties with them."""
+        return self.votes_counted - (self.results.board.settled_ties or 0)
+
 
 class Standing(models.Model):
     """One line of a snapshot. Null ratings mean that the votes do not determine them.

@@ -42,6 +42,13 @@ _BEGIN = r"""\providecolor{llm_blue}{RGB}{105, 156, 219}
 _UPWARDS = {"Elo": r"~$\uparrow$"}
 """Where more is better."""
 
+_HOW_TO_READ = (
+    "The mean of models that are rated together is 1000, and a tie counts as half a win. Rank is "
+    "1 plus the number of models whose lower bound is above the model's upper bound."
+)
+PLACES_LEFT = r"95\% ranks are the places left with all pairs judged at once."
+"""Ends of captions, as TeX."""
+
 _SYMMETRIC = 1e-6
 """Points by which sides may differ for the sake of rounding."""
 
@@ -102,18 +109,44 @@ def says_no_order(lines: Sequence["Line"]) -> bool:
     return len(lines) > 1 and len(ranks) != 1 and set(ranks) <= {1}
 
 
-def caption_text(method: str, *, votes: int, experts: int, scenarios: int) -> str:
-    """The caption as TeX: what is shown, by which method, on how many votes.
+def votes_text(votes: int, settled: int | None) -> str:
+    """How many votes count, and apart from them how many ties on pairs that nobody was shown.
+
+    Args:
+        votes: Without these ties.
+        settled: How many ties; None where they were not counted.
+    """
+    if settled is None:
+        return f"{votes} votes"
+    ties = f" and {count_text(settled, 'tie| on pairs that nobody was shown')}" if settled else ""
+    return f"{count_text(votes, 'vote|')}{ties}"
+
+
+def count_text(number: int, what: str) -> str:
+    """A number of things, whose plural has an s in the place of |."""
+    return f"{number} {what.replace('|', '' if number == 1 else 's')}"
+
+
+def caption_text(
+    method: str, *, votes: int, settled: int | None, experts: int, scenarios: int, more: str = ""
+) -> str:
+    """The caption as TeX: what is shown, by which method, on how many votes, and how to read it.
 
     Args:
         method: As plain text.
-        votes: How many were counted.
-        experts: How many gave them; up to 1 is not known, or not worth a word.
+        votes: How many people gave.
+        settled: How many ties count beside them; None for earlier ratings, which say less.
+        experts: How many gave votes; 0 is not known.
         scenarios: On how many, likewise.
+        more: Sentences to end with, as TeX.
     """
-    numbers = ((votes, "votes"), (experts, "experts"), (scenarios, "scenarios"))
-    said = ", ".join(f"{number} {what}" for number, what in numbers if number > 1)
-    return rf"Elo with 95\% confidence intervals: {escape(method)}; {said}."
+    is_old = settled is None
+    numbers = ((experts, "expert|"), (scenarios, "scenario|"))
+    counts = [count_text(number, what) for number, what in numbers if number > is_old]
+    if votes > 1 or not is_old:
+        counts.insert(0, votes_text(votes, settled))
+    text = rf"Elo with 95\% confidence intervals: {escape(method)}; {', '.join(counts)}."
+    return text if is_old else f"{text} {_HOW_TO_READ} {more}".rstrip()
 
 
 def latex_table(

@@ -55,6 +55,8 @@ its standings alone."""
 
 _SINCE_2, _SINCE_3, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 5}
 """Of fields that documents of earlier versions do not have, unless they say something."""
+_WHERE_SET = {"since": VERSION + 1}
+"""Of fields that came without a version of their own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,6 +73,8 @@ class BoardRemarks:
             where votes hang together in ways that the intervals do not know of.
         p_values: Of pairs, adjusted for all of them; None as `above`.
         seems_above: As `above` where that is None, because it rests on few experts or scenarios.
+        settled: How many ties of pairs that nobody was shown count for whom; none for those
+            without, None in ratings that did not count them apart.
     """
 
     reasons: tuple[Kept, ...] | None = None
@@ -82,7 +86,13 @@ class BoardRemarks:
     parts: dict[str, int] = field(default_factory=dict)
     above: tuple[tuple[str, str], ...] | None = None
     p_values: tuple[PairP, ...] | None = field(default=None, metadata=_SINCE_3)
-    seems_above: tuple[tuple[str, str], ...] | None = field(default=None, metadata=_SINCE_5)
+    seems_above: tuple[tuple[str, str], ...] | None = field(default=None, metadata=_WHERE_SET)
+    settled: dict[str, int] | None = field(default=None, metadata=_WHERE_SET)
+
+    @property
+    def settled_ties(self) -> int | None:
+        """How many such ties count, each for two contestants; None where nobody counted them."""
+        return None if self.settled is None else sum(self.settled.values()) // 2
 
     def answer(self, lines: Sequence[Line], slugs: Sequence[str], votes: int) -> str:
         """Say in one sentence who is better than whom.

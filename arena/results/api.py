@@ -53,6 +53,9 @@ class StandingDocument(serializers.Serializer[Any]):
     name = serializers.CharField()
     kind = serializers.CharField()
     simulated = serializers.BooleanField()
+    settled_ties = serializers.IntegerField(
+        help_text="Ties on pairs that nobody was shown, which are no votes."
+    )
     part = serializers.IntegerField(
         help_text="Ratings compare only those with the same number here."
     )
@@ -63,6 +66,8 @@ class StandingDocument(serializers.Serializer[Any]):
         stored = {name: kinds[name]() for name in STORED}
         stored["elo"] = serializers.FloatField(source="rating", allow_null=True)
         del stored["rating"]
+        for name in ("votes", "ties"):
+            stored[name] = serializers.IntegerField(source=f"{name}_cast")
         return {**super().get_fields(), **stored}
 
 
@@ -80,7 +85,10 @@ class SnapshotDocument(RowDocument[Snapshot]):
 
     study = serializers.UUIDField(source="study.code")
     resample = serializers.CharField(source="resampling_unit")
-    votes = serializers.IntegerField(source="votes_counted")
+    votes = serializers.IntegerField(source="votes_cast")
+    settled_ties = serializers.IntegerField(
+        source="results.board.settled_ties", allow_null=True, help_text="null where uncounted"
+    )
     status = serializers.CharField(
         source="reason", help_text="why there is no rating, if there is none"
     )
@@ -91,7 +99,7 @@ class SnapshotDocument(RowDocument[Snapshot]):
         fields = (
             *("code", "study", "state", "progress", "method", "rounds", "resample", "intervals"),
             *("seed", "filters", "votes", "votes_sha256", "is_early", "includes_simulated"),
-            *("status", "made_at", "table"),
+            *("status", "made_at", "table", "settled_ties"),
         )
 
     @extend_schema_field(TableDocument(allow_null=True))

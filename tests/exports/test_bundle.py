@@ -18,7 +18,7 @@ from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.exports.writers import MANIFEST, bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
-from arena.studies.services.opening import close_study
+from arena.studies.services.opening import close_study, product_version
 from augment.errors import UnknownName
 from tests.full_study import Size, full_study
 from tests.study_rows import a_study, vote
@@ -52,7 +52,9 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
     assert manifest["votes"]["sha256"] == hashlib.sha256(files["votes.csv"]).hexdigest()
     assert (manifest["method"]["seed"], manifest["method"]["rounds"]) == (4, 300)
     assert manifest["filters"]["kinds"] == ["main"]
-    assert set(manifest["versions"]) == {"python", "numpy", "scipy", "results", "votes"}
+    others = {"python", "numpy", "scipy", "results", "votes"}
+    assert set(manifest["versions"]) == others | {"scenario-arena"}
+    assert manifest["versions"]["scenario-arena"] == product_version()
     wanted = ("csv", "json", "parquet", "tex", "svg", "pdf", "png")
     assert {f"leaderboard.{suffix}" for suffix in wanted} < set(files)
     person = snapshot.study.experts.order_by("pk")[0].person

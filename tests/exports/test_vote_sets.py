@@ -2,13 +2,18 @@
 
 import csv
 import io
+import json
 from datetime import datetime
 
 import pytest
 from pyarrow import parquet
 
-from arena.models import Study, Vote
+from arena.models import Snapshot, Study, Vote
+from arena.results.api import SnapshotDocument
+from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS, plain_text
+from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import Filters, last_vote_of, vote_set
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.ratings import votes_of
@@ -69,6 +74,8 @@ def test_settled_pairs_are_ties_of_experts_but_no_judgements_of_theirs() -> None
     )
     settled = whole.votes_counted - voted
     assert alone.votes_counted == voted
+    for rating, ties in ((whole, settled), (alone, 0)):
+        _check_that_ties_stand_apart(rating, voted, ties)
     assert settled == pytest.approx(6 * voted / study.scenarios.count() / 3, abs=6)
     assert whole.results.board.experts == alone.results.board.experts
     for name in ("agreement", "side"):
@@ -78,6 +85,31 @@ def test_settled_pairs_are_ties_of_experts_but_no_judgements_of_theirs() -> None
     assert any("are left out" in warning for warning in alone.results.board.warnings)
     planned = {frozenset((pair.a, pair.b)): pair for pair in whole.results.pairs}
     assert planned[frozenset(("ann", "bob"))].planned == planned[frozenset(("ann", "bob"))].votes
+
+
+def _check_that_ties_stand_apart(rating: Snapshot, voted: int, ties: int) -> None:
+    """Check every file, page and document: the votes of people, and beside them unshown ties."""
+    table = leaderboard_table(rating)
+    both = f"{voted} votes" + (f" and {ties} ties on pairs that nobody was shown" if ties else "")
+    assert count_settled(rating) == ties
+    assert f"{both} counted; left out" in plain_text(table)
+    latex = FORMATS["latex"].write(table).decode()
+    assert f"; {both}, 2 experts, 6 scenarios. The mean of models" in latex
+    assert f"Rating {rating.code} of {rating.made_at:%Y-%m-%d}.}}" in latex
+    assert "seed" not in latex
+    lines = list(csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode())))
+    assert list(lines[0])[-2:] == ["settled_ties", "votes_sha256"]
+    document = json.loads(FORMATS["json"].write(table))
+    assert (document["votes"]["counted"], document["votes"]["settled_ties"]) == (voted, ties)
+    listed = SnapshotDocument(rating).data
+    assert (listed["votes"], listed["settled_ties"]) == (voted, ties)
+    for rows in (lines, document["standings"], listed["table"]["rows"]):
+        assert sum(int(row["votes"]) for row in rows) == 2 * voted
+        assert sum(int(row["settled_ties"]) for row in rows) == 2 * ties
+        for row in rows:
+            parts = (int(row[name]) for name in ("wins", "ties", "losses"))
+            assert sum(parts) == int(row["votes"])
+    assert {line["votes_sha256"] for line in lines} == {rating.votes_sha256}
 
 
 def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> None:

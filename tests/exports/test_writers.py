@@ -2,6 +2,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
@@ -53,6 +54,7 @@ def table(
         "resampling_unit": "vote",
         "seed": 7,
         "votes_counted": 5760,
+        "made_at": datetime(2026, 1, 5, tzinfo=UTC),
         "votes_sha256": "ab" * 32,
     }
     snapshot = Snapshot(study=Study(name=study), **values | rating)

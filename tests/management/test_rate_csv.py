@@ -44,9 +44,10 @@ def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count
     votes: Any,
 ) -> None:
     lines = clustered()
-    first = run(file=votes(*lines, head=WITH_CLUSTERS), seed=3, rounds=200)
-    assert first == run(file=votes(*reversed(lines), head=WITH_CLUSTERS), seed=3, rounds=200)
-    assert first != run(file=votes(*lines, head=WITH_CLUSTERS), seed=4, rounds=200)
+    how: dict[str, Any] = {"rounds": 200, "intervals": "resamples"}
+    first = run(file=votes(*lines, head=WITH_CLUSTERS), seed=3, **how)
+    assert first == run(file=votes(*reversed(lines), head=WITH_CLUSTERS), seed=3, **how)
+    assert first != run(file=votes(*lines, head=WITH_CLUSTERS), seed=4, **how)
 
 
 def test_csv_cells_are_no_formulas(votes: Any, capsys: pytest.CaptureFixture[str]) -> None:

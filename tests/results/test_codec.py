@@ -13,6 +13,7 @@ from arena.exports.formats import csv_of
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     VERSION,
+    BoardRemarks,
     Results,
     read_results,
     read_text,
@@ -65,6 +66,9 @@ def test_what_a_version_brought_is_a_key_of_it_also_when_it_is_empty() -> None:
     }
     assert (read_results(document), read_results({})) == (Results(version=VERSION), Results())
     assert results_document(Results()) == {}
+    apart = Results(version=VERSION, board=BoardRemarks(settled={}))
+    assert "settled" not in document["board"], "as ratings of this version were stored before it"
+    assert read_results(results_document(apart)) == apart
 
 
 def test_names_in_an_older_sentence_are_joined_and_groups_told_apart() -> None:

@@ -28,7 +28,7 @@ from arena.results.services.stored_rows import (
     label_of,
 )
 from arena.site.services import UNFINISHED
-from arena.studies.services.opening import FILE_NAME, preregistration_sha256
+from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.analyses import measure_job
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
@@ -236,6 +236,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
             "allow_simulated": study.allow_simulated,
             "preregistration": preregistration_sha256(study) or None,
         },
+        "product": product_version(),
         "packages": {name: version(name) for name in PACKAGES},
         "migrations": applied_migrations(),
         "rows": counts,

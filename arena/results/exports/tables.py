@@ -13,7 +13,7 @@ from django.db.models import F
 from arena.exports.formats import Dtype
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.rating.lines import Line, notes_by_reason, says_no_order
+from arena.rating.lines import Line, notes_by_reason, says_no_order, votes_text
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.results.queries.votes import LeftOut
@@ -50,7 +50,10 @@ def method_text(rating: Snapshot) -> str:
     method = METHOD_TEXTS[rating.method]
     is_usual = rating.study.questions == [Question.INSTRUCTION]
     asked = "" if is_usual else f", question {rating.question}"
-    return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}{asked}"
+    # Nothing is drawn for a closed form; earlier ratings name the seed all the same.
+    is_drawn = rating.results.board.settled_ties is None or not is_closed_form(rating)
+    seed = f", seed {rating.seed}" if is_drawn else ""
+    return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{asked}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +64,7 @@ class Row(Line):
         variant: The recipe's name as it ends the contestant's name, empty without.
         options: How it asked, a JSON object with sorted names; empty for who asks no model.
         sends: What of that its models take, by role, in the same form.
+        settled_ties: How many of `votes` and `ties` are of pairs that nobody was shown.
         card: Who made a submission and how; None for all others.
     """
 
@@ -70,12 +74,23 @@ class Row(Line):
     variant: str = ""
     options: str = ""
     sends: str = ""
+    settled_ties: int = 0
     card: dict[str, Any] | None = None
 
     @property
     def model(self) -> str:
         """The name, with "(simulated)" where that is so."""
         return shown_name(self.name, self.simulated)
+
+    @property
+    def votes_cast(self) -> int:
+        """The votes that people gave."""
+        return self.votes - self.settled_ties
+
+    @property
+    def ties_cast(self) -> int:
+        """The ties among them."""
+        return self.ties - self.settled_ties
 
     @property
     def score_text(self) -> str:
@@ -110,6 +125,16 @@ class LeaderboardTable:
     def question(self) -> str:
         """What was asked in the votes that are rated."""
         return self.snapshot.question
+
+    @property
+    def votes_sha256(self) -> str:
+        """The SHA-256 of the file of counted votes."""
+        return self.snapshot.votes_sha256
+
+    @property
+    def votes_text(self) -> str:
+        """How many votes count, and apart from them the ties of pairs that nobody was shown."""
+        return votes_text(self.snapshot.votes_cast, self.snapshot.results.board.settled_ties)
 
     @property
     def is_simulated(self) -> bool:
@@ -170,7 +195,10 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     if board.order:
         standings.sort(key=lambda standing: board.order.index(standing.slug))
     rows = [
-        _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
+        replace(
+            _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0),
+            settled_ties=(board.settled or {}).get(standing.slug, 0),
+        )
         for standing in standings
     ]
     if says_no_order(rows):
@@ -228,6 +256,7 @@ class Column:
         printed: Its head in LaTeX and in the terminal.
         text_field: What is printed, in LaTeX and in the terminal.
         identifies: Says whose line it is, which stands first in JSON and where it is printed.
+        is_old: Also of ratings that did not count settled ties apart.
     """
 
     name: str = ""
@@ -237,6 +266,7 @@ class Column:
     printed: str = ""
     text_field: str = ""
     identifies: bool = False
+    is_old: bool = True
 
     def value_of(self, table: LeaderboardTable, row: Row) -> object:
         """What stands in files."""
@@ -261,9 +291,9 @@ COLUMNS = (
     _column("lower", Dtype.NUMBER),
     _column("upper", Dtype.NUMBER),
     Column(field="interval_text", printed="95% CI"),
-    _column("votes", Dtype.WHOLE, printed="Votes"),
+    _column("votes", Dtype.WHOLE, field="votes_cast", printed="Votes"),
     _column("wins", Dtype.WHOLE),
-    _column("ties", Dtype.WHOLE),
+    _column("ties", Dtype.WHOLE, field="ties_cast"),
     _column("losses", Dtype.WHOLE),
     _column("slug", identifies=True),
     _column("kind", identifies=True),
@@ -280,9 +310,16 @@ COLUMNS = (
     _column("options"),
     _column("question", key=""),
     _column("sends"),
+    _column("settled_ties", Dtype.WHOLE, is_old=False),
+    _column("votes_sha256", key="", is_old=False),
 )
 
-IN_FILES = tuple(column for column in COLUMNS if column.name)
 _WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
-IN_JSON = tuple(column for column in _WHOSE_FIRST if column.key)
 PRINTED = tuple(column for column in _WHOSE_FIRST if column.printed)
+
+
+def columns_in(table: LeaderboardTable, *, is_json: bool = False) -> list[Column]:
+    """Return those of files, or of JSON, that the rating of a table has."""
+    is_new = table.snapshot.results.board.settled_ties is not None
+    columns, place = (_WHOSE_FIRST, "key") if is_json else (COLUMNS, "name")
+    return [one for one in columns if getattr(one, place) and (is_new or one.is_old)]

@@ -25,17 +25,16 @@ from arena.exports.formats import (
     table_formats,
 )
 from arena.models import Snapshot
-from arena.rating.lines import align_cells, caption_text, escape, latex_table
+from arena.rating.lines import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.agreement import FORMATS as AGREEMENT_FORMATS
 from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import (
-    IN_FILES,
-    IN_JSON,
     PRINTED,
     LeaderboardTable,
     Row,
+    columns_in,
     leaderboard_table,
 )
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
@@ -52,10 +51,11 @@ MANIFEST = "manifest.json"
 
 def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
     """Return one row a contestant; in CSV numbers have two decimals."""
+    columns = columns_in(table)
     return Sheet(
         name="leaderboard",
-        columns={column.name: column.kind for column in IN_FILES},
-        rows=[[column.value_of(table, row) for column in IN_FILES] for row in table.rows],
+        columns={column.name: column.kind for column in columns},
+        rows=[[column.value_of(table, row) for column in columns] for row in table.rows],
         number=".2f",
     )
 
@@ -69,7 +69,7 @@ def leaderboard_json(table: LeaderboardTable) -> bytes:
 
 def _document(table: LeaderboardTable) -> dict[str, Any]:
     """Return what JSON files say of a rating beside its lines."""
-    rating = table.snapshot
+    rating, settled = table.snapshot, table.snapshot.results.board.settled_ties
     # Older ratings had no word for resamples.
     notes: dict[str, Any] = {"intervals": rating.intervals} if table.is_closed_form else {}
     if rating.covariates:
@@ -91,9 +91,10 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
             "seed": rating.seed,
         },
         "votes": {
-            "counted": rating.votes_counted,
+            "counted": rating.votes_cast,
             "left_out": table.left_out,
             "sha256": rating.votes_sha256,
+            **({} if settled is None else {"settled_ties": settled}),
         },
         "preregistration": table.preregistration or None,
         "hypotheses": [_hypothesis(answer) for answer in table.hypotheses],
@@ -109,9 +110,8 @@ def plain_text(table: LeaderboardTable) -> str:
     ]
     lines = align_cells(grid)
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
-    votes = table.snapshot.votes_counted
     lines += ["", *(f"{line}." for line in table.missing)]
-    lines.append(f"{votes} votes counted; left out: {left_out or 'none'}.")
+    lines.append(f"{table.votes_text} counted; left out: {left_out or 'none'}.")
     lines.append(f"{table.method_text}.")
     if table.frozen_text:
         lines.append(f"{table.frozen_text[0].upper()}{table.frozen_text[1:]}.")
@@ -126,9 +126,11 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
     words = [word for word, holds in marks.items() if holds]
     caption = caption_text(
         table.method_text,
-        votes=rating.votes_counted,
+        votes=rating.votes_cast,
+        settled=board.settled_ties,
         experts=board.experts,
         scenarios=board.scenarios,
+        more=f"{PLACES_LEFT} Rating {rating.code} of {rating.made_at:%Y-%m-%d}.",
     )
     text = latex_table(
         (
@@ -137,7 +139,7 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
         ),
         heads=[column.printed for column in PRINTED],
         comments=(
-            f"{table.study}: {rating.votes_counted} votes; {table.method_text}",
+            f"{table.study}: {table.votes_text}; {table.method_text}",
             f"votes sha256 {rating.votes_sha256}",
             *((table.frozen_text,) if table.frozen_text else ()),
             *table.warnings,
@@ -247,7 +249,8 @@ def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
 
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
-    values = {column.key: column.value_of(table, row) for column in IN_JSON}
+    columns = columns_in(table, is_json=True)
+    values = {column.key: column.value_of(table, row) for column in columns}
     part: dict[str, Any] = {"part": row.part} if table.has_parts else {}
     part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {

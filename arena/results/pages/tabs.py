@@ -60,12 +60,16 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     names = {row.slug: row.name for row in table.rows}
     order = trust.strength.order if trust.strength else ()
     both_miss = sum(pair.both_miss for pair in snapshot.results.pairs)
+    settled = count_settled(snapshot)
+    cast = max(snapshot.votes_counted - settled, 1)
+    ties = round((trust.tie_share or 0.0) * snapshot.votes_counted)
     return plot(table.rows) | {
         "largest_move": max(moves, default=None),
-        "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
+        "ties": ties,
+        "tie_share": (ties - settled) / cast if settled else trust.tie_share,
         "all_tied": trust.tie_share == 1.0,
         "both_miss": both_miss,
-        "both_miss_share": both_miss / max(snapshot.votes_counted, 1),
+        "both_miss_share": both_miss / cast,
         "weighed_order": [names[slug] for slug in order],
     }
 

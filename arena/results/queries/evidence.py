@@ -76,6 +76,8 @@ def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
 
 def count_settled(snapshot: Snapshot) -> int:
     """Return how many ties of pairs that nobody was shown count in a rating."""
+    if (ties := snapshot.results.board.settled_ties) is not None:
+        return ties
     is_possible = snapshot.study.rules.get("identical") and not is_imported(snapshot.study)
     if not is_possible or Filters.of_document(snapshot.filters).leave_out_settled:
         return 0

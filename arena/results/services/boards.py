@@ -24,7 +24,7 @@ from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.studies.queries import authors_of
-from arena.studies.services.opening import preregistration_sha256, product_version
+from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, Scenario
 from augment.services.events import log_change
@@ -272,8 +272,8 @@ def _pooled(study: Study, votes: int) -> PooledStudy:
 
 def _versions() -> dict[str, str]:
     """Of what the numbers depend on, and of the metrics that have one of their own."""
-    ours = {"scenario-arena": product_version(), "realism": REALISM_VERSION}
-    return {name: str(version) for name, version in (ours | software_versions()).items()}
+    versions = software_versions() | {"realism": REALISM_VERSION}
+    return {name: str(version) for name, version in versions.items()}
 
 
 def _without_equal_ranks(lines: Sequence[Line]) -> list[Line]:

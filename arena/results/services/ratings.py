@@ -1,9 +1,11 @@
 """Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
 
 import platform
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import chain
 from typing import TypedDict, TypeVar, Unpack
 
 import numpy
@@ -46,6 +48,7 @@ from arena.results.services.trust import board_remarks, trust
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.studies.queries import authors_of
+from arena.studies.services.opening import product_version
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, UnknownName
 from augment.services.clock import Moment
@@ -262,6 +265,7 @@ def votes_version_of(snapshot: Snapshot) -> int:
 def software_versions() -> dict[str, str | int]:
     """The versions of what the numbers of a rating depend on."""
     return {
+        "scenario-arena": product_version(),
         "python": platform.python_version(),
         "numpy": numpy.__version__,
         "scipy": scipy.__version__,
@@ -381,14 +385,14 @@ def _results(
     study = snapshot.study
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
+    ties = [(vote.left, vote.right) for vote in votes.counted if vote.kind == AUTOMATIC]
     planned = analysis.planned_pairs(study, filters)
-    planned.update(
-        frozenset((vote.left, vote.right)) for vote in votes.counted if vote.kind == AUTOMATIC
-    )
+    planned.update(map(frozenset, ties))
+    settled = dict(sorted(Counter(chain.from_iterable(ties)).items()))
     remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
     return Results(
         version=RESULTS_VERSION,
-        board=board_remarks(board, arrays, *filter(None, [remark])),
+        board=replace(board_remarks(board, arrays, *filter(None, [remark])), settled=settled),
         trust=trust(arrays, votes, seed=snapshot.seed),
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
         types=analysis.by_type(arrays, board),
