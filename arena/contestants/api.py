@@ -44,6 +44,7 @@ class ContestantDocument(RowDocument[Contestant]):
 
     endpoint = serializers.CharField(source="endpoint.label", default=None, allow_null=True)
     frozen_options = serializers.DictField(allow_null=True, read_only=True)
+    sends = serializers.DictField(allow_null=True, read_only=True)
 
     class Meta:
         model = Contestant
