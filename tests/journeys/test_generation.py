@@ -24,8 +24,8 @@ Endpoint.objects.create(label="waiting", base_url="{base_url}", is_simulated=Tru
 contestants.add_contestant(
     ContestantRequest(slug="waiting", variant="otm", endpoint="waiting", model="waits")
 )
-for number in range(1, 4):
-    add_scenario(f"street-{{number}}")
+for number in range(1, 4):  # the last has the first one's prompt, which waits for no other
+    add_scenario(f"street-{{number}}", instruction=f"Set out {{1 + number % 2}} cones.")
 """
 CHOSEN = ("--contestants", "reference", "waiting", "--scenarios", "all")
 UPLOAD_THEN_GENERATE = """
