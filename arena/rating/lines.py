@@ -85,6 +85,11 @@ def interval_text(rating: float | None, lower: float | None, upper: float | None
     return f"-{max(rating - lower, 0.1):.1f}/+{max(upper - rating, 0.1):.1f}"
 
 
+def join_counts(votes: int, settled_ties: int | None) -> str:
+    """Return votes as they were cast, and after a plus ties on pairs that nobody was shown."""
+    return f"{votes} + {settled_ties}" if settled_ties else str(votes)
+
+
 def with_minus(text: str) -> str:
     """A printed number as a page shows it: a real minus sign, a dash where it is unknown."""
     return "–" if text == UNKNOWN else text.replace("-", MINUS)

@@ -13,7 +13,7 @@ from django.db.models import F
 from arena.exports.formats import Dtype
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.rating.lines import Line, notes_by_reason, says_no_order, votes_text
+from arena.rating.lines import Line, join_counts, notes_by_reason, says_no_order, votes_text
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.results.queries.votes import LeftOut
@@ -86,6 +86,11 @@ class Row(Line):
     def votes_cast(self) -> int:
         """The votes that people gave."""
         return self.votes - self.settled_ties
+
+    @property
+    def votes_counted_text(self) -> str:
+        """The votes that people gave, and after a plus the ties that nobody was shown."""
+        return join_counts(self.votes_cast, self.settled_ties)
 
     @property
     def ties_cast(self) -> int:
