@@ -124,7 +124,9 @@ def _zipped(**entries: bytes) -> bytes:
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in entries.items():
-            archive.writestr(zipfile.ZipInfo(name.replace("__", "/").replace("_xml", ".xml")), data)
+            archive.writestr(
+                zipfile.ZipInfo(name.replace("__", "/").replace("_xml", ".xml")), data
+            )
     return content.getvalue()
 
 
