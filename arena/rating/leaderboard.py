@@ -10,9 +10,8 @@ with rating, interval and rank, and what must be said with the numbers.
     board.status, board.explanation, board.warnings  # always shown with the numbers
 """
 
-import math
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -174,7 +173,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     lines = _blank_lines(votes.names, counted.tolist())
     across = np.zeros((len(lines), len(lines)), dtype=np.bool_)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
-        _fill(lines, present[part], number, found)
+        fill_lines(lines, present[part], number, found)
     if chains.reaches.any():
         _rank_across(lines, present, counting, chains, rules)
         if rules.intervals is Intervals.CLOSED_FORM:
@@ -252,17 +251,19 @@ def _blank_lines(names: tuple[str, ...], counted: list[list[int]]) -> list[Line]
     ]
 
 
-def _fill(lines: list[Line], members: IntArray, number: int, found: Rated) -> None:
-    """Put the numbers of a part into its lines: NaN is no bound, 0 no rank."""
-    columns = ("rating", "lower", "upper", "rank", "rank_best", "rank_worst")
+def fill_lines(lines: list[Line], members: IntArray, number: int, found: Rated) -> None:
+    """Put what a part has under the names of a line's fields into its lines."""
+    columns = {
+        column.name: np.asarray(values).tolist()
+        for column in fields(lines[members[0]])
+        if (values := getattr(found, column.name, None)) is not None
+    }
     for place, index in enumerate(members):
-        values: dict[str, Any] = {}
-        for name in columns:
-            column = getattr(found, name)
-            value = None if column is None else column[place].item()
-            is_missing = value is None or math.isnan(value)
-            values[name] = None if is_missing or (name.startswith("rank") and not value) else value
-        lines[index] = replace(lines[index], part=number, note=found.note[place], **values)
+        values = {name: column[place] for name, column in columns.items()}
+        for name, value in values.items():  # NaN is no bound, 0 no rank
+            if value != value or (name.startswith("rank") and not value):
+                values[name] = None
+        lines[index] = replace(lines[index], part=number, **values)
 
 
 def _rank_across(
