@@ -1,7 +1,7 @@
 """A directed line through points, read by its arc length.
 
-The four verbs of a lane: `position(s, d)`, `project(point)`, `heading_at(s)` and (on the lane)
-`width_at(s)`. s runs along the line from its first point, d to the left of it, both in metres.
+The verbs of a lane: `position(s, d)`, `project(x, y)` and `heading_at(s)`. s runs along the line
+from its first point, d to the left of it, both in metres.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def test_every_name_that_may_be_shared_is_shared() -> None:
     assert {name for name in shared_names() if len(homes[name]) < 2} == set()
 
 
-def test_no_public_function_is_called_by_a_bare_participle() -> None:
+def test_no_function_of_a_module_is_called_by_a_bare_participle() -> None:
     functions = [
         f"{name}.{node.name}"
         for name, tree in modules()

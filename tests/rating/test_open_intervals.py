@@ -1,5 +1,6 @@
 """Votes that bound some contestants on one side only, or not at all: the others keep theirs."""
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from arena.rating.bootstrap import percentile_interval
 from arena.rating.chains import Status
 from arena.rating.comparisons import Comparisons
-from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
+from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, fill_lines, rate
+from arena.rating.parts import Rated
 from arena.rating.ranking import ranks, shown_ranks
 from arena.rating.rules import Unit
 from tests.rating.votes import Comparison, as_arrays, by_votes, named, versus
@@ -255,3 +257,22 @@ def test_two_way_intervals_are_those_of_the_rounds() -> None:
     assert line.lower is not None
     assert line.upper is not None
     assert line.upper - line.lower == pytest.approx(high - low, rel=0.05)
+
+
+def test_a_new_column_of_a_part_reaches_the_line_by_its_name() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class WiderLine(Line):
+        width: float | None = None
+
+    @dataclass(frozen=True, kw_only=True)
+    class WiderRated(Rated):
+        width: object
+
+    lines: list[Line] = [WiderLine(name=name, rank=7) for name in "abc"]
+    part = WiderRated(note=("", "open"), rank=np.array([1, 0]), width=np.array([5.0, np.nan]))
+    fill_lines(lines, np.array([2, 0]), 3, part)
+    assert lines == [
+        WiderLine(name="a", part=3, note="open"),
+        WiderLine(name="b", rank=7),
+        WiderLine(name="c", part=3, rank=1, width=5.0),
+    ]
