@@ -9,7 +9,7 @@ from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
 from arena.people.services import create_person
-from arena.voting.services.casting import cast_vote, decision_of
+from arena.voting.services.casting import Decision, cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
@@ -144,8 +144,8 @@ def shown_again(matchup: Matchup) -> Matchup:
 def vote(matchup: Matchup, outcome: str = "left", **more: object) -> Vote:
     """A vote with a fresh key unless one is given."""
     arguments: dict[str, object] = {"key": uuid.uuid4(), **more}
-    decision = decision_of(
-        matchup_code=matchup.code,
+    decision = Decision(
+        matchup=matchup.code,
         outcome=outcome,
         **arguments,  # type: ignore[arg-type]
     )

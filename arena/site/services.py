@@ -12,10 +12,10 @@ from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
-from arena.studies.services.experts import Complaint, check_complaint
+from arena.studies.services.experts import Complaint
 from arena.studies.services.opening import check_questions, check_seed
 from arena.studies.services.planning import rules_of
-from arena.voting.services.casting import decision_of
+from arena.voting.services.casting import Decision
 from augment.errors import AugmentError
 from augment.models import FAILED, Augmentation, GenerationJob, Work
 from augment.services import row_rules
@@ -44,9 +44,9 @@ def check_row(row: models.Model) -> None:
             for name in ("original_image", "left_image", "right_image"):
                 check_picture_name(name, getattr(row, name))
         case Vote():
-            decision_of(
-                matchup_code=uuid4(),
+            Decision(
                 key=row.key,
+                matchup=uuid4(),
                 outcome=row.outcome,
                 both_miss=row.both_miss,
                 strength=row.strength,
@@ -55,7 +55,10 @@ def check_row(row: models.Model) -> None:
                 aids=row.aids.split(),
             )
         case Report():
-            check_complaint(_complaint_of(row))
+            side = row.side or Report.Side.BOTH  # reports from before it was asked name none
+            Complaint(
+                key=row.key, matchup=uuid4(), reason=row.reason, side=side, comment=row.comment
+            )
         case Snapshot():
             check_seed(row.seed)
             Method(row.method)
@@ -65,11 +68,6 @@ def check_row(row: models.Model) -> None:
             raise ValueError(f"note: at most {NOTE_LENGTH} characters are allowed")
         case _ if rule := row_rules.RULES.get(type(row)):
             rule(row)
-
-
-def _complaint_of(row: Report) -> Complaint:
-    side = row.side or Report.Side.BOTH  # reports from before it was asked name none
-    return Complaint(reason=row.reason, side=side, comment=row.comment)
 
 
 def check_votes() -> None:

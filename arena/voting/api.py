@@ -28,7 +28,7 @@ from arena.studies.services.experts import SIDES, Complaint, report
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
-from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
+from arena.voting.services.casting import LONGEST_COMMENT, Decision, receive_vote
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}
@@ -176,8 +176,7 @@ class VotesView(ApiView):
         The same key counts once, however often it arrives.
         """
         n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
-        decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
-        received = receive_vote(expert=self.user, decision=decision)
+        received = receive_vote(expert=self.user, decision=Decision(outcome=outcome, **given))
         progress = received.progress
         coming = upcoming(study=received.study, expert=self.user, n=n)
         return Response(
@@ -201,10 +200,8 @@ class ReportsView(ApiView):
 
         The same key counts once, however often it arrives.
         """
-        said = Complaint(
-            reason=given["reason"], side=SIDES[given["side"]], comment=given["comment"]
-        )
-        report(expert=self.user, matchup_code=given["matchup"], key=given["key"], said=said)
+        side = SIDES[given.pop("side")]
+        report(expert=self.user, complaint=Complaint(side=side, **given))
         return {"saved": True}
 
 

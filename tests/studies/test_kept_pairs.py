@@ -22,9 +22,7 @@ def test_a_pair_whose_repeat_was_judged_is_not_handed_over(is_vote: bool) -> Non
     else:
         report(
             expert=repeat.expert,
-            matchup_code=repeat.code,
-            key=uuid.uuid4(),
-            said=Complaint(reason="other", comment=""),
+            complaint=Complaint(key=uuid.uuid4(), matchup=repeat.code, reason="other", comment=""),
         )
     taken = hand_over(study=study, username="eva", to=["finn"])
     kept = {row.pk for row in matchups_of(study, "eva")}

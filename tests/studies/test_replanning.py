@@ -56,9 +56,7 @@ def test_a_pair_that_was_reported_but_not_judged_stays_where_it_is() -> None:
     first = matchups_of(study, "eva")[0]
     report(
         expert=first.expert,
-        matchup_code=first.code,
-        key=uuid.uuid4(),
-        said=Complaint(reason="picture_wrong"),
+        complaint=Complaint(key=uuid.uuid4(), matchup=first.code, reason="picture_wrong"),
     )
     assert hand_over(study=study, username="eva", to=["finn"]) == {"finn": 8}
     assert matchups_of(study, "eva") == [first]

@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from arena.errors import InvalidVote, NotYours
 from arena.models import Matchup, Study, Vote
 from arena.voting.queries.showings import drives_of_pair
-from arena.voting.services.casting import Decision, cast_vote, decision_of
+from arena.voting.services.casting import Decision, cast_vote
 from augment.models import Augmentation
 from augment.simulation.trace import blind_trace
 from tests.drives import drive_pictures
@@ -31,7 +31,7 @@ def pictures(*places: str) -> list[Augmentation]:
 
 
 def decided(matchup: Matchup, *aids: str) -> Decision:
-    return decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left", aids=aids)
+    return Decision(matchup=matchup.code, key=uuid.uuid4(), outcome="left", aids=aids)
 
 
 def eva() -> User:

@@ -8,7 +8,7 @@ from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, To
 from arena.models import EarlyLook, Vote
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes, own_votes, upcoming
-from arena.voting.services.casting import PACE_WINDOW, cast_vote, decision_of, receive_vote
+from arena.voting.services.casting import PACE_WINDOW, Decision, cast_vote, receive_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 
@@ -81,8 +81,8 @@ def test_changes_count_towards_the_pace_that_a_person_can_keep(
     matchup = matchups_of(a_study(), "eva")[0]
     first = vote(matchup, "left")
     settings.VOTES_PER_S = allowed / PACE_WINDOW.total_seconds()
-    change = decision_of(
-        matchup_code=matchup.code, key=uuid.uuid4(), outcome="right", supersedes=first.key
+    change = Decision(
+        matchup=matchup.code, key=uuid.uuid4(), outcome="right", supersedes=first.key
     )
     if is_stored:
         receive_vote(expert=matchup.expert, decision=change)
@@ -114,7 +114,7 @@ def test_who_has_opened_the_results_of_a_study_no_longer_votes_in_it() -> None:
 def test_nobody_votes_on_somebody_elses_matchup() -> None:
     theirs = matchups_of(a_study(), "finn")[0]
     for stranger in (matchups_of(theirs.study, "eva")[0].expert, expert("gus")):
-        decision = decision_of(matchup_code=theirs.code, key=uuid.uuid4(), outcome="left")
+        decision = Decision(matchup=theirs.code, key=uuid.uuid4(), outcome="left")
         with pytest.raises(NotYours):
             cast_vote(expert=stranger, decision=decision)
     assert not Vote.objects.exists()

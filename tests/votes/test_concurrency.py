@@ -10,7 +10,7 @@ from pytest_django import Settings
 
 from arena.errors import AlreadyDecided, TooFast
 from arena.models import Matchup, Vote
-from arena.voting.services.casting import PACE_WINDOW, decision_of, receive_vote
+from arena.voting.services.casting import PACE_WINDOW, Decision, receive_vote
 from tests.study_rows import a_study, vote
 
 pytestmark = pytest.mark.django_db(transaction=True)
@@ -73,7 +73,7 @@ def test_a_browser_that_floods_gets_no_more_through_than_the_pace_allows(
     matchups = list(study.matchups.filter(expert=eva))
 
     def send(matchup: Matchup) -> bool:
-        decision = decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left")
+        decision = Decision(matchup=matchup.code, key=uuid.uuid4(), outcome="left")
         try:
             receive_vote(expert=eva, decision=decision)
         except TooFast:

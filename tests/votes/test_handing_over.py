@@ -15,7 +15,7 @@ from arena.errors import NothingToPlan, NotYours
 from arena.models import Matchup, Report, Study, Vote
 from arena.studies.services.experts import Complaint, report
 from arena.studies.services.taking_part import hand_over
-from arena.voting.services.casting import decision_of, receive_vote
+from arena.voting.services.casting import Decision, receive_vote
 from augment.models import Event
 from tests.study_rows import a_study
 
@@ -50,7 +50,7 @@ class Ballots:
 
     def cast(self, expert: User, matchup: Matchup) -> None:
         """One vote in whatever thread; gone is what was handed over in the meantime."""
-        decision = decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left")
+        decision = Decision(matchup=matchup.code, key=uuid.uuid4(), outcome="left")
         try:
             receive_vote(expert=expert, decision=decision)
         except NotYours:
@@ -170,9 +170,7 @@ def test_a_report_at_the_same_time_keeps_its_pair(study: Study) -> None:
             for row in rows:
                 report(
                     expert=eva,
-                    matchup_code=row.code,
-                    key=uuid.uuid4(),
-                    said=Complaint(reason="other"),
+                    complaint=Complaint(key=uuid.uuid4(), matchup=row.code, reason="other"),
                 )
                 kept.append(row.code)
                 ballots.first_ones.set()

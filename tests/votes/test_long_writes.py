@@ -10,7 +10,7 @@ from pytest_django import Settings
 from arena.models import Matchup, Snapshot, Vote
 from arena.results.services import ratings
 from arena.studies.services.opening import close_study
-from arena.voting.services.casting import decision_of, receive_vote
+from arena.voting.services.casting import Decision, receive_vote
 from tests.opening import open_study
 from tests.study_rows import a_study, matchups_of, vote
 
@@ -26,7 +26,7 @@ def store(matchup: Matchup) -> None:
     """A vote that comes in by another thread of the web server."""
 
     def send() -> None:
-        decision = decision_of(matchup_code=matchup.code, key=matchup.code, outcome="left")
+        decision = Decision(matchup=matchup.code, key=matchup.code, outcome="left")
         try:
             receive_vote(expert=matchup.expert, decision=decision)
         finally:

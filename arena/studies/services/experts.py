@@ -136,60 +136,63 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Complaint:
-    """What an expert reports."""
+    """What an expert reports.
 
+    Attributes:
+        key: Made by the browser, one per report.
+        matchup: One of the expert's own.
+        side: Which picture it is about, one of Report.Side.
+
+    Raises:
+        InvalidVote: Parts are unknown or too long.
+    """
+
+    key: UUID
+    matchup: UUID
     reason: str
     side: str = Report.Side.BOTH
     comment: str = ""
 
+    def __post_init__(self) -> None:
+        faults = {}
+        for name, known in (("reason", Report.Reason.values), ("side", Report.Side.values)):
+            if getattr(self, name) not in known:
+                faults[name] = f"One of these is needed: {', '.join(known)}."
+        if len(self.comment) > LONGEST_COMMENT:
+            faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+        if faults:
+            raise InvalidVote(faults)
 
-def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint) -> Report:
+
+def report(*, expert: User, complaint: Complaint) -> Report:
     """Keep what an expert reports; the same key again is the same report.
-
-    Args:
-        expert: Whose report it is.
-        matchup_code: What it is about; one of the expert's own matchups.
-        key: Made by the browser, one per report.
-        said: What is wrong, and where.
 
     Raises:
         NotYours: The matchup is somebody else's or does not exist.
         StudyNotOpen: The study is over.
         Conflict: The key belongs to another report.
     """
-    matchup = matchup_of(expert=expert, code=matchup_code)
-    stored = Report.objects.filter(key=key).first()
+    matchup = matchup_of(expert=expert, code=complaint.matchup)
+    stored = Report.objects.filter(key=complaint.key).first()
     if stored is None:
         if matchup.study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
-        stored = _insert(matchup, expert, key, said)
-    if (stored.matchup_id, stored.reason, stored.side) != (matchup.pk, said.reason, said.side):
+        stored = _insert(matchup, expert, complaint)
+    content = (matchup.pk, complaint.reason, complaint.side)
+    if (stored.matchup_id, stored.reason, stored.side) != content:
         raise Conflict("This key belongs to another report; make a new key for every report.")
     return stored
 
 
-def check_complaint(said: Complaint) -> None:
-    """Raise InvalidVote for parts that are unknown or too long, in rows from elsewhere."""
-    wrong = {}
-    if said.reason not in Report.Reason.values:
-        wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."
-    if said.side not in Report.Side.values:
-        wrong["side"] = f"One of these is needed: {', '.join(Report.Side.values)}."
-    if len(said.comment) > LONGEST_COMMENT:
-        wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
-    if wrong:
-        raise InvalidVote(wrong)
-
-
-def _insert(matchup: Matchup, expert: User, key: UUID, said: Complaint) -> Report:
+def _insert(matchup: Matchup, expert: User, complaint: Complaint) -> Report:
     values = {
         "matchup": matchup,
         "expert": expert,
-        "reason": said.reason,
-        "side": said.side,
-        "comment": make_storable(said.comment.strip()),
+        "reason": complaint.reason,
+        "side": complaint.side,
+        "comment": make_storable(complaint.comment.strip()),
     }
     try:
-        return Report.objects.get_or_create(key=key, defaults=values)[0]
+        return Report.objects.get_or_create(key=complaint.key, defaults=values)[0]
     except IntegrityError:  # the pair was handed over at this moment
         raise NotYours("This matchup is not yours.") from None

@@ -5,7 +5,7 @@ decision sent again; or an error that says why nothing was stored.
 """
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from uuid import UUID
@@ -30,19 +30,40 @@ PREFERENCES = (Vote.Outcome.LEFT, Vote.Outcome.RIGHT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What an expert decided, as it came in; its parts go together."""
+    """What an expert decided about a matchup; its parts are known and go together.
+
+    Attributes:
+        key: Made by the browser, one per decision.
+        matchup: One of the expert's own.
+        outcome: One of Vote.Outcome; the side is kept apart from who won.
+        question: Which of the study's is answered; empty is the primary one.
+        both_miss: With "equal": both miss the instruction. Counts as a tie.
+        strength: With "left" or "right": "slightly" or "clearly", empty where it was not said.
+        reason: With "skip": why, one of Vote.SkipReason.
+        comment: Whatever the expert wants to add.
+        aids: What was used to look, out of AIDS.
+        supersedes: The key of the matchup's current vote on the question, to change it.
+        ms_visible: How long the pair was on screen.
+
+    Raises:
+        InvalidVote: Parts do not go together, or are unknown.
+    """
 
     key: UUID
     matchup: UUID
-    question: str
-    outcome: Vote.Outcome
-    both_miss: bool
-    strength: str
-    reason: str
-    comment: str
-    aids: str
-    supersedes: UUID | None
-    ms_visible: int | None
+    outcome: str
+    question: str = ""
+    both_miss: bool = False
+    strength: str = ""
+    reason: str = ""
+    comment: str = ""
+    aids: Collection[str] = ()
+    supersedes: UUID | None = None
+    ms_visible: int | None = None
+
+    def __post_init__(self) -> None:
+        if faults := _find_faults(self):
+            raise InvalidVote(faults)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,63 +78,6 @@ class Received:
     vote: Vote
     study: Study
     progress: VotingProgress
-
-
-def decision_of(
-    *,
-    matchup_code: UUID | str,
-    key: UUID | str,
-    outcome: str,
-    question: str = "",
-    both_miss: bool = False,
-    strength: str = "",
-    reason: str = "",
-    comment: str = "",
-    aids: Iterable[str] = (),
-    supersedes: UUID | str | None = None,
-    ms_visible: int | None = None,
-) -> Decision:
-    """Read what came in.
-
-    Args:
-        matchup_code: What was decided; one of the expert's own matchups.
-        key: Made by the browser, one per decision.
-        outcome: "left", "equal", "right" or "skip"; the side is kept apart from who won.
-        question: Which of the study's is answered; empty is the primary one.
-        both_miss: With "equal": both miss the instruction. Counts as a tie.
-        strength: With "left" or "right": "slightly" or "clearly", empty where it was not said.
-        reason: With "skip": why, one of Vote.SkipReason.
-        comment: Whatever the expert wants to add.
-        aids: What was used to look, out of AIDS.
-        supersedes: The key of the matchup's current vote on the question, to change it.
-        ms_visible: How long the pair was on screen.
-
-    Raises:
-        ValueError: The outcome is none of the four.
-        InvalidVote: Parts do not go together, or are unknown.
-    """
-    used = set(aids)
-    decision = Decision(
-        key=UUID(str(key)),
-        matchup=UUID(str(matchup_code)),
-        question=question,
-        outcome=Vote.Outcome(outcome),
-        both_miss=both_miss,
-        strength=strength,
-        reason=reason,
-        comment=make_storable(comment.strip()),
-        aids=" ".join(aid for aid in AIDS if aid in used),
-        supersedes=None if supersedes is None else UUID(str(supersedes)),
-        ms_visible=ms_visible,
-    )
-    wrong = _find_faults(decision)
-    if len(comment) > LONGEST_COMMENT:
-        wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
-    if unknown := sorted(used - set(AIDS)):
-        wrong["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
-    if wrong:
-        raise InvalidVote(wrong)
-    return decision
 
 
 def cast_vote(*, expert: User, decision: Decision) -> Vote:
@@ -149,19 +113,25 @@ def receive_vote(*, expert: User, decision: Decision) -> Received:
 
 
 def _find_faults(decision: Decision) -> dict[str, str]:
-    """What does not go with the outcome, by the name of the part."""
-    outcome, wrong = decision.outcome, {}
+    """Return what is unknown or does not go with the outcome, by the name of the part."""
+    outcome, faults = decision.outcome, {}
+    if outcome not in Vote.Outcome:
+        faults["outcome"] = f"One of these is needed: {', '.join(Vote.Outcome.values)}."
     if decision.both_miss and outcome != Vote.Outcome.EQUAL:
-        wrong["both_miss"] = "Both can only miss the instruction where they are equal."
+        faults["both_miss"] = "Both can only miss the instruction where they are equal."
     is_strength = decision.strength in Vote.Strength and outcome in PREFERENCES
     if decision.strength and not is_strength:
         allowed = " or ".join(Vote.Strength.values)
-        wrong["strength"] = f"Only a preference has a strength: {allowed}."
+        faults["strength"] = f"Only a preference has a strength: {allowed}."
     if outcome == Vote.Outcome.SKIP and decision.reason not in Vote.SkipReason.values:
-        wrong["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
+        faults["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
     if outcome != Vote.Outcome.SKIP and decision.reason:
-        wrong["reason"] = "Only a skip has a reason."
-    return wrong
+        faults["reason"] = "Only a skip has a reason."
+    if len(decision.comment) > LONGEST_COMMENT:
+        faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+    if unknown := sorted(set(decision.aids) - set(AIDS)):
+        faults["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
+    return faults
 
 
 def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
@@ -199,25 +169,23 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
     return Received(vote=vote, study=study, progress=progress)
 
 
+_SAME_COLUMNS = ("key", "question", "outcome", "both_miss", "strength", "reason", "ms_visible")
+"""Of a vote, what a decision holds by the same name and as it is stored."""
+
+
 def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None) -> Vote:
     winners = {Vote.Outcome.LEFT: matchup.left_id, Vote.Outcome.RIGHT: matchup.right_id}
     vote = Vote(
-        key=decision.key,
+        **{name: getattr(decision, name) for name in _SAME_COLUMNS},
         matchup_id=matchup.pk,
         expert=expert,
         shown_left_id=matchup.left_id,
         shown_right_id=matchup.right_id,
-        question=decision.question,
-        outcome=decision.outcome,
-        winner_id=winners.get(decision.outcome),
-        both_miss=decision.both_miss,
-        strength=decision.strength,
-        reason=decision.reason,
-        comment=decision.comment,
-        aids=decision.aids,
+        winner_id=winners.get(Vote.Outcome(decision.outcome)),
+        comment=make_storable(decision.comment.strip()),
+        aids=" ".join(aid for aid in AIDS if aid in decision.aids),
         supersedes=old,
         is_simulated=expert.person.is_simulated,
-        ms_visible=decision.ms_visible,
     )
     vote.save(force_insert=True)
     return vote
@@ -240,10 +208,9 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
     if vote.matchup_id != matchup.pk:
         raise Conflict("This key belongs to another vote; make a new key for every decision.")
     old = None if vote.supersedes is None else vote.supersedes.key
-    stored = (vote.question, vote.outcome, vote.both_miss, vote.strength, vote.reason, old)
-    given: tuple[object, ...] = (decision.question, decision.outcome, decision.both_miss)
-    given += (decision.strength, decision.reason)
-    if stored != (*given, decision.supersedes):
+    parts = ("question", "outcome", "both_miss", "strength", "reason")
+    is_same = all(getattr(vote, part) == getattr(decision, part) for part in parts)
+    if not is_same or old != decision.supersedes:
         raise AlreadyDecided(vote.outcome)
 
 
@@ -272,5 +239,5 @@ def _check_allowed(decision: Decision, study: Study) -> None:
         raise InvalidVote({"both_miss": "Nobody is asked here whether both miss."})
     if decision.strength and not study.ask_strength:
         raise InvalidVote({"strength": "This study does not ask how clear a preference is."})
-    if "replay" in decision.aids.split() and not study.allow_replay:
+    if "replay" in decision.aids and not study.allow_replay:
         raise InvalidVote({"aids": "This study has no drives to play."})

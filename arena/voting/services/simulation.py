@@ -11,7 +11,7 @@ import numpy as np
 from django.db import transaction
 
 from arena.models import Study, Vote
-from arena.voting.services.casting import cast_vote, decision_of
+from arena.voting.services.casting import Decision, cast_vote
 from augment.errors import Conflict
 from augment.models import Augmentation
 from augment.services.events import log_event
@@ -48,8 +48,8 @@ def simulate_votes(*, study: Study, seed: int) -> int:
         advantage = _error_m(matchup.right) - _error_m(matchup.left)
         for question in study.questions:
             is_primary = question == study.questions[0]
-            decision = decision_of(
-                matchup_code=matchup.code,
+            decision = Decision(
+                matchup=matchup.code,
                 key=uuid5(matchup.code, "simulated" if is_primary else f"simulated {question}"),
                 outcome=_judge(advantage, rng),
                 question=question,
