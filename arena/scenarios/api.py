@@ -39,6 +39,7 @@ from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
     SLUG_LENGTH,
+    NewScenario,
     add_scenario,
 )
 from augment.services.scenarios.submissions import keep_submission
@@ -141,7 +142,7 @@ class ScenariosView(ApiView):
 
         A worker draws it.
         """
-        add = partial(add_scenario, **given, actor=self.user)
+        add = partial(add_scenario, NewScenario(**given), actor=self.user)
         row, warnings = keep_and_send(add, enqueue_scenario)
         return _scenarios().get(pk=row.pk), warnings
 

@@ -12,7 +12,12 @@ from augment.services.events import log_change
 from augment.services.scenarios import editing
 from augment.services.scenarios.benchmarks import refuse_handed_out
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import change_surroundings, derive_intent, set_wording
+from augment.services.scenarios.scenes import (
+    ScenarioContent,
+    change_surroundings,
+    derive_intent,
+    set_wording,
+)
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"
@@ -75,22 +80,12 @@ def _refuse_judged(scenario: Scenario) -> None:
 
 @transaction.atomic
 def change_scenario(
-    scenario: Scenario,
-    *,
-    instruction: str,
-    type: str,
-    keep_traffic: bool,
-    density: str,
-    goal: str,
-    reference: object = None,
-    derives: bool = False,
-    actor: User | None = None,
+    scenario: Scenario, content: ScenarioContent, *, actor: User | None = None
 ) -> Scenario:
     """Set what a scenario says and draws.
 
     Its drawing can be changed until an open study shows it, all else until something needs it;
     nothing while a benchmark hands it out.
-    The arguments are those of `add_scenario`.
 
     Raises:
         InvalidDocument: One of these breaks its format.
@@ -102,12 +97,15 @@ def change_scenario(
     editing.refuse_catalogue(row, "text")
     refuse_handed_out(row)
     before, drawn = _state(row), row.reference
-    row.reference = reference if isinstance(reference, dict) else None
-    change_surroundings(row, keep_traffic=keep_traffic, density=density, goal=goal)
-    row.reference = editing.reference_document(row, reference)
+    row.reference = content.reference if isinstance(content.reference, dict) else None
+    change_surroundings(
+        row, keep_traffic=content.keep_traffic, density=content.density, goal=content.goal
+    )
+    row.reference = editing.reference_document(row, content.reference)
     if row.reference != drawn:
         _refuse_judged(row)
-    if derives:
+    type, instruction = content.type, content.instruction
+    if content.derives:
         type, instruction = derive_intent(row, type, instruction)
     set_wording(row, instruction, type)
     if _state(row) != before:

@@ -73,33 +73,44 @@ class Outcome:
     is_accepted: bool | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EditTask:
+    """What a modifier is to do.
+
+    Attributes:
+        scene: The scene before the change.
+        instruction: The user's wish in natural language; of a follow-up all wishes so far.
+        intent: What a geometric review holds modifications against, where that is stored.
+        begun: The modifier's conversation up to the wish that it is to meet now; by default it is
+            given its task.
+    """
+
+    scene: Scene
+    instruction: str
+    intent: Intent | None = None
+    begun: Messages = ()
+
+
 def run(
     recipe: Recipe,
+    task: EditTask,
     *,
-    scene: Scene,
-    instruction: str,
     modifier: RespondentClient,
     transcript: Transcript,
     patience: Patience | None = None,
     others: Mapping[ModelRole, RespondentClient] | None = None,
-    intent: Intent | None = None,
     sampling: Sampling | None = None,
-    begun: Messages = (),
 ) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
     Args:
         recipe: The variant, within whatever limits.
-        scene: The scene before the change.
-        instruction: The user's wish in natural language; of a follow-up all wishes so far.
+        task: The scene and the instruction.
         modifier: Who modifies.
         transcript: Is handed every raw answer before it is read.
         patience: How faults that may pass are waited out; by default three attempts.
         others: Who plays the reviewers' roles; by default the modifier's model does.
-        intent: What a geometric review holds modifications against, where that is stored.
         sampling: What every request is sent with.
-        begun: The modifier's conversation up to the wish that it is to meet now; by default it is
-            given its task.
 
     Raises:
         ModelFault: The wire or the endpoint broke; the same run may succeed later if it says so.
@@ -112,15 +123,7 @@ def run(
         max_tokens=recipe.limits.max_output_tokens,
         re_asks=recipe.limits.re_asks,
     )
-    work = _Work(
-        recipe=recipe,
-        scene=scene,
-        instruction=instruction,
-        respondents=respondents,
-        intent=intent,
-        begun=begun,
-    )
-    return work.outcome()
+    return _Work(recipe=recipe, task=task, respondents=respondents).outcome()
 
 
 def ask_for_intent(
@@ -177,16 +180,13 @@ class _Work:
     """One modifier at work on one scene."""
 
     recipe: Recipe
-    scene: Scene
-    instruction: str
+    task: EditTask
     respondents: Respondents
-    intent: Intent | None
-    begun: Messages
 
     @cached_property
     def ground(self) -> Ground:
         """The scene, laid out for the checks once for all rounds."""
-        return Ground.of(self.scene)
+        return Ground.of(self.task.scene)
 
     def outcome(self) -> Outcome:
         """Return what came of it, an answer that is none included."""
@@ -217,7 +217,9 @@ class _Work:
         note = self.respondents.transcript.note
         native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
         form = form_of(self.recipe, native_tools=native)
-        messages = self.begun or fill.modifier_messages(self.scene, self.instruction, form)
+        messages = self.task.begun or fill.modifier_messages(
+            self.task.scene, self.task.instruction, form
+        )
         rounds: list[_Round] = []
         while True:
             number, fault = len(rounds) + 1, ""
@@ -231,7 +233,7 @@ class _Work:
                 break
             if self.recipe.review is None:
                 return _Round(number=1, read=read, verdict=None), ""
-            changes = changes_text(self.scene, read.modification)
+            changes = changes_text(self.task.scene, read.modification)
             note(NoteKind.ROUND, {"round": number, "changes": changes, "mended": read.mended})
             verdict, fault = self._review(read, rounds)
             rounds.append(_Round(number=number, read=read, verdict=verdict))
@@ -250,7 +252,7 @@ class _Work:
         read, asked, answer = self.respondents.read(
             ModelRole.MODIFIER,
             messages,
-            partial(read_reply, scene=self.scene, radius_m=self.recipe.limits.radius_m),
+            partial(read_reply, scene=self.task.scene, radius_m=self.recipe.limits.radius_m),
             again=fill.re_ask_messages,
             tools=(fill.pose_tool(),) if calling is Calling.NATIVE else (),
             reply=reply,
@@ -264,7 +266,7 @@ class _Work:
         said is its answer then.
         """
         desk = _ToolDesk(
-            tool=PoseTool(self.scene, self.recipe.limits.radius_m),
+            tool=PoseTool(self.task.scene, self.recipe.limits.radius_m),
             limits=self.recipe.limits,
             transcript=self.respondents.transcript,
         )
@@ -287,13 +289,13 @@ class _Work:
         assert review is not None
         answer = ReviewedAnswer(
             ground=self.ground,
-            instruction=self.instruction,
+            instruction=self.task.instruction,
             modification=read.modification,
             respondents=self.respondents,
             limits=self.recipe.limits,
             earlier=rounds[-1].read.modification if rounds else None,
             told=tuple(entry for one in rounds if one.verdict for entry in one.verdict.feedback),
-            intent=self.intent,
+            intent=self.task.intent,
         )
         head: dict[str, object] = {"round": len(rounds) + 1, "review": review.name}
         note = partial(self.respondents.transcript.note, NoteKind.REVIEW)

@@ -22,7 +22,7 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.pictures import store
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import NewScenario, add_scenario
 from tests.jobs import rows
 from tests.scenes import junction, pedestrian, vehicle
 from tests.web.cast import png
@@ -43,9 +43,10 @@ def job() -> GenerationJob:
         source="json",
         provenance="Recorded somewhere; CC BY-NC-SA 4.0",
     )
-    scenario = add_scenario(
+    new = NewScenario(
         scene="junction", type=ScenarioType.NUDGE.value, instruction="Park a car.", slug="park"
     )
+    scenario = add_scenario(new)
     job = GenerationJob.objects.create(name="Round 1")
     for slug, state, change in (
         ("rule", "done", modification_to_document(ADDED)),

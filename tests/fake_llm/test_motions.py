@@ -18,7 +18,7 @@ from augment.prompts.vectors import changes_text
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
-from augment.variants.pipeline import Outcome, run
+from augment.variants.pipeline import EditTask, Outcome, run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 from tests.checks.test_asked_motions import WISHES
@@ -40,8 +40,7 @@ def asked(server: FakeServer, name: str, variant: str, *, native: bool = False) 
         good = RespondentClient(client=client, model="fake-good", native_tools=native)
         return run(
             find_recipe(variant),
-            scene=WISHES[name][0],
-            instruction=name,
+            EditTask(scene=WISHES[name][0], instruction=name),
             modifier=good,
             transcript=MemoryTranscript(),
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),

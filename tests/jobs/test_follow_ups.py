@@ -31,7 +31,12 @@ from augment.services.running.follow_ups import (
 from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios.prompts import stored_tasks
-from augment.services.scenarios.scenes import add_scenario, change_surroundings, scene_of
+from augment.services.scenarios.scenes import (
+    NewScenario,
+    add_scenario,
+    change_surroundings,
+    scene_of,
+)
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
 from tests.brokers import Broker
@@ -66,12 +71,14 @@ def two_steps(*, intents: bool = False) -> tuple[Scenario, Scenario]:
     made = [place(scene_of(first), intent).modification for intent in asked]
     Scenario.objects.filter(pk=first.pk).update(reference=modification_to_document(made[0]))
     follow_up = add_scenario(
-        scene=first.base_scene.slug,
-        type=first.type,
-        instruction=NEXT,
-        reference=modification_to_document(made[1]),
-        intent=intent_to_document(asked[1]),
-        follows="street",
+        NewScenario(
+            scene=first.base_scene.slug,
+            type=first.type,
+            instruction=NEXT,
+            reference=modification_to_document(made[1]),
+            intent=intent_to_document(asked[1]),
+            follows="street",
+        )
     )
     return first, follow_up
 
@@ -217,10 +224,11 @@ def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
     with pytest.raises(Conflict, match="It follows “street”"):
         change_surroundings(follow_up, keep_traffic=True, density="", goal="")
     rows.add_scenario("elsewhere")
+    new = NewScenario(
+        scene=first.base_scene.slug, type=first.type, instruction=NEXT, follows="elsewhere"
+    )
     with pytest.raises(UnknownName, match=r"'elsewhere'\. Known: street, street-then-1"):
-        add_scenario(
-            scene=first.base_scene.slug, type=first.type, instruction=NEXT, follows="elsewhere"
-        )
+        add_scenario(new)
 
 
 def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the_rest_alone() -> (

@@ -27,8 +27,8 @@ from augment.services.scenarios.benchmarks import (
     make_benchmark,
     plan_benchmark,
 )
+from augment.services.scenarios.scenes import NewScenario, ScenarioContent, add_variant
 from augment.services.scenarios.scenes import add_scenario as add_scenario_row
-from augment.services.scenarios.scenes import add_variant
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone, vehicle
@@ -111,10 +111,10 @@ def add_relatives(first: Scenario) -> list[Scenario]:
     ]
     asks: dict[str, Any] = {"scene": first.base_scene.slug, "type": first.type}
     asks |= {"instruction": "Place them nearer.", "keep_traffic": True}
-    copy = add_scenario_row(**asks, variant_of=first.slug, reference=first.reference)
+    copy = add_scenario_row(NewScenario(**asks, variant_of=first.slug, reference=first.reference))
     second = add_variant(copy, difference="7 m", reference=placed(7.0), intent=None)
     lone = modification_to_document(placed(21.0, 60.0))
-    return [*family, copy, second, add_scenario_row(**asks, reference=lone)]
+    return [*family, copy, second, add_scenario_row(NewScenario(**asks, reference=lone))]
 
 
 def poses_of(items: Iterable[BenchmarkItem]) -> set[tuple[object, ...]]:
@@ -216,15 +216,13 @@ def test_what_is_asked_for_is_checked(
 
 
 def change(row: Scenario, reference: object) -> None:
-    services.change_scenario(
-        row,
+    content = ScenarioContent(
         instruction=row.instruction,
         type=row.type,
         keep_traffic=row.keep_traffic,
-        density="",
-        goal="",
         reference=reference,
     )
+    services.change_scenario(row, content)
 
 
 def test_what_is_handed_out_stays_until_the_benchmark_is_retired(streets: list[Scenario]) -> None:

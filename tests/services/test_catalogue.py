@@ -18,7 +18,7 @@ from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import add_scenario, reference_of
+from augment.services.scenarios.scenes import NewScenario, add_scenario, reference_of
 from tests.fixtures.shelf import FOLDER, HARD, MOVING
 from tests.intents import parked
 from tests.scenes import scene, vehicle
@@ -187,7 +187,7 @@ def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
     with pytest.raises(Conflict, match="from the source 'json'"):
         load_catalogue(folder=folder)
     BaseScene.objects.update(source="authored")
-    add_scenario(scene="street", type="jaywalking_pedestrian", instruction="x", slug="parked-car")
+    add_scenario(NewScenario(scene="street", type="cut_in", instruction="x", slug="parked-car"))
     with pytest.raises(Conflict, match="not the catalogue's"):
         load_catalogue(folder=folder)
 

@@ -31,7 +31,7 @@ from augment.services.scenarios.pictures import (
     reference_picture,
     scene_picture,
 )
-from augment.services.scenarios.scenes import reference_of
+from augment.services.scenarios.scenes import ScenarioContent, reference_of
 from tests.jobs.rows import add_scenario, launch
 from tests.render.pictures import at_camera_size
 from tests.scenes import pedestrian, scene, vehicle
@@ -48,7 +48,7 @@ def document(*added: TrafficAgent, **parts: tuple[object, ...]) -> dict[str, obj
 def set_reference(here: Scenario, given: object, **more: Any) -> Scenario:
     names = ("instruction", "type", "keep_traffic", "goal")
     same = {name: getattr(here, name) for name in names} | {"density": here.traffic_density}
-    return guarded.change_scenario(here, **same | more, reference=given)
+    return guarded.change_scenario(here, ScenarioContent(**same | more, reference=given))
 
 
 def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:

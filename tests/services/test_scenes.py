@@ -16,7 +16,7 @@ from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import add_scenario, reference_of
+from augment.services.scenarios.scenes import NewScenario, add_scenario, reference_of
 from tests.formats.av2_logs import write_log
 from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
@@ -40,7 +40,7 @@ def street(file: Path) -> BaseScene:
 
 def scenario(**changes: object) -> Scenario:
     asked = {"scene": "street", "type": "jaywalking_pedestrian", "instruction": "add a pedestrian"}
-    return add_scenario(**(asked | changes))  # type: ignore[arg-type]
+    return add_scenario(NewScenario(**(asked | changes)))  # type: ignore[arg-type]
 
 
 def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from augment.llm.client import Patience
 from augment.llm.messages import Reply, ToolCall
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from augment.variants.pipeline import Outcome, run
+from augment.variants.pipeline import EditTask, Outcome, run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 from tests.llm.scripted import ScriptedClient
@@ -75,13 +75,11 @@ class Play:
         self.transcript = MemoryTranscript()
         self.outcome: Outcome = run(
             find_recipe(variant),
-            scene=shown or scene(),
-            instruction=WISH,
+            EditTask(scene=shown or scene(), instruction=WISH, intent=intent),
             modifier=RespondentClient(client=self.client, model="m", native_tools=native),
             transcript=self.transcript,
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
             others=others,
-            intent=intent,
         )
 
     @property

@@ -13,7 +13,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
 from augment.metrics.displacement import displacement
-from augment.variants.pipeline import Outcome, OutcomeStatus, run
+from augment.variants.pipeline import EditTask, Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
@@ -52,8 +52,7 @@ def played(
     with OpenAIWire(base_url=server.url, api_key=None, timeout_s=30.0) as client:
         outcome = run(
             find_recipe(variant),
-            scene=shown_scene(slug),
-            instruction=entry(slug).instruction,
+            EditTask(scene=shown_scene(slug), instruction=entry(slug).instruction),
             modifier=RespondentClient(client=client, model=model, native_tools=native),
             transcript=transcript,
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),

@@ -16,7 +16,7 @@ from augment.errors import ModelFault
 from augment.fake_llm.server import MODELS, FakeServer, running
 from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.variants.pipeline import run
+from augment.variants.pipeline import EditTask, run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 from tests.intents import known
@@ -48,8 +48,7 @@ def test_a_fault_ends_as_expected(server: FakeServer, row: dict[str, str]) -> No
         try:
             made = run(
                 find_recipe(row["variant"]),
-                scene=scene(),
-                instruction=WISH,
+                EditTask(scene=scene(), instruction=WISH),
                 modifier=RespondentClient(client=client, model=model),
                 transcript=transcript,
                 patience=Patience(sleep=lambda _: None, rng=random.Random(0)),

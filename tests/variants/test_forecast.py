@@ -9,7 +9,7 @@ from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
 from augment.fake_llm.wire import chat_request
 from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.variants.pipeline import run
+from augment.variants.pipeline import EditTask, run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.respondents import ModelRole, RespondentClient
 from augment.variants.showing import CallRange, calls_of
@@ -42,8 +42,7 @@ def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
     transcript = MemoryTranscript()
     run(
         RECIPES[variant],
-        scene=shown_scene(SLUG),
-        instruction=entry(SLUG).instruction,
+        EditTask(scene=shown_scene(SLUG), instruction=entry(SLUG).instruction),
         modifier=RespondentClient(client=Playing(character), model="m"),
         transcript=transcript,
         patience=Patience(sleep=lambda _: None, rng=random.Random(1)),

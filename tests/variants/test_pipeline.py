@@ -3,7 +3,7 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Speaker
 from augment.prompts.fill import prompt_version
-from augment.variants.pipeline import OutcomeStatus, run
+from augment.variants.pipeline import EditTask, OutcomeStatus, run
 from augment.variants.recipes import OTM
 from augment.variants.respondents import RespondentClient
 from tests.llm.scripted import ScriptedClient
@@ -88,8 +88,7 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     with pytest.raises(KeyboardInterrupt):
         run(
             OTM,
-            scene=scene(),
-            instruction="Add a parked car.",
+            EditTask(scene=scene(), instruction="Add a parked car."),
             modifier=RespondentClient(client=client, model="m"),
             transcript=Stops(),
         )

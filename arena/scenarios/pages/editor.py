@@ -98,14 +98,14 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 editing.draft_of(scene, None, keep_traffic=wanted["keep_traffic"]),
                 wanted["reference"],
             )
-            made = scenes.add_scenario(
+            new = scenes.NewScenario(
                 scene=scene.slug,
                 **wanted | {"reference": reference},
                 slug=form.cleaned_data["slug"] or None,
                 follows="" if first is None else first.slug,
                 variant_of="" if original is None else original.slug,
-                actor=user_of(request),
             )
+            made = scenes.add_scenario(new, actor=user_of(request))
             send_later(request, enqueue_scenario, made.pk)
             messages.success(request, f"“{made.slug}” is added.")
             return redirect("scenario", code=made.code)
@@ -135,7 +135,8 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = ScenarioForm(request.POST or _stored(scenario))
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
-            services.change_scenario(scenario, **form.wanted(), actor=user_of(request))
+            content = scenes.ScenarioContent(**form.wanted())
+            services.change_scenario(scenario, content, actor=user_of(request))
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, f"“{scenario.slug}” is changed.")
             return redirect("scenario", code=code)

@@ -10,7 +10,7 @@ from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.entities import ScenarioType, TrafficDensity
 from augment.services.scenarios.bulk import DOCUMENTS, NEEDED, OPTIONAL, add_rows
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import NewScenario, add_scenario
 from augment.services.terminal import TerminalCommand
 
 
@@ -67,7 +67,7 @@ class Command(TerminalCommand):
                 given[name] = read_json(file, what=what)
                 if given[name] is None:
                     raise InvalidDocument(what, [(file.name, "holds null")])
-        scenario = add_scenario(**given)
+        scenario = add_scenario(NewScenario(**given))
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
         self.stdout.write(

@@ -19,7 +19,7 @@ from augment.prompts.fill import model_message
 from augment.services.inputs import InputKind, input_field
 from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest, launch
-from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, add_scenario
+from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, NewScenario, add_scenario
 from augment.variants.respondents import ModelRole, NoteKind
 
 
@@ -56,13 +56,13 @@ def ask_follow_up(
     """
     conversation_of(answer)
     before = answer.scenario
-    scenario = add_scenario(
+    new = NewScenario(
         scene=before.base_scene.slug,
         type=before.type,
         instruction=request.instruction,
         follows=before.slug,
-        actor=actor,
     )
+    scenario = add_scenario(new, actor=actor)
     Scenario.objects.filter(pk=scenario.pk).update(
         retired_at=timezone.now(), language=before.language
     )

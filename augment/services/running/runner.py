@@ -266,8 +266,12 @@ def _ask_model(
         modifier = playing.pop(ModelRole.MODIFIER)
         return pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
-            scene=scene,
-            instruction=row.scenario.wording,
+            pipeline.EditTask(
+                scene=scene,
+                instruction=row.scenario.wording,
+                intent=intent_of(row.scenario),
+                begun=begun,
+            ),
             modifier=modifier,
             transcript=RowTranscript(
                 held,
@@ -277,7 +281,5 @@ def _ask_model(
                 key=options.key(row.sample),
             ),
             others=playing,
-            intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),
-            begun=begun,
         )

@@ -13,7 +13,7 @@ from django.db import transaction
 
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.documents import parse_json, read_yaml
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import NewScenario, add_scenario
 
 WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
@@ -46,7 +46,7 @@ def add_rows(
             place = f"row {number}"
             try:
                 with transaction.atomic():
-                    slugs.append(add_scenario(**_request_of(row), actor=actor).slug)
+                    slugs.append(add_scenario(_read_row(row), actor=actor).slug)
             except InvalidDocument as error:
                 problems += [(f"{place}.{path}", str(text)) for path, text in error.problems]
             except AugmentError as error:
@@ -75,8 +75,7 @@ def _read_rows(name: str, content: bytes, most: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _request_of(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row as `add_scenario` takes it."""
+def _read_row(row: Mapping[str, Any]) -> NewScenario:
     given = {name: value for name, value in row.items() if value not in (None, "")}
     known, keep = (*NEEDED, *OPTIONAL), str(given.pop("keep_traffic", "")).strip().lower()
     problems = [
@@ -95,4 +94,4 @@ def _request_of(row: Mapping[str, Any]) -> dict[str, Any]:
     for name, what in DOCUMENTS.items():
         if isinstance(given.get(name), str):
             given[name] = parse_json(given[name].encode(), what=what, place=name)
-    return given | {"keep_traffic": keep in _YES}
+    return NewScenario(**given, keep_traffic=keep in _YES)

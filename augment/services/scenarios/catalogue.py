@@ -233,14 +233,10 @@ def _store_scenario(
         own["origin"] = original.origin
     if row is None:
         origin = IntentOrigin.AUTHORED
-        row = scene_rows.add_scenario(
-            scene=entry.scene,
-            slug=entry.slug,
-            **said,
-            intent_origin=origin,
-            follows=entry.follows,
-            actor=actor,
+        new = scene_rows.NewScenario(
+            scene=entry.scene, slug=entry.slug, **said, intent_origin=origin, follows=entry.follows
         )
+        row = scene_rows.add_scenario(new, actor=actor)
         Scenario.objects.filter(pk=row.pk).update(**own)
         return CatalogueStep.ADDED
     if not row.in_catalogue:

@@ -28,7 +28,7 @@ from augment.scene.density import keep_clear
 from augment.scene.entities import AgentType, InterplanRules, Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.scenarios.scene_imports import free_slug, keep_reading
-from augment.services.scenarios.scenes import add_scenario
+from augment.services.scenarios.scenes import NewScenario, add_scenario
 
 _KEY = "modification_details_dictionary"
 _VEHICLE, _BUS = AgentType.VEHICLE, AgentType.BUS
@@ -195,7 +195,7 @@ def _keep_entry(
     options = replace(scene.options, density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
     instruction, intent = describe_change(entry.type, reference, driven)
-    add_scenario(
+    new = NewScenario(
         scene=row.slug,
         type=entry.type.value,
         instruction=instruction,
@@ -207,6 +207,6 @@ def _keep_entry(
         goal=goal or "",
         traffic=traffic,
         interplan=kept,
-        actor=actor,
     )
+    add_scenario(new, actor=actor)
     return ImportStep(StepKind.NEW, f"{name}: {slug}{left_out}")

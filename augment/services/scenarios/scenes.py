@@ -5,7 +5,7 @@ import json
 import random
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from typing import Any
@@ -115,45 +115,57 @@ def placeable_intent(document: object) -> dict[str, Any]:
     return codec.intent_to_document(intent)
 
 
-@transaction.atomic
-def add_scenario(
-    *,
-    scene: str,
-    type: str,
-    instruction: str,
-    slug: str | None = None,
-    reference: dict[str, Any] | None = None,
-    intent: object = None,
-    intent_origin: IntentOrigin = IntentOrigin.ENTERED,
-    keep_traffic: bool = False,
-    density: str = "",
-    goal: str = "",
-    traffic: Sequence[entities.TrafficAgent] | None = None,
-    interplan: dict[str, Any] | None = None,
-    derives: bool = False,
-    follows: str = "",
-    variant_of: str = "",
-    actor: User | None = None,
-) -> Scenario:
-    """Keep an instruction for a scene, with its intent and reference if there are any.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioContent:
+    """What a scenario says and draws, as it is entered.
 
-    Args:
-        scene: The slug of a stored scene.
+    Attributes:
         type: The value of a `ScenarioType`, or a slug of one's own.
         instruction: What is to be changed, in the user's words.
-        slug: The scenario's name; made from the scene's and the type's when None.
         reference: A modification document that fits the scene.
-        intent: An intent document.
-        intent_origin: Where that comes from.
         keep_traffic: Whether the recorded traffic stays.
         density: Of the traffic that is spawned where the recorded one is cleared; empty for none.
         goal: Where the ego's way turns; empty where nobody says.
+        derives: Whether the reference says what is asked for, see `derive_intent`.
+    """
+
+    type: str
+    instruction: str
+    reference: Any = None
+    keep_traffic: bool = False
+    density: str = ""
+    goal: str = ""
+    derives: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewScenario(ScenarioContent):
+    """A scenario that is to be added.
+
+    Attributes:
+        scene: The slug of a stored scene.
+        slug: The scenario's name; made from the scene's and the type's when None.
+        intent: An intent document.
+        intent_origin: Where that comes from.
         traffic: Who is spawned, where that is known already; None to spawn it.
         interplan: The parts of interPlan's file that it comes from, with a generated instruction.
-        derives: Whether the reference says what is asked for, see `derive_intent`.
         follows: The slug of one on the scene whose results it changes further, in its traffic.
         variant_of: The slug of a scenario that it was made from: both are in one split.
-        actor: Who did it.
+    """
+
+    scene: str
+    slug: str | None = None
+    intent: object = None
+    intent_origin: IntentOrigin = IntentOrigin.ENTERED
+    traffic: Sequence[entities.TrafficAgent] | None = None
+    interplan: dict[str, Any] | None = None
+    follows: str = ""
+    variant_of: str = ""
+
+
+@transaction.atomic
+def add_scenario(new: NewScenario, *, actor: User | None = None) -> Scenario:
+    """Keep an instruction for a scene, with its intent and reference if there are any.
 
     Raises:
         UnknownName: No such scene, or no such scenario on it.
@@ -161,19 +173,28 @@ def add_scenario(
         InvalidModification: The reference does not fit the scene.
         Conflict: The slug is taken, or traffic is to be kept and spawned.
     """
-    scenario = _new_scenario(_find_scene(scene), type, slug, follows)
-    scenario.interplan, first = interplan, scenario.follows
-    scenario.origin = scenario_named(variant_of).origin if variant_of else None
-    if first is not None:
-        scenario.interplan, traffic = first.interplan, _spawned_in(first)
-        keep_traffic, density, goal = first.keep_traffic, first.traffic_density, first.goal
-    _set_surroundings(scenario, keep_traffic, density, goal, traffic, reference)
-    if derives:
+    scenario = _new_scenario(_find_scene(new.scene), new.type, new.slug, new.follows)
+    is_generated = new.interplan is not None
+    scenario.origin = scenario_named(new.variant_of).origin if new.variant_of else None
+    if (first := scenario.follows) is not None:
+        new = replace(
+            new,
+            interplan=first.interplan,
+            traffic=_spawned_in(first),
+            keep_traffic=first.keep_traffic,
+            density=first.traffic_density,
+            goal=first.goal,
+        )
+    scenario.interplan = new.interplan
+    surroundings = new.keep_traffic, new.density, new.goal
+    _set_surroundings(scenario, *surroundings, new.traffic, new.reference)
+    type, instruction = new.type, new.instruction
+    if new.derives:
         type, instruction = derive_intent(scenario, type, instruction)
     set_wording(scenario, instruction, type)
-    scenario.instruction_is_generated |= interplan is not None
-    if intent is not None:
-        _set_intent(scenario, intent, intent_origin)
+    scenario.instruction_is_generated |= is_generated
+    if new.intent is not None:
+        _set_intent(scenario, new.intent, new.intent_origin)
     _insert(scenario, actor)
     return scenario
 
