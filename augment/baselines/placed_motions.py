@@ -8,25 +8,10 @@ from augment.baselines.placing_ground import PlacingGround
 from augment.checks.lanes_across import LanesAcross, find_mark
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
+from augment.scene import planned_motion, presets
 from augment.scene.entities import LaneConnector, TrafficAgent, TrafficLight, TurnType
 from augment.scene.intent import Side
 from augment.scene.intent_parts import MotionWish, StartWish
-from augment.scene.planned_motion import (
-    REACHED_M,
-    AtPlace,
-    AtTime,
-    MotionPreset,
-    NearEgo,
-    PointPath,
-    Trigger,
-)
-from augment.scene.presets import (
-    PresetNumbers,
-    ego_pace_mps,
-    find_crossing,
-    numbers_of,
-    with_preset,
-)
 
 _STOP_LINE_M = 3.5
 """From the centre of a car that waits to the junction."""
@@ -42,14 +27,14 @@ def give_motion(
     Raises:
         CannotPlace: The scene has not what it needs.
     """
-    numbers = PresetNumbers(start=_trigger(wish.start, ground.lanes, rng))
-    for name in numbers_of(wish.preset):
+    numbers = presets.PresetNumbers(start=_trigger(wish.start, ground.lanes, rng))
+    for name in presets.numbers_of(wish.preset):
         if (amount := getattr(wish, name)) is not None:
             numbers = replace(numbers, **{name: round(amount.drawn(rng), 2)})
-    mover = with_preset(wish.preset, ground.scene, agent, numbers)
+    mover = presets.with_preset(wish.preset, ground.scene, agent, numbers)
     if agent.walk_to_m is None or mover.motion is None:
         return mover
-    path = PointPath(points_m=(agent.walk_to_m,))
+    path = planned_motion.PointPath(points_m=(agent.walk_to_m,))
     waiting = replace(mover, heading_rad=agent.heading_rad)
     return replace(waiting, motion=replace(mover.motion, path=path))
 
@@ -69,7 +54,7 @@ def find_arm(
     for connector in ground.graph.lanes.values():
         if not isinstance(connector, LaneConnector) or connector.from_lane is None:
             continue
-        crossing = find_crossing(connector, ground.route)
+        crossing = presets.find_crossing(connector, ground.route)
         if crossing is None or connector.traffic_light is TrafficLight.GREEN:
             continue
         begin = ground.route.locate(*connector.centerline.position(0.0))
@@ -85,7 +70,9 @@ def find_arm(
     _, ahead_m, _, lane_id, away_m = min(options)
     before_m = _STOP_LINE_M
     if speed_mps > 0.0:
-        before_m = max(speed_mps * ahead_m / ego_pace_mps(ground.scene) - away_m, _STOP_LINE_M)
+        before_m = max(
+            speed_mps * ahead_m / presets.ego_pace_mps(ground.scene) - away_m, _STOP_LINE_M
+        )
     length_m = ground.graph.lane(lane_id).centerline.length_m
     place = ground.graph.along(lane_id, length_m, nearer_m - before_m)
     if place is None:
@@ -95,7 +82,7 @@ def find_arm(
 
 def is_on_other_arm(wish: MotionWish | None) -> bool:
     """Return whether who is to move so comes from another arm of the junction."""
-    return wish is not None and wish.preset is MotionPreset.RED_LIGHT
+    return wish is not None and wish.preset is planned_motion.MotionPreset.RED_LIGHT
 
 
 # Private
@@ -103,17 +90,19 @@ def is_on_other_arm(wish: MotionWish | None) -> bool:
 
 def _trigger(
     wish: StartWish | None, lanes: LanesAcross, rng: np.random.Generator
-) -> Trigger | None:
+) -> planned_motion.Trigger | None:
     if wish is None:
         return None
     if wish.after_s is not None:
-        return AtTime(after_s=round(wish.after_s.drawn(rng), 2))
-    within_m = REACHED_M if wish.ego_distance is None else wish.ego_distance.drawn(rng)
+        return planned_motion.AtTime(after_s=round(wish.after_s.drawn(rng), 2))
+    within_m = (
+        planned_motion.REACHED_M if wish.ego_distance is None else wish.ego_distance.drawn(rng)
+    )
     within_m = round(within_m, 2)
     if wish.mark is None:
-        return NearEgo(within_m=within_m)
+        return planned_motion.NearEgo(within_m=within_m)
     mark_m = find_mark(lanes, wish.mark)
     if mark_m is None:
         raise CannotPlace(f"Not in this scene: {wish.mark}.")
     x_m, y_m = (round(value, 3) for value in lanes.route.position(mark_m))
-    return AtPlace(x_m=x_m, y_m=y_m, within_m=within_m)
+    return planned_motion.AtPlace(x_m=x_m, y_m=y_m, within_m=within_m)

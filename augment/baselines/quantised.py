@@ -20,15 +20,8 @@ from augment.baselines import rule_placer
 from augment.baselines.placing_ground import build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference, overlap
+from augment.scene import intent as wish
 from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import (
-    Body,
-    ConesRequest,
-    DoorRequest,
-    Intent,
-    VehicleRequest,
-    WalkRequest,
-)
 from augment.scene.lane_graph import LaneGraph
 
 FURTHEST_M = 72.0
@@ -37,7 +30,7 @@ _LEFT_FROM_M = 0.005
 """What lies on the ego's own axis is on its right; half a centimetre is no side."""
 _STEP_M = 0.5
 _DRAWS = 50
-_NO_VEHICLES = (Body.BICYCLE, Body.BARRIER, Body.CONSTRUCTION_SIGN)
+_NO_VEHICLES = (wish.Body.BICYCLE, wish.Body.BARRIER, wish.Body.CONSTRUCTION_SIGN)
 
 
 class Direction(IntEnum):
@@ -101,7 +94,7 @@ def _direction_of(heading_rad: float) -> Direction:
 
 
 def place(
-    scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0
+    scene: Scene, intent: wish.Intent | None, *, bin_m: float, seed: int = 0
 ) -> rule_placer.Placement:
     """Put vehicles where their codes allow; the same for the same seed.
 
@@ -116,8 +109,10 @@ def place(
             refuses the intent, or no place is left.
     """
     for request in () if intent is None else intent.requests:
-        is_other = isinstance(request, VehicleRequest) and request.body in _NO_VEHICLES
-        if is_other or isinstance(request, WalkRequest | ConesRequest | DoorRequest):
+        is_other = isinstance(request, wish.VehicleRequest) and request.body in _NO_VEHICLES
+        if is_other or isinstance(
+            request, wish.WalkRequest | wish.ConesRequest | wish.DoorRequest
+        ):
             raise CannotPlace("The code knows vehicles alone, and something else is asked for.")
     right = rule_placer.place(scene, intent, seed=seed).modification
     moved = {agent.id for agent in right.moved}

@@ -22,31 +22,19 @@ from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, r
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
+from augment.scene import intent as intents
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
-from augment.scene.intent import (
-    Body,
-    ConesRequest,
-    CrashRequest,
-    DoorRequest,
-    Intent,
-    Length,
-    Move,
-    Relation,
-    Request,
-    VehicleRequest,
-    WalkRequest,
-)
 from augment.scene.intent_parts import MotionWish
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
 _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
-_NEEDS: dict[type[Request], tuple[str, str, str]] = {
-    VehicleRequest: ("vehicles", "speed_mps", "whether they stand or how fast they drive"),
-    WalkRequest: ("pedestrians", "start", "the side that they come from"),
-    ConesRequest: ("cones", "shape", "the shape"),
-    CrashRequest: ("crashed vehicles", "count", "the count"),
+_NEEDS: dict[type[intents.Request], tuple[str, str, str]] = {
+    intents.VehicleRequest: ("vehicles", "speed_mps", "whether they stand or how fast they drive"),
+    intents.WalkRequest: ("pedestrians", "start", "the side that they come from"),
+    intents.ConesRequest: ("cones", "shape", "the shape"),
+    intents.CrashRequest: ("crashed vehicles", "count", "the count"),
 }
 """How a request's agents are called, and what it must say besides distance and count."""
 
@@ -65,7 +53,7 @@ class Placement:
     notes: str
 
 
-def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
+def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Placement:
     """Add what is asked for to a scene; the same for the same seed.
 
     Raises:
@@ -98,7 +86,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
     named: dict[str, _Agents] = {}
     for asked, added in zip(intent.requests, resolved.requests, strict=True):
-        car = _car_of(asked, lanes, named) if isinstance(asked, DoorRequest) else None
+        car = _car_of(asked, lanes, named) if isinstance(asked, intents.DoorRequest) else None
         agents, sentence = fitting.fit(added, car)
         named[asked.name] = agents
         fitting.added += agents
@@ -109,12 +97,12 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     return Placement(modification=changes, notes=" ".join(sentences))
 
 
-def list_open(request: Request) -> list[str]:
+def list_open(request: intents.Request) -> list[str]:
     """Return what a request leaves open without which nothing can be placed, a sentence each."""
-    if isinstance(request, DoorRequest):
+    if isinstance(request, intents.DoorRequest):
         return []
     who, field, what = _NEEDS[type(request)]
-    comes = isinstance(request, VehicleRequest) and is_on_other_arm(request.motion)
+    comes = isinstance(request, intents.VehicleRequest) and is_on_other_arm(request.motion)
     needs = {
         "the distance": request.spot.distance or comes,
         what: getattr(request, field),
@@ -142,7 +130,7 @@ class _Fitting:
         self._place, self._route, self._rng = PlacingGround(self._ground, route), route, rng
         self.added: _Agents = ()
 
-    def fit(self, request: Request, of: TrafficAgent | None = None) -> tuple[_Agents, str]:
+    def fit(self, request: intents.Request, of: TrafficAgent | None = None) -> tuple[_Agents, str]:
         """Return the agents nearest to the asked distance that the checks pass, and a note.
 
         Args:
@@ -151,11 +139,13 @@ class _Fitting:
         """
         for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
-        wanted = request.spot.distance or Length(low_m=0.0, high_m=0.0)
+        wanted = request.spot.distance or intents.Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.drawn(self._rng)
-        sign = 1.0 if request.spot.relation is Relation.AHEAD else -1.0
+        sign = 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
         draw = int(self._rng.integers(2**32))
-        arrangements = count_arrangements(request) if isinstance(request, CrashRequest) else 1
+        arrangements = (
+            count_arrangements(request) if isinstance(request, intents.CrashRequest) else 1
+        )
         first_problem = ""
         best: tuple[int, _Agents, float] | None = None
         for shift_m, arrangement in itertools.product(_shifts(wanted), range(arrangements)):
@@ -180,7 +170,7 @@ class _Fitting:
 
     def _put(
         self,
-        request: Request,
+        request: intents.Request,
         distance_m: float,
         rng: np.random.Generator,
         arrangement: int,
@@ -190,19 +180,21 @@ class _Fitting:
         if of is not None and wish is not None:
             return (_rounded(give_motion(wish, self._place, of, rng)),)
         match request:
-            case VehicleRequest():
+            case intents.VehicleRequest():
                 agents = place_vehicles(request, self._place, distance_m, rng)
-            case WalkRequest():
+            case intents.WalkRequest():
                 agents = place_walkers(request, self._place, distance_m, rng)
-            case ConesRequest():
+            case intents.ConesRequest():
                 agents = place_cones(request, self._place, distance_m, rng)
-            case CrashRequest():
+            case intents.CrashRequest():
                 agents = place_crash(request, self._place, distance_m, rng, arrangement)
-            case DoorRequest():
+            case intents.DoorRequest():
                 raise AssertionError("a door is of somebody")
         return tuple(map(_rounded, agents))
 
-    def _judge(self, request: Request, distance_m: float, agents: _Agents) -> tuple[str, int]:
+    def _judge(
+        self, request: intents.Request, distance_m: float, agents: _Agents
+    ) -> tuple[str, int]:
         """Return why the agents can't stand there, "" if they can, and how much is doubtful.
 
         The checks see the request and the placement, never a reference.
@@ -217,25 +209,25 @@ class _Fitting:
         ground = self._ground
         if before:
             ground = Ground.of(replace(self._scene, agents=(*self._scene.agents, *before)))
-        intent = Intent(requests=(request,), route=self._route)
+        intent = intents.Intent(requests=(request,), route=self._route)
         findings = check_against_intent(ground, Modification(added=own), intent)
         wrong = (one.sentence() for one in findings if one.severity is Severity.WRONG)
         return next(wrong, ""), sum(one.severity is Severity.DOUBTFUL for one in findings)
 
 
-def _as_request(move: Move, agent: TrafficAgent) -> Request:
+def _as_request(move: intents.Move, agent: TrafficAgent) -> intents.Request:
     """Return a road user's move as the placement of a new one."""
     if move.stays and agent.type is AgentType.PEDESTRIAN:
-        return WalkRequest(count=1, motion=move.motion)
+        return intents.WalkRequest(count=1, motion=move.motion)
     return replace(
         move.vehicle_request,
-        body=Body.__members__.get(agent.type.name, Body.VEHICLE),
+        body=intents.Body.__members__.get(agent.type.name, intents.Body.VEHICLE),
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
     )
 
 
 def _car_of(
-    request: DoorRequest, lanes: LanesAcross, named: Mapping[str, _Agents]
+    request: intents.DoorRequest, lanes: LanesAcross, named: Mapping[str, _Agents]
 ) -> TrafficAgent:
     if request.spot.landmark is not None:
         return find_picked(lanes, request.spot.landmark)[0]
@@ -251,7 +243,7 @@ def _numbered(agents: _Agents, scene: Scene) -> _Agents:
     )
 
 
-def _shifts(wanted: Length) -> list[float]:
+def _shifts(wanted: intents.Length) -> list[float]:
     """Return 0, then further and further to either side."""
     tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
     steps = range(1, int(tolerance_m / _SHIFT_STEP_M) + 1)

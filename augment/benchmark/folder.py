@@ -20,14 +20,7 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.documents import read_json
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell
-from augment.scene.codec import (
-    modification_from_document,
-    modification_to_document,
-    recording_from_document,
-    recording_to_document,
-    scene_from_document,
-    scene_to_document,
-)
+from augment.scene import codec
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.planned_mover import check_motions
 from augment.scene.schema import CLOSED, Codec, Text, Whole, Yes, path
@@ -200,9 +193,9 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
 
 
 _PARSERS: dict[str, Any] = {
-    SCENE: scene_from_document,
-    RECORDING: recording_from_document,
-    REFERENCE: modification_from_document,
+    SCENE: codec.scene_from_document,
+    RECORDING: codec.recording_from_document,
+    REFERENCE: codec.modification_from_document,
 }
 
 
@@ -231,14 +224,14 @@ def _file_of(kind: str, name: str) -> str:
 
 def _documents_of(task: BenchmarkTask) -> dict[str, Any]:
     """Return the own documents of a task that are handed out, by their kinds."""
-    documents = {SCENE: scene_to_document(task.scene)}
+    documents = {SCENE: codec.scene_to_document(task.scene)}
     if task.recording is not None:
-        documents[RECORDING] = recording_to_document(task.recording)
+        documents[RECORDING] = codec.recording_to_document(task.recording)
     if task.split is Split.PRACTICE:
         if task.reference is None:
             problem = "is for practice and has no reference to hand out"
             raise InvalidDocument(WHAT, [(task.name, problem)])
-        documents[REFERENCE] = modification_to_document(task.reference)
+        documents[REFERENCE] = codec.modification_to_document(task.reference)
     return documents
 
 

@@ -9,19 +9,8 @@ from augment.checks.asked_crash import in_order
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
 from augment.checks.parties import CRASH_M, WORKER_M, Asked, Bounds, Party, apart_m, hold
+from augment.scene import intent as wish
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Point, TrafficAgent
-from augment.scene.intent import (
-    ConesRequest,
-    CrashRequest,
-    Lateral,
-    Length,
-    Nearness,
-    Relation,
-    Shape,
-    Side,
-    VehicleRequest,
-    WalkRequest,
-)
 
 _SLIGHT_M = 1.5
 """The end of the paper's range for a slight offset."""
@@ -60,25 +49,25 @@ def asked_distance(asked: Asked) -> Iterator[Finding]:
 
 
 def _is_ring(party: Party) -> bool:
-    return isinstance(party.request, ConesRequest) and party.request.shape is Shape.RING
+    return isinstance(party.request, wish.ConesRequest) and party.request.shape is wish.Shape.RING
 
 
 def _measure_ahead(asked: Asked, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
     """Who tells the distance of a party, and its distance ahead of the ego."""
     request = party.request
-    sign = -1.0 if request.spot.relation is Relation.BEHIND else 1.0
+    sign = -1.0 if request.spot.relation is wish.Relation.BEHIND else 1.0
     agents = [*party.placed, *party.spare]
     ahead = [(asked.ahead_m(agent), agent) for agent in agents]
     first_m, first = min(ahead, key=lambda item: (sign * item[0], item[1].id))
     if _is_ring(party):
         return first, sum(value for value, _ in ahead) / len(ahead)
-    if isinstance(request, CrashRequest) and party.is_exact:
+    if isinstance(request, wish.CrashRequest) and party.is_exact:
         first = in_order(party, request, asked.route)[0]
         return first, asked.ahead_m(first)
-    if isinstance(request, WalkRequest):
+    if isinstance(request, wish.WalkRequest):
         meetings = [(_meets_route(asked, agent), agent) for agent in party.placed]
         ahead += [(asked.route.locate(*at).ahead_m, agent) for at, agent in meetings if at]
-    elif not isinstance(request, CrashRequest) and party.is_exact:
+    elif not isinstance(request, wish.CrashRequest) and party.is_exact:
         return first, first_m
     value, agent = min(ahead, key=lambda item: (wanted.off(item[0]), item[1].id))
     return agent, value
@@ -86,9 +75,9 @@ def _measure_ahead(asked: Asked, party: Party, wanted: Bounds) -> tuple[TrafficA
 
 def _to_next_m(party: Party) -> float:
     """How much further the next one stands where one is missing."""
-    if party.missing and isinstance(party.request, CrashRequest):
+    if party.missing and isinstance(party.request, wish.CrashRequest):
         return CRASH_M
-    if party.missing and isinstance(party.request, ConesRequest) and party.request.spacing:
+    if party.missing and isinstance(party.request, wish.ConesRequest) and party.request.spacing:
         return party.request.spacing.high_m
     return 0.0
 
@@ -109,21 +98,21 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
     """Vehicles by their offset, crashes and cones by the lane that they are in."""
     for party in asked.parties:
         request, lane = party.request, party.request.spot.lane
-        if isinstance(request, WalkRequest) or not party.placed or lane is None:
+        if isinstance(request, wish.WalkRequest) or not party.placed or lane is None:
             continue
         first = min(party.placed, key=lambda agent: (abs(asked.ahead_m(agent)), agent.id))
         band = asked.lanes.band(lane, asked.ahead_m(first))
         if band is None:
             continue
-        if isinstance(request, VehicleRequest):
+        if isinstance(request, wish.VehicleRequest):
             for agent in party.placed:
                 wanted = _wanted(asked, request.spot.lateral, band, agent.width_m / 2.0)
                 left_m = asked.left_m(agent) - band.left_m
                 yield _across([agent], left_m, wanted)
-        elif isinstance(request, ConesRequest):
+        elif isinstance(request, wish.ConesRequest):
             yield from _cones(asked, party, request, band)
         elif (
-            isinstance(request, CrashRequest) and not party.missing
+            isinstance(request, wish.CrashRequest) and not party.missing
         ):  # else the nearest may be missing, and the others lie anywhere
             if party.is_exact:
                 first = in_order(party, request, asked.route)[0]
@@ -146,7 +135,7 @@ def _across(
     )
 
 
-def _wanted(asked: Asked, lateral: Lateral | None, band: Band, half_box_m: float) -> Bounds:
+def _wanted(asked: Asked, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
     """Where across its lane something belongs, left positive; anywhere in it by default."""
     sign, half_lane_m = asked.lanes.side_sign(lateral), band.width_m / 2.0
     if lateral is None:
@@ -158,21 +147,26 @@ def _wanted(asked: Asked, lateral: Lateral | None, band: Band, half_box_m: float
     else:
         near_m, far_m = {
             None: (0.0, half_lane_m),
-            Nearness.SLIGHTLY: (0.0, _SLIGHT_M),
-            Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
-            Nearness.HALF_OUT: (half_lane_m, half_lane_m),
-            Nearness.OUTSIDE: (half_lane_m + half_box_m, half_lane_m + half_box_m + _FAR_OUT_M),
+            wish.Nearness.SLIGHTLY: (0.0, _SLIGHT_M),
+            wish.Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
+            wish.Nearness.HALF_OUT: (half_lane_m, half_lane_m),
+            wish.Nearness.OUTSIDE: (
+                half_lane_m + half_box_m,
+                half_lane_m + half_box_m + _FAR_OUT_M,
+            ),
         }[lateral.nearness]
     low_m, high_m = sorted((sign * near_m, sign * far_m))
     return Bounds(low_m, high_m, asked.tolerances.across_m)
 
 
-def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Iterator[Finding]:
+def _cones(
+    asked: Asked, party: Party, request: wish.ConesRequest, band: Band
+) -> Iterator[Finding]:
     """A line by its side of the lane, all other shapes by their middle and their first cone."""
     cones = sorted(party.placed, key=asked.ahead_m)
     lefts = [asked.left_m(cone) - band.left_m for cone in cones]
     sign, middle_m = asked.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
-    is_line = request.shape is Shape.LINE and sign != 0.0 and not request.both_sides
+    is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
     wanted = _wanted(asked, None, band, 0.0)
     if is_line:
         edge_m = sign * band.width_m / 2.0
@@ -185,9 +179,9 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
     if request.ends_in_middle and party.is_exact:
         yield _across(cones[-1:], lefts[-1], Bounds(0.0, 0.0, asked.tolerances.middle_m))
     begins_m = lefts[0] - lefts[-1]
-    if request.shape is Shape.TAPER and abs(begins_m) > _TAPER_M:
+    if request.shape is wish.Shape.TAPER and abs(begins_m) > _TAPER_M:
         start = asked.lanes.kerb if request.start is None else request.start.sign
-        side = Side.LEFT if start > 0.0 else Side.RIGHT
+        side = wish.Side.LEFT if start > 0.0 else wish.Side.RIGHT
         words = f"The taper is to begin with {{agents[0]}} at the {side} of the lane."
         yield find(FindingKind.ASKED_SIDE, begins_m * start > 0.0, cones, words)
 
@@ -196,9 +190,9 @@ def asked_spacing(asked: Asked) -> Iterator[Finding]:
     """The median gap between neighbours in a row, and from a worker to the cones."""
     for party in asked.parties:
         request = party.request
-        if isinstance(request, VehicleRequest):
+        if isinstance(request, wish.VehicleRequest):
             yield from _in_row(asked, party, request.spacing)
-        elif isinstance(request, ConesRequest):
+        elif isinstance(request, wish.ConesRequest):
             yield from _in_row(asked, party, None if request.reach_m else request.spacing)
             for worker in party.workers if party.agents else ():
                 nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
@@ -211,7 +205,7 @@ def asked_spacing(asked: Asked) -> Iterator[Finding]:
                 )
 
 
-def _in_row(asked: Asked, party: Party, spacing: Length | None) -> Iterator[Finding]:
+def _in_row(asked: Asked, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
     """From centre to centre, straight or along the ego's lane: whichever is nearer to the wish."""
     things = party.agents
     if spacing is None or not party.is_exact or len(things) < 2:

@@ -12,6 +12,7 @@ import shapely
 
 from augment.checks.ground import Ground, is_stopped
 from augment.geometry.frames import difference
+from augment.scene import intent as intents
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
     AgentType,
@@ -20,20 +21,6 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficSide,
     TurnType,
-)
-from augment.scene.intent import (
-    DoorRequest,
-    Intent,
-    LaneChoice,
-    Lateral,
-    LateralTarget,
-    Length,
-    MapPlace,
-    Pick,
-    Relation,
-    Request,
-    Sight,
-    Spot,
 )
 from augment.scene.lane_graph import Beside, best_aligned
 
@@ -46,10 +33,12 @@ _BESIDE_M = 15.0
 _ON_A_SIDE_M = 1.0
 _VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
 _SIGHTS = {
-    **dict.fromkeys((Sight.VEHICLE, Sight.PARKED, Sight.MOVING), _VEHICLES),
-    Sight.BUS: (AgentType.BUS,),
-    Sight.BICYCLE: (AgentType.BICYCLE,),
-    Sight.PEDESTRIAN: (AgentType.PEDESTRIAN,),
+    **dict.fromkeys(
+        (intents.Sight.VEHICLE, intents.Sight.PARKED, intents.Sight.MOVING), _VEHICLES
+    ),
+    intents.Sight.BUS: (AgentType.BUS,),
+    intents.Sight.BICYCLE: (AgentType.BICYCLE,),
+    intents.Sight.PEDESTRIAN: (AgentType.PEDESTRIAN,),
 }
 
 
@@ -87,11 +76,11 @@ class LanesAcross:
         """On which side of the ego's lane the kerb is: 1 left, -1 right."""
         return 1.0 if self.route.scene.traffic_side is TrafficSide.LEFT else -1.0
 
-    def band(self, choice: LaneChoice, ahead_m: float) -> Band | None:
+    def band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         """Return the lane of that choice, None where there is none there."""
         tangent_rad = self.route.heading_at(ahead_m)
         near = self.route.graph.beside(*self.route.position(ahead_m))
-        if choice is LaneChoice.OWN:
+        if choice is intents.LaneChoice.OWN:
             own = best_aligned([lane for lane in near if lane.covers], tangent_rad)
             if own is None:
                 return None
@@ -104,26 +93,26 @@ class LanesAcross:
             default=None,
         )
 
-    def side_sign(self, lateral: Lateral | None) -> float:
+    def side_sign(self, lateral: intents.Lateral | None) -> float:
         """Return 1 for left of the ego's direction, -1 for right, 0 for the lane's centre."""
         signs = {
-            LateralTarget.LEFT_BOUNDARY: 1.0,
-            LateralTarget.RIGHT_BOUNDARY: -1.0,
-            LateralTarget.KERB: self.kerb,
-            LateralTarget.CENTRE_LINE: -self.kerb,
+            intents.LateralTarget.LEFT_BOUNDARY: 1.0,
+            intents.LateralTarget.RIGHT_BOUNDARY: -1.0,
+            intents.LateralTarget.KERB: self.kerb,
+            intents.LateralTarget.CENTRE_LINE: -self.kerb,
         }
         return signs.get(lateral.target, 0.0) if lateral else 0.0
 
 
-def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
+def _band(lane: Beside, tangent_rad: float, choice: intents.LaneChoice) -> Band | None:
     """A lane beside the own one as one of the choice, None where it is not."""
     turn_rad = abs(difference(lane.tangent_rad, tangent_rad))
     is_along, is_against = turn_rad < _ALONG_RAD, turn_rad > _AGAINST_RAD
     left_m = lane.d_m if is_against else -lane.d_m
     fits = {
-        LaneChoice.LEFT: is_along and left_m > 0.0,
-        LaneChoice.RIGHT: is_along and left_m < 0.0,
-        LaneChoice.ONCOMING: is_against,
+        intents.LaneChoice.LEFT: is_along and left_m > 0.0,
+        intents.LaneChoice.RIGHT: is_along and left_m < 0.0,
+        intents.LaneChoice.ONCOMING: is_against,
     }
     if lane.beyond_m > _JOINT_M or abs(left_m) < _SAME_LANE_M or not fits[choice]:
         return None
@@ -132,9 +121,9 @@ def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
     )
 
 
-def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
+def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, ...]:
     """Return who is meant: one, or all of `every`; empty where nobody fits."""
-    sign = 1.0 if pick.relation is Relation.AHEAD else -1.0
+    sign = 1.0 if pick.relation is intents.Relation.AHEAD else -1.0
     agents = []
     for agent in lanes.route.scene.agents:
         place = lanes.route.locate_agent(agent)
@@ -144,31 +133,31 @@ def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
     return ordered if pick.every else ordered[pick.ordinal - 1 : pick.ordinal]
 
 
-def find_mark(lanes: LanesAcross, mark: MapPlace) -> float | None:
+def find_mark(lanes: LanesAcross, mark: intents.MapPlace) -> float | None:
     """Return how far ahead of the ego a place of the map is, None where there is none ahead."""
-    if mark is MapPlace.CROSSWALK:
+    if mark is intents.MapPlace.CROSSWALK:
         return _crosswalk_m(lanes)
     route, begins_m = lanes.route, -lanes.route.ego_s_m
     for name, ends_m in zip(route.lane_ids, route.ends_m, strict=True):
         if isinstance(route.graph.lane(name), LaneConnector) and ends_m > 0.0:
-            return begins_m if mark is MapPlace.JUNCTION_START else ends_m
+            return begins_m if mark is intents.MapPlace.JUNCTION_START else ends_m
         begins_m = ends_m
     return None
 
 
-def resolve_spots(intent: Intent, lanes: LanesAcross) -> Intent:
+def resolve_spots(intent: intents.Intent, lanes: LanesAcross) -> intents.Intent:
     """Return the intent with every distance counted from the ego.
 
     It is left open where what it is counted from is not there, or open itself.
     """
-    named: dict[str, Spot] = {}
-    requests: list[Request] = []
+    named: dict[str, intents.Spot] = {}
+    requests: list[intents.Request] = []
     for request in intent.requests:
         spot = request.spot
-        if isinstance(request, DoorRequest) and spot.distance is None:
+        if isinstance(request, intents.DoorRequest) and spot.distance is None:
             # Level with its car.
-            level = Length(low_m=0.0, high_m=0.0)
-            spot = replace(spot, distance=level, relation=Relation.AHEAD)
+            level = intents.Length(low_m=0.0, high_m=0.0)
+            spot = replace(spot, distance=level, relation=intents.Relation.AHEAD)
         spot = _from_ego(spot, lanes, named)
         named[request.name] = spot
         requests.append(replace(request, spot=spot))
@@ -176,7 +165,9 @@ def resolve_spots(intent: Intent, lanes: LanesAcross) -> Intent:
     return replace(intent, requests=tuple(requests), moves=moves)
 
 
-def _from_ego(spot: Spot, lanes: LanesAcross, named: dict[str, Spot]) -> Spot:
+def _from_ego(
+    spot: intents.Spot, lanes: LanesAcross, named: dict[str, intents.Spot]
+) -> intents.Spot:
     own, base, is_approximate = spot.span_m, None, False
     if spot.anchor is not None:
         anchor = named[spot.anchor]
@@ -199,12 +190,12 @@ def _from_ego(spot: Spot, lanes: LanesAcross, named: dict[str, Spot]) -> Spot:
     is_approximate |= spot.distance is not None and spot.distance.is_approximate
     return replace(
         bare,
-        relation=Relation.AHEAD if is_ahead else Relation.BEHIND,
-        distance=Length(low_m=low_m, high_m=high_m, is_approximate=is_approximate),
+        relation=intents.Relation.AHEAD if is_ahead else intents.Relation.BEHIND,
+        distance=intents.Length(low_m=low_m, high_m=high_m, is_approximate=is_approximate),
     )
 
 
-def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
+def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
     """Return in words what the intent names and the scene does not have."""
     asked = (*intent.requests, *intent.moves)
     spots = [one.spot for one in asked]
@@ -217,11 +208,15 @@ def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
     return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
 
 
-def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosition) -> bool:
+def _fits(
+    lanes: LanesAcross, pick: intents.Pick, agent: TrafficAgent, place: RoutePosition
+) -> bool:
     stands = is_stopped(agent)
     if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
         return False
-    if stands is not {Sight.PARKED: True, Sight.MOVING: False}.get(pick.kind, stands):
+    if stands is not {intents.Sight.PARKED: True, intents.Sight.MOVING: False}.get(
+        pick.kind, stands
+    ):
         return False
     if pick.side is not None and pick.side.sign * place.left_m <= _ON_A_SIDE_M:
         return False
@@ -229,7 +224,7 @@ def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosit
         return True
     # What comes towards the ego is in the oncoming lane.
     turned_rad = abs(difference(agent.heading_rad, place.tangent_rad))
-    if pick.lane is LaneChoice.ONCOMING:
+    if pick.lane is intents.LaneChoice.ONCOMING:
         return turned_rad > _AGAINST_RAD
     band = lanes.band(pick.lane, place.ahead_m)
     if band is None or turned_rad > _ALONG_RAD:

@@ -12,21 +12,9 @@ from enum import StrEnum
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import LanesAcross
+from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
-from augment.scene.intent import (
-    Body,
-    ConesRequest,
-    CrashRequest,
-    DoorRequest,
-    Intent,
-    LaneChoice,
-    Length,
-    Request,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +114,7 @@ _TYPES = {
     Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
     Role.DOOR: (AgentType.GENERIC_OBJECT,),
 }
-_ROLES = {Body.VAN: Role.CAR, Body.TRUCK: Role.CAR}
+_ROLES = {wish.Body.VAN: Role.CAR, wish.Body.TRUCK: Role.CAR}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +129,7 @@ class Party:
         spare: Those of the main role that are one too many, whichever of them it is.
     """
 
-    request: Request
+    request: wish.Request
     agents: tuple[TrafficAgent, ...] = ()
     workers: tuple[TrafficAgent, ...] = ()
     mistyped: tuple[tuple[TrafficAgent, Role], ...] = ()
@@ -166,7 +154,7 @@ class Party:
 
 
 def match_to_requests(
-    intent: Intent, added: Sequence[TrafficAgent], lanes: LanesAcross
+    intent: wish.Intent, added: Sequence[TrafficAgent], lanes: LanesAcross
 ) -> tuple[list[Party], tuple[TrafficAgent, ...]]:
     """Deal the added agents out to the requests, each to the nearest spot that takes its type.
 
@@ -210,27 +198,27 @@ def match_to_requests(
     return parties, surplus
 
 
-def _roles(request: Request, added: Sequence[TrafficAgent]) -> list[Role]:
+def _roles(request: wish.Request, added: Sequence[TrafficAgent]) -> list[Role]:
     """Whom a request needs; where its count is open, as many as there are, and at least one."""
-    kinds = {WalkRequest: Role.WALKER, DoorRequest: Role.DOOR}
+    kinds = {wish.WalkRequest: Role.WALKER, wish.DoorRequest: Role.DOOR}
     role = kinds.get(type(request), Role.CONE)
-    if isinstance(request, VehicleRequest | CrashRequest):
+    if isinstance(request, wish.VehicleRequest | wish.CrashRequest):
         role = _ROLES.get(request.body) or Role(request.body.value)
     count = request.count or max(sum(role.suits(agent) for agent in added), 1)
-    if not isinstance(request, ConesRequest):
+    if not isinstance(request, wish.ConesRequest):
         return [role] * count
     both = 2 if request.both_sides and request.count is not None else 1
     return [role] * (count * both) + [Role.WORKER] * request.has_worker
 
 
-def middle_of(spot: Spot, lanes: LanesAcross) -> Point:
+def middle_of(spot: wish.Spot, lanes: LanesAcross) -> Point:
     """Return the point that a spot names: the middle of its range, on the middle of its lane.
 
     What is open is taken as the ego's own place and lane: it only says who is nearest.
     """
     span_m = [end for end in spot.span_m or (0.0,) if math.isfinite(end)]
     ahead_m = sum(span_m) / len(span_m)
-    band = lanes.band(spot.lane or LaneChoice.OWN, ahead_m)
+    band = lanes.band(spot.lane or wish.LaneChoice.OWN, ahead_m)
     return lanes.route.position(ahead_m, 0.0 if band is None else band.left_m)
 
 
@@ -269,7 +257,7 @@ class Asked:
         """Return how far left of the ego's route an agent is."""
         return self.route.locate_agent(agent).left_m
 
-    def gap(self, wanted: Length) -> "Bounds":
+    def gap(self, wanted: wish.Length) -> "Bounds":
         """Return how far apart two things may be of which this is asked for."""
         share_m = self.tolerances.spacing_share * wanted.high_m
         return Bounds(wanted.low_m, wanted.high_m, max(self.tolerances.spacing_m, share_m))

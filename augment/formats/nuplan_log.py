@@ -17,16 +17,8 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
+from augment.formats import reading
 from augment.formats.nuplan_map import city_around, open_tables
-from augment.formats.reading import (
-    Log,
-    LoggedTrack,
-    LogReader,
-    Moment,
-    frames_every,
-    speeds,
-    tracks_of,
-)
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 
 if TYPE_CHECKING:
@@ -52,22 +44,22 @@ _FRAME = "SELECT timestamp FROM lidar_pc WHERE token = ?"
 LIGHT_OF = {name: TrafficLight(name) for name in ("green", "yellow", "red", "unknown")}
 
 
-class NuPlan(LogReader):
+class NuPlan(reading.LogReader):
     """The reader of nuPlan's log databases."""
 
     name = "nuplan"
     title = "nuPlan log (.db file, with maps/ beside or above it)"
     suffix, marker = ".db", b"SQLite format 3\0"
 
-    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+    def moments(self, path: Path, *, every_s: float) -> Iterator[reading.Moment]:
         """Frames that far apart."""
         with open_tables(path) as base:
             tokens = _tokens(base)
         times_s = [(time - tokens[0][1]) * 1e-6 for _, time in tokens]
-        for index in frames_every(times_s, every_s):
-            yield Moment(item=tokens[index][0], time_s=times_s[index])
+        for index in reading.frames_every(times_s, every_s):
+            yield reading.Moment(item=tokens[index][0], time_s=times_s[index])
 
-    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+    def logs(self, path: Path, item: str | None) -> Iterator[reading.Log]:
         """Half a minute from one lidar_pc on."""
         with open_tables(path) as base:
             place = base.execute("SELECT location, map_version, logfile FROM log").fetchone()
@@ -78,7 +70,7 @@ class NuPlan(LogReader):
             doubts = Doubts()
             times_s, ego, tracks = _motion(base, token, doubts)
             lights, notes = _lights(base, token, doubts), _tag_notes(base, token)
-        yield Log(
+        yield reading.Log(
             times_s=times_s,
             ego=ego,
             ego_size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
@@ -158,7 +150,7 @@ def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
 
 def _motion(
     base: sqlite3.Connection, token: str, doubts: Doubts
-) -> tuple[FloatArray, FloatArray, dict[str, LoggedTrack]]:
+) -> tuple[FloatArray, FloatArray, dict[str, reading.LoggedTrack]]:
     """Times, the ego's states and all tracks from a lidar_pc on, which is the first step."""
     start = base.execute(_FRAME, (bytes.fromhex(token),)).fetchone()
     if start is None:
@@ -185,10 +177,10 @@ def _motion(
     center_m = poses[["x", "y"]].to_numpy() + REAR_AXLE_TO_CENTER_M * way
     times_s = np.array([(stamps[index] - first) * 1e-6 for index in chosen])
     speed_mps = np.hypot(vx, vy)
-    speed_mps = np.where(np.isnan(speed_mps), speeds(times_s, center_m), speed_mps)
+    speed_mps = np.where(np.isnan(speed_mps), reading.speeds(times_s, center_m), speed_mps)
     boxes = _boxes(base, poses["token"].tolist(), doubts)
     ego = np.column_stack([center_m, yaw, speed_mps])
-    return times_s, ego, tracks_of(boxes, TYPE_OF, times_s)
+    return times_s, ego, reading.tracks_of(boxes, TYPE_OF, times_s)
 
 
 def _numbers(

@@ -15,13 +15,7 @@ from augment.foreign import fault_at
 from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reader, Reading
 from augment.formats.writing import Cell, LossReport, Written, write_each
-from augment.scene.codec import (
-    SCENE_FORMAT,
-    modification_to_document,
-    recording_to_document,
-    scene_from_document,
-    scene_to_document,
-)
+from augment.scene import codec
 from augment.scene.motion import MotionSource, Movement
 from augment.scene.recording import Recording, Track
 
@@ -31,7 +25,7 @@ class OwnJson(Reader):
 
     name = "json"
     title = "scene in the own JSON (file)"
-    suffix, marker = ".json", SCENE_FORMAT.encode()
+    suffix, marker = ".json", codec.SCENE_FORMAT.encode()
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """The one."""
@@ -41,7 +35,7 @@ class OwnJson(Reader):
         """The scene under another name."""
         if frame or item is not None:
             raise fault_at("frame", "a JSON scene has no parts and frame 0 alone")
-        scene = scene_from_document(read_json(path, what="scene"))
+        scene = codec.scene_from_document(read_json(path, what="scene"))
         return Reading(scene=replace(scene, name=name), recording=None)
 
 
@@ -55,12 +49,12 @@ def write(cells: Sequence[Cell]) -> Written:
 
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     documents = {
-        "before": scene_to_document(cell.scene),
-        "scene": scene_to_document(cell.after),
-        "modification": modification_to_document(cell.modification),
+        "before": codec.scene_to_document(cell.scene),
+        "scene": codec.scene_to_document(cell.after),
+        "modification": codec.modification_to_document(cell.modification),
     }
     if cell.recording is not None:
-        documents["recording"] = recording_to_document(_recording(cell))
+        documents["recording"] = codec.recording_to_document(_recording(cell))
     return {f"{cell.stem}.{name}.json": _text(one) for name, one in documents.items()}
 
 

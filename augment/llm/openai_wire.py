@@ -18,20 +18,12 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
+from augment.llm import wire_transport
 from augment.llm.addresses import Resolve
 from augment.llm.answers import fault_of_status, read_completion
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.costs import least_tokens
 from augment.llm.messages import Reply, Request
-from augment.llm.wire_transport import (
-    ACCEPTED,
-    CONNECT_TIMEOUT_S,
-    LOOK_EVERY_S,
-    Transport,
-    Watch,
-    WireFault,
-    watch_over,
-)
 
 if TYPE_CHECKING:
     import openai
@@ -79,7 +71,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         timeout_s: float = DEFAULT_TIMEOUT_S,
         most_bytes: int = DEFAULT_MOST_BYTES,
         still_wanted: Callable[[], None] = watch_nothing,
-        look_every_s: float = LOOK_EVERY_S,
+        look_every_s: float = wire_transport.LOOK_EVERY_S,
         proxy_url: str = "",
         resolve: Resolve = socket.getaddrinfo,
     ) -> None:
@@ -114,14 +106,14 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         sent = request.to_document()
         sending()
         started = time.monotonic()
-        watch = Watch(
+        watch = wire_transport.Watch(
             longest_s=self._timeout_s,
             most_bytes=self._most_bytes,
             still_wanted=self._still_wanted,
             look_every_s=self._look_every_s,
         )
         try:
-            with watch_over(watch):
+            with wire_transport.watch_over(watch):
                 # Raw: the package passes on what has wrong types as if it had the right ones.
                 answer = self._client.post("/chat/completions", cast_to=httpx2.Response, body=sent)
             latency_s = time.monotonic() - started
@@ -145,7 +137,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             fault = Abandoned(why) if watch.has_written else why
         except InvalidDocument as error:
             fault = NotSent(error.problems[0][1])
-        except WireFault as error:
+        except wire_transport.WireFault as error:
             # Where nothing was written there is nothing to be billed.
             kind = ModelFault if watch.has_written else NotSent
             fault = kind(str(error), retryable=error.retryable, status=error.status)
@@ -198,7 +190,7 @@ def _client(
     host = (address.hostname or "").lower()
     foreign = not f".{host}".endswith(_OPENAI_HOSTS)
     headers = dict.fromkeys(("OpenAI-Organization", "OpenAI-Project"), openai.omit)
-    transport = Transport(
+    transport = wire_transport.Transport(
         resolve=resolve,
         # Plain HTTP shows no certificate, and loading those to check one by takes longer than
         # a call on this computer.
@@ -210,11 +202,13 @@ def _client(
         api_key=key,
         base_url=base_url,
         max_retries=0,
-        timeout=openai.Timeout(timeout_s, connect=min(CONNECT_TIMEOUT_S, timeout_s)),
+        timeout=openai.Timeout(
+            timeout_s, connect=min(wire_transport.CONNECT_TIMEOUT_S, timeout_s)
+        ),
         default_headers=headers if foreign else None,  # type: ignore[arg-type]
         http_client=openai.DefaultHttpxClient(
             transport=transport,  # type: ignore[arg-type]
-            headers={"Accept-Encoding": ACCEPTED},
+            headers={"Accept-Encoding": wire_transport.ACCEPTED},
             # A redirect would carry the scene to a host that nobody entered.
             follow_redirects=False,
             # The environment's proxy would look the name up itself, and nobody would check it.

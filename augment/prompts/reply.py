@@ -15,14 +15,8 @@ from pydantic import BeforeValidator, Field
 
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
 from augment.geometry.frames import wrap
+from augment.prompts import vectors
 from augment.prompts.blocks import LONGEST_ANSWER, Strict, last_object, validate, without_thoughts
-from augment.prompts.vectors import (
-    DEFAULT_RADIUS_M,
-    ShortNames,
-    short_names,
-    with_scene_ids,
-    with_short_ids,
-)
 from augment.scene.codec import intent_from_parts
 from augment.scene.density import fit_boxes
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
@@ -166,7 +160,9 @@ class JudgeAnswer(Strict):
     reason: Annotated[str, Field(max_length=LONGEST_ENTRY)] = ""
 
 
-def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M) -> ReadReply:
+def read_reply(
+    answer: str, scene: Scene, *, radius_m: float = vectors.DEFAULT_RADIUS_M
+) -> ReadReply:
     """Return the modification that the answer asks for.
 
     Args:
@@ -178,7 +174,7 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
         ReplyUnreadable: Whatever is wrong with the answer.
     """
     document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
-    block, names = validate(_Block, document), short_names(scene)
+    block, names = validate(_Block, document), vectors.short_names(scene)
     problems = []
     for agent in [*block.add, *block.move]:
         ends = (agent.x_m, agent.y_m, *(agent.walk_to or ()))
@@ -302,9 +298,9 @@ def read_intent(answer: str) -> Intent:
 # Private
 
 
-def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modification:
+def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Modification:
     """Return the change in the scene's own ids; its faults are told in the short ones."""
-    shown = with_short_ids(scene, names)
+    shown = vectors.with_short_ids(scene, names)
     asked = Modification(
         added=tuple(_agent(agent) for agent in block.add),
         moved=tuple(_agent(agent) for agent in block.move),
@@ -318,7 +314,7 @@ def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modificatio
         raise ReplyUnreadable(
             [f"an added agent's id is taken: number them from {names.next_agent}"]
         )
-    return with_scene_ids(asked, names)
+    return vectors.with_scene_ids(asked, names)
 
 
 def _agent(agent: _Agent) -> TrafficAgent:

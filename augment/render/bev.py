@@ -13,23 +13,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from augment.render import palette
+from augment.render import palette, road
 from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, stack_png
 from augment.render.labels import draw_badges, draw_ghosts, draw_labels, place_badges
 from augment.render.legend import draw_legend
 from augment.render.marks import draw_mark, draw_motion, draw_trails, draw_walks, is_small
 from augment.render.palette import MarkStyle
-from augment.render.road import (
-    Corner,
-    beyond_road,
-    draw_goal,
-    draw_ground,
-    draw_scale,
-    draw_signals,
-    scale_box,
-    scale_corner,
-)
 from augment.render.shapes import sides
 from augment.scene.entities import (
     AgentType,
@@ -74,7 +64,7 @@ def draw(
 
 def draw_empty(scene: Scene, camera: Camera) -> bytes:
     """Draw what stays while everybody moves: road, goal, lights and scale, nobody on it."""
-    corner = scale_corner(scene, camera)
+    corner = road.scale_corner(scene, camera)
     return _still(replace(scene, agents=()), camera, corner).png()
 
 
@@ -98,7 +88,7 @@ def draw_for_review(scene: Scene, modification: Modification, camera: Camera) ->
         for lane in near:
             _draw_over_boxes(ground, scene, lane)
         # The scale stays readable; what crosses it is to be seen in the rest of the picture.
-        draw_scale(ground, scale_box(window, scale_corner(scene, window)))
+        road.draw_scale(ground, road.scale_box(window, road.scale_corner(scene, window)))
         draw_labels(
             ground,
             apply(scene, modification),
@@ -141,7 +131,7 @@ def _paint_scene(
     changed = {agent.id for agent in modification.changed}
     rest = replace(after, agents=tuple(one for one in after.agents if one.id not in changed))
     # The scale keeps away from who was there before the change, the same for every contestant.
-    corner = scale_corner(scene, camera)
+    corner = road.scale_corner(scene, camera)
     ground = _unchanged(rest, camera, corner).copy()
     if ghosts:
         draw_ghosts(ground, scene, modification)
@@ -149,14 +139,14 @@ def _paint_scene(
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
     lost = [one for one in modification.changed if not ground.shows(ground.at(one.x_m, one.y_m))]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
-    scale_px = scale_box(camera, corner)
+    scale_px = road.scale_box(camera, corner)
     badges = place_badges(ground, lost, seen, taken=(scale_px,))
     draw_badges(ground, badges)
     return ground, [scale_px, *(badge.box_px for badge in badges)]
 
 
 @lru_cache(maxsize=4)
-def _unchanged(rest: Scene, camera: Camera, corner: Corner) -> Canvas:
+def _unchanged(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
     """Draw everything that a change leaves as it is; nobody draws on it, only on copies."""
     ground = _still(rest, camera, corner)
     traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]
@@ -164,12 +154,12 @@ def _unchanged(rest: Scene, camera: Camera, corner: Corner) -> Canvas:
     return ground
 
 
-def _still(rest: Scene, camera: Camera, corner: Corner) -> Canvas:
+def _still(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
     """Draw all but who is there, on a surface of its own."""
     ground = _flat(replace(rest, agents=()), camera).copy()
-    draw_goal(ground, rest)
-    draw_signals(ground, rest)
-    draw_scale(ground, scale_box(camera, corner))
+    road.draw_goal(ground, rest)
+    road.draw_signals(ground, rest)
+    road.draw_scale(ground, road.scale_box(camera, corner))
     return ground
 
 
@@ -179,8 +169,8 @@ def _flat(scene: Scene, camera: Camera) -> Canvas:
 
     A job runs the contestants of a scenario one after the other; each of these holds 4 MB.
     """
-    ground = Canvas(camera, beyond_road(scene))
-    draw_ground(ground, scene)
+    ground = Canvas(camera, road.beyond_road(scene))
+    road.draw_ground(ground, scene)
     return ground
 
 

@@ -15,14 +15,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 
 from augment.errors import InvalidModification
-from augment.scene.entities import (
-    AgentType,
-    Modification,
-    ScenarioType,
-    Scene,
-    TrafficAgent,
-    TurnType,
-)
+from augment.scene import entities
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
 from augment.scene.intent_parts import Amount
 from augment.scene.planned_motion import EGO_ID as EGO_ID
@@ -35,13 +28,13 @@ ENGLISH = "en"
 _ALWAYS_WRITTEN = ("requests", "kind", "body")
 
 
-def _scene_problems(scene: Scene) -> Iterator[Problem]:
+def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
     """What keeps a well-shaped value from being a scene."""
     ego = scene.ego
     if ego.id != EGO_ID:
         yield "ego.id", f"the ego is {EGO_ID!r}, got {ego.id!r}"
-    if ego.type is not AgentType.EGO_VEHICLE:
-        yield "ego.type", f"the ego is {AgentType.EGO_VEHICLE!s}, got {ego.type!s}"
+    if ego.type is not entities.AgentType.EGO_VEHICLE:
+        yield "ego.type", f"the ego is {entities.AgentType.EGO_VEHICLE!s}, got {ego.type!s}"
     for name in ("x_m", "y_m", "heading_rad"):
         if (value := getattr(ego, name)) != 0.0:
             yield f"ego.{name}", f"the ego is the origin of its frame: 0, got {value}"
@@ -59,11 +52,11 @@ def _scene_problems(scene: Scene) -> Iterator[Problem]:
     for index, area in enumerate(scene.areas):
         if len(set(area.boundary_m)) < 3:
             yield path("areas", index, "boundary_m"), "an area needs three distinct points"
-    if scene.options.goal is TurnType.U_TURN:
+    if scene.options.goal is entities.TurnType.U_TURN:
         yield "options.goal", "left, right or straight"
 
 
-def _modification_problems(change: Modification) -> Iterator[Problem]:
+def _modification_problems(change: entities.Modification) -> Iterator[Problem]:
     """What keeps a well-shaped value from being a modification of any scene."""
     named = [(path("add", i, "id"), agent.id) for i, agent in enumerate(change.added)]
     named += [(path("move", i, "id"), agent.id) for i, agent in enumerate(change.moved)]
@@ -84,18 +77,18 @@ def _doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
 def _second_egos(**agents: Iterable[Any]) -> Iterator[Problem]:
     for key, listed in agents.items():
         for index, agent in enumerate(listed):
-            if agent.type is AgentType.EGO_VEHICLE:
+            if agent.type is entities.AgentType.EGO_VEHICLE:
                 yield path(key, index, "type"), "there is one ego, and it is not in this list"
 
 
-def _motion_problems(**agents: Iterable[TrafficAgent]) -> Iterator[Problem]:
+def _motion_problems(**agents: Iterable[entities.TrafficAgent]) -> Iterator[Problem]:
     for key, listed in agents.items():
         for index, agent in enumerate(listed):
             if agent.motion is not None and agent.walk_to_m is not None:
                 yield path(key, index, "motion"), "an agent has a walk or a motion, not both"
 
 
-def _reference_problems(scene: Scene) -> Iterator[Problem]:
+def _reference_problems(scene: entities.Scene) -> Iterator[Problem]:
     lanes = {lane.id for lane in scene.lanes}
     known = lanes | {connector.id for connector in scene.connectors}
     on = [("ego.lane_id", scene.ego.lane_id)]
@@ -158,8 +151,8 @@ def _intent_problems(intent: Intent) -> Iterator[Problem]:
             yield f"{at}.{further}", text
 
 
-SCENE = Codec("scene", TypeAdapter(Scene), _scene_problems)
-MODIFICATION = Codec("modification", TypeAdapter(Modification), _modification_problems)
+SCENE = Codec("scene", TypeAdapter(entities.Scene), _scene_problems)
+MODIFICATION = Codec("modification", TypeAdapter(entities.Modification), _modification_problems)
 RECORDING = Codec("recording", TypeAdapter(Recording), _recording_problems)
 SCENE_FORMAT: str = SCENE.frame["format"]
 INTENT = Codec("intent", TypeAdapter(Intent), _intent_problems)
@@ -243,7 +236,7 @@ class CatalogueEntry:
     slug: _Words
     scene: _Words
     follows: Annotated[str, Field(exclude_if=lambda slug: not slug)] = ""
-    type: ScenarioType | MotionPreset
+    type: entities.ScenarioType | MotionPreset
     language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
     instruction: _Words
     paraphrases: Annotated[
@@ -258,7 +251,7 @@ class CatalogueEntry:
         PlainSerializer(lambda intent: intent and intent_to_document(intent)),
     ] = None
     reference: Annotated[
-        Modification,
+        entities.Modification,
         BeforeValidator(modification_from_document),
         PlainSerializer(modification_to_document),
     ]

@@ -5,23 +5,8 @@ What is open makes no statement.
 
 from collections.abc import Iterator
 
+from augment.scene import intent as intents
 from augment.scene.entities import TurnType
-from augment.scene.intent import (
-    ConesRequest,
-    CrashedCar,
-    CrashRequest,
-    DoorRequest,
-    Facing,
-    Intent,
-    Lateral,
-    Length,
-    Move,
-    Request,
-    Side,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
 from augment.scene.intent_parts import MotionWish
 
 _ROUTES = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.U_TURN: "back"}
@@ -46,7 +31,7 @@ _MOTION_FACTS = {
 }
 
 
-def list_statements(intent: Intent) -> tuple[str, ...]:
+def list_statements(intent: intents.Intent) -> tuple[str, ...]:
     """Return all that the intent says, in the order of its requests."""
     statements = [
         f"{_name_thing(request)}: {fact}"
@@ -81,29 +66,29 @@ def list_motion_facts(wish: MotionWish) -> Iterator[str]:
 # Private
 
 
-def _name_thing(request: Request) -> str:
+def _name_thing(request: intents.Request) -> str:
     match request:
-        case VehicleRequest():
+        case intents.VehicleRequest():
             thing = str(request.body)
-        case WalkRequest():
+        case intents.WalkRequest():
             thing = "pedestrian"
-        case ConesRequest():
+        case intents.ConesRequest():
             thing = "cones"
-        case CrashRequest():
+        case intents.CrashRequest():
             thing = f"crashed {request.body}"
-        case DoorRequest():
+        case intents.DoorRequest():
             thing = f"door of {request.spot.anchor or request.spot.landmark}"
     return f"{thing} “{request.name}”" if request.name else thing
 
 
-def _list_facts(request: Request) -> Iterator[str]:
-    if request.count is not None and not isinstance(request, DoorRequest):
+def _list_facts(request: intents.Request) -> Iterator[str]:
+    if request.count is not None and not isinstance(request, intents.DoorRequest):
         yield f"number {request.count}"
     yield from _list_place_facts(request.spot)
     yield from _list_pose_facts(request)
-    if isinstance(request, WalkRequest) and request.start is not None:
+    if isinstance(request, intents.WalkRequest) and request.start is not None:
         yield f"crosses from the {request.start} to the {request.start.other}"
-    if isinstance(request, ConesRequest) and request.start is not None:
+    if isinstance(request, intents.ConesRequest) and request.start is not None:
         yield f"begins at the {request.start} lane boundary"
     for name, words in _FACTS.items():
         value = getattr(request, name, None)
@@ -115,7 +100,7 @@ def _list_facts(request: Request) -> Iterator[str]:
         yield from (f"number {number} is {fact}" for fact in _list_car_facts(car))
 
 
-def _list_car_facts(car: CrashedCar) -> Iterator[str]:
+def _list_car_facts(car: intents.CrashedCar) -> Iterator[str]:
     if car.bearing is not None:
         yield f"{car.bearing} the one before"
     if car.gap is not None:
@@ -124,7 +109,7 @@ def _list_car_facts(car: CrashedCar) -> Iterator[str]:
         yield _name_turn(car.turn_deg, is_signed=car.is_signed)
 
 
-def _list_place_facts(spot: Spot) -> Iterator[str]:
+def _list_place_facts(spot: intents.Spot) -> Iterator[str]:
     if spot.relation is not None:
         anchor = f"“{spot.anchor}”" if spot.anchor else str(spot.landmark or "the ego")
         anchor = f"the {spot.mark}" if spot.mark else anchor
@@ -139,17 +124,17 @@ def _list_place_facts(spot: Spot) -> Iterator[str]:
     yield from (str(setting) for setting in spot.settings)
 
 
-def _name_lateral(lateral: Lateral) -> str:
-    if isinstance(lateral.offset, Length):
+def _name_lateral(lateral: intents.Lateral) -> str:
+    if isinstance(lateral.offset, intents.Length):
         return f"{lateral.offset} from the lane centre towards the {lateral.target}"
     nearness = f"{lateral.nearness}, " if lateral.nearness else ""
     return f"{nearness}towards the {lateral.target}"
 
 
-def _list_pose_facts(request: Request | Move) -> Iterator[str]:
+def _list_pose_facts(request: intents.Request | intents.Move) -> Iterator[str]:
     facing = getattr(request, "facing", None)
     if facing is not None:
-        yield f"{'stands' if facing is Facing.ACROSS else 'faces'} {facing}"
+        yield f"{'stands' if facing is intents.Facing.ACROSS else 'faces'} {facing}"
     if turn_deg := getattr(request, "turn_deg", 0.0):
         yield _name_turn(turn_deg)
     speed_mps = getattr(request, "speed_mps", None)
@@ -161,5 +146,9 @@ def _list_pose_facts(request: Request | Move) -> Iterator[str]:
 
 
 def _name_turn(turn_deg: float, *, is_signed: bool = True) -> str:
-    side = f"to the {Side.LEFT if turn_deg > 0.0 else Side.RIGHT}" if is_signed else "to a side"
+    side = (
+        f"to the {intents.Side.LEFT if turn_deg > 0.0 else intents.Side.RIGHT}"
+        if is_signed
+        else "to a side"
+    )
     return f"turned {abs(turn_deg):g} degrees {side}"

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 
 from augment.errors import CannotPlace, InvalidDocument
 from augment.geometry.frames import Pose, difference
+from augment.scene import planned_mover
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
     AgentType,
@@ -36,13 +37,6 @@ from augment.scene.planned_motion import (
     PlannedMotion,
     PointPath,
     Trigger,
-)
-from augment.scene.planned_mover import (
-    HeldCourse,
-    lane_line,
-    run_beside,
-    smooth_share,
-    way_and_speed,
 )
 from augment.scene.schema import Codec
 
@@ -259,7 +253,7 @@ def _cut_in(case: _Case) -> TrafficAgent:
     mean_mps = (case.agent.speed_mps + case.reached_mps) / 2.0
     least_m = CHANGE_M if case.numbers.duration_s is None else 1.0
     change_m = round(min(max(least_m, mean_mps * case.number("duration_s")), 200.0), 1)
-    if case.lane_id is None or not run_beside(case.route.graph, case.lane_id, own):
+    if case.lane_id is None or not planned_mover.run_beside(case.route.graph, case.lane_id, own):
         raise case.refusal("it has to be in a lane beside the ego's, in the same direction.")
     path = LanePath(lane_ids=(case.lane_id, own), change_m=change_m)
     return case.moving(path, _ramp(case.agent.speed_mps, case.reached_mps))
@@ -337,7 +331,7 @@ def _u_turn(case: _Case) -> TrafficAgent:
             raise case.refusal("of somebody who drives it begins at a moment.")
         gone_m = agent.speed_mps * start.after_s
         gone_m += max(agent.speed_mps**2 - turn_mps**2, 0.0) / (2.0 * _SPEEDING_UP_MPS2)
-    here = HeldCourse(agent, case.route.graph).pose_at(gone_m)
+    here = planned_mover.HeldCourse(agent, case.route.graph).pose_at(gone_m)
     if here is None:
         raise case.refusal("the lanes end before it begins.")
     points = [here[:2]] if gone_m else []
@@ -366,7 +360,7 @@ def _turn_points(case: _Case, begin: Pose) -> list[Point]:
     points = [(x, y) for x, y in begin.to_parent(arc).tolist()]
     there = graph.lane(target).centerline.project(*points[-1])
     for gone_m in np.arange(3.0, _ONWARDS_M, 3.0).tolist():
-        left_m = there.d_m * (1.0 - smooth_share(min(gone_m / _ROUND_M, 1.0)))
+        left_m = there.d_m * (1.0 - planned_mover.smooth_share(min(gone_m / _ROUND_M, 1.0)))
         place = graph.along(target, there.s_m, gone_m, left_m)
         if place is None:
             break
@@ -394,12 +388,14 @@ def _red_light(case: _Case) -> TrafficAgent:
         path = LanePath(lane_ids=(*lane_ids, *case.route.graph.successors(connector.id)[:1]))
         own_mps = case.agent.speed_mps
         speeds = _ramp(own_mps, case.reached_mps)
-        line = lane_line(case.route.graph, path, (case.agent.x_m, case.agent.y_m))
+        line = planned_mover.lane_line(case.route.graph, path, (case.agent.x_m, case.agent.y_m))
         needs_m = line.project(*crossing).s_m if line is not None else 0.0
         if needs_m == 0.0:
             continue  # it is past the crossing
         times_s = np.arange(0.0, 60.0, 0.1)
-        gone_m = [way_and_speed(speeds, own_mps, time_s)[0] for time_s in times_s.tolist()]
+        gone_m = [
+            planned_mover.way_and_speed(speeds, own_mps, time_s)[0] for time_s in times_s.tolist()
+        ]
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])
         within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
         meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)

@@ -20,14 +20,8 @@ from augment.scene.codec import (
     scene_from_document,
 )
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
+from augment.services.scenarios import scenes
 from augment.services.scenarios.scene_imports import notes_of
-from augment.services.scenarios.scenes import (
-    INSTRUCTION_LENGTH,
-    check_reference,
-    check_slug,
-    label_for,
-    scene_of,
-)
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import MOST_SAMPLES, options_from_document
@@ -43,36 +37,36 @@ def _check_document(read: Callable[[Any], object], document: Any) -> None:
 
 
 def _check_scene(row: models.BaseScene) -> None:
-    check_slug(row.slug, what="scene")
+    scenes.check_slug(row.slug, what="scene")
     scene_from_document(row.document)
     notes_of(row.notes)
     _check_document(recording_from_document, row.recording)
 
 
 def _check_scenario(row: models.Scenario) -> None:
-    check_slug(row.slug, what="scenario")
-    label_for(row.type)
-    check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    scenes.check_slug(row.slug, what="scenario")
+    scenes.label_for(row.type)
+    check_prose("instruction", row.instruction, what="scenario", longest=scenes.INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
     _check_document(intent_from_document, row.intent)
     if row.reference is not None:
-        check_reference(scene_of(row), modification_from_document(row.reference))
+        scenes.check_reference(scenes.scene_of(row), modification_from_document(row.reference))
 
 
 def _check_benchmark(row: models.Benchmark) -> None:
-    check_slug(row.slug, what="benchmark")
+    scenes.check_slug(row.slug, what="benchmark")
     one_line("title", row.title, what="benchmark")
 
 
 def _check_endpoint(row: models.Endpoint) -> None:
-    check_slug(row.label, what="endpoint")
+    scenes.check_slug(row.label, what="endpoint")
     names = [field.name for field in fields(EndpointFacts)]
     facts = EndpointFacts(**{name: getattr(row, name) for name in names})
     check_facts(facts, is_stored=True)  # a call asks what its key is bound to
 
 
 def _check_contestant(row: models.Contestant) -> None:
-    check_slug(row.slug, what="contestant")
+    scenes.check_slug(row.slug, what="contestant")
     one_line("name", row.name, what="contestant")
     _check_document(CARD.from_parts, row.card)
     options_from_document(row.options)

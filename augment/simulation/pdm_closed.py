@@ -10,21 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.simulation import shapes
+from augment.simulation import planning, shapes
 from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
-from augment.simulation.planning import (
-    FALLBACK_LIMIT_MPS,
-    STEPS_A_SLICE,
-    Corridor,
-    Forecast,
-    Idm,
-    ParallelPaths,
-    Plan,
-    Proposals,
-    Situation,
-    foresee,
-    nearest,
-)
 from augment.simulation.road import Road
 from augment.simulation.states import (
     ACCELERATION,
@@ -45,7 +32,7 @@ from augment.simulation.states import (
 )
 from augment.simulation.tracker import track
 
-PROPOSAL_IDM = Idm(1.5, 3.0, 10.0)
+PROPOSAL_IDM = planning.Idm(1.5, 3.0, 10.0)
 """PDM-Closed's policies."""
 ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
 """The centreline first: of equal scores, all zero among them, the lowest number wins."""
@@ -98,16 +85,16 @@ class PdmClosed:
     def start(self, road: Road, body: EgoBody) -> None:
         """Lay the paths beside the centreline."""
         self._road, self._body = road, body
-        self._paths = ParallelPaths(road.centreline, self._offsets)
+        self._paths = planning.ParallelPaths(road.centreline, self._offsets)
         self._touched: set[str] = set()
 
-    def plan(self, situation: Situation) -> Plan:
+    def plan(self, situation: planning.Situation) -> planning.Plan:
         """Roll out, simulate and judge proposals, and continue the best, or brake."""
         ego, body, paths = situation.ego, self._body, self._paths
-        forecast = foresee(self._seen(situation), WHOLE_STEPS * STEP_S)
+        forecast = planning.foresee(self._seen(situation), WHOLE_STEPS * STEP_S)
         ego_m = self._road.centreline.station_of(ego)
         limit = self._road.limit_at(ego_m)
-        targets = SPEED_SHARES * (FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
+        targets = SPEED_SHARES * (planning.FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
         reaches_m = targets * WHOLE_STEPS * STEP_S
         furthest_m = reaches_m.max(keepdims=True)
         corridor = paths.corridor(forecast, ego_m, float(furthest_m[0]), body)
@@ -120,25 +107,25 @@ class PdmClosed:
         judged = score_proposals(states, forecast, self._road, body)
         # Scores that differ by rounding alone are equal, and the lowest number wins.
         best = int(judged.scores.round(9).argmax())
-        shown = Proposals(states=states, scores=judged.scores, chosen=best)
+        shown = planning.Proposals(states=states, scores=judged.scores, chosen=best)
         if must_brake(float(judged.fault_s[best]), float(ego[SPEED])):
-            return Plan(poses=brake(ego, body), proposals=shown, braking=True)
+            return planning.Plan(poses=brake(ego, body), proposals=shown, braking=True)
         # All go on from 4 s to 8 s; the winner's way is what is driven.
         ends = begun[..., -1]
         goes_on, _ = self._roll_out(ends, speeds, targets, reaches_m, corridor, rest)
         path, policy = divmod(best, len(targets))
         stations = np.concatenate([begun[path, policy], goes_on[path, policy, 1:]])
-        return Plan(poses=paths.paths[path].poses(stations), proposals=shown)
+        return planning.Plan(poses=paths.paths[path].poses(stations), proposals=shown)
 
-    def _seen(self, situation: Situation) -> Objects:
+    def _seen(self, situation: planning.Situation) -> Objects:
         """The objects that count: near, and not touching the ego since some step."""
         box = self._body.boxes(situation.ego)
-        near = nearest(situation.objects, box[:2])
+        near = planning.nearest(situation.objects, box[:2])
         touching = shapes.meet(box, near.boxes)
         self._touched |= {name for name, hit in zip(near.ids, touching, strict=True) if hit}
         return near.chosen(np.array([name not in self._touched for name in near.ids], dtype=bool))
 
-    def _with_red(self, corridor: Corridor, front_m: float) -> Corridor:
+    def _with_red(self, corridor: planning.Corridor, front_m: float) -> planning.Corridor:
         """The corridor with something standing at each red light ahead."""
         red = self._road.red_stations_m
         red = red[red >= front_m]
@@ -157,7 +144,7 @@ class PdmClosed:
         speed: FloatArray,
         targets_mps: FloatArray,
         reaches_m: FloatArray,
-        corridor: Corridor,
+        corridor: planning.Corridor,
         steps: range,
     ) -> tuple[FloatArray, FloatArray]:
         """Every policy on every path, over some steps of the horizon.
@@ -176,8 +163,10 @@ class PdmClosed:
         stations = [station]
         near, leader = np.zeros(station.shape), np.zeros(station.shape)
         for step in steps:
-            if step % STEPS_A_SLICE == 0:
-                near, leader = self._leaders(station, corridor, step // STEPS_A_SLICE, reaches_m)
+            if step % planning.STEPS_A_SLICE == 0:
+                near, leader = self._leaders(
+                    station, corridor, step // planning.STEPS_A_SLICE, reaches_m
+                )
             gap = near - station - self._body.front_m
             pull = PROPOSAL_IDM.clipped(speed, targets_mps, gap, leader)
             station = station + speed * STEP_S
@@ -186,7 +175,7 @@ class PdmClosed:
         return np.stack(stations, axis=-1), speed
 
     def _leaders(
-        self, station: FloatArray, corridor: Corridor, moment: int, reaches_m: FloatArray
+        self, station: FloatArray, corridor: planning.Corridor, moment: int, reaches_m: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Where the leader's rear is (P, V), and its speed; of equal ones the first.
 
@@ -224,7 +213,7 @@ class ProposalScores:
 
 
 def score_proposals(
-    states: FloatArray, forecast: Forecast, road: Road, body: EgoBody
+    states: FloatArray, forecast: planning.Forecast, road: Road, body: EgoBody
 ) -> ProposalScores:
     """Judge simulated states (B, T, 6)."""
     look = _Look(states, forecast, road, body)
@@ -249,7 +238,9 @@ def score_proposals(
 class _Look:
     """The states with what several judgements need of them."""
 
-    def __init__(self, states: FloatArray, forecast: Forecast, road: Road, body: EgoBody) -> None:
+    def __init__(
+        self, states: FloatArray, forecast: planning.Forecast, road: Road, body: EgoBody
+    ) -> None:
         self.states, self.road, self.body = states, road, body
         self.boxes = body.boxes(states)
         self.corners = shapes.corners(self.boxes)
@@ -259,7 +250,7 @@ class _Look:
 
     def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
         """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
-        moments = (np.arange(boxes.shape[1]) + later) // STEPS_A_SLICE
+        moments = (np.arange(boxes.shape[1]) + later) // planning.STEPS_A_SLICE
         others = self.moving_boxes[np.minimum(moments, len(self.moving_boxes) - 1)]
         reach = (self._sizes + shapes.radii(boxes[0, 0])) ** 2
         dx = boxes[..., None, 0] - others[None, ..., 0]
@@ -285,7 +276,7 @@ def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
     np.minimum.at(first, (proposal, thing), moment)
     proposal, thing = np.nonzero(first < never)
     moment = first[proposal, thing]
-    boxes = look.moving_boxes[moment // STEPS_A_SLICE, thing]
+    boxes = look.moving_boxes[moment // planning.STEPS_A_SLICE, thing]
     speeds, kinds = look.objects.speeds_mps[thing], look.objects.kinds[thing]
     states = look.states[proposal, moment]
     contacts = classify_contacts(states, boxes, speeds, kinds, look.body)
@@ -331,7 +322,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
     pairs = (proposal * (len(look.objects) + 1) + thing)[order]
     first = order[np.unique(pairs, return_index=True)[1]]
     proposal, moment, thing, later = (row[first] for row in (proposal, moment, thing, later))
-    moments = np.minimum((moment + later) // STEPS_A_SLICE, len(look.moving_boxes) - 1)
+    moments = np.minimum((moment + later) // planning.STEPS_A_SLICE, len(look.moving_boxes) - 1)
     places = look.moving_boxes[moments, thing, :2]
     bearing = shapes.bearings(look.states[proposal, moment], places)
     made[proposal[bearing < AHEAD_RAD]] = 0.0

@@ -14,14 +14,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from augment.formats import writing
+from augment.formats.openscenario import triggers
 from augment.formats.openscenario.roads import map_of
-from augment.formats.openscenario.triggers import (
-    held_states,
-    motion_in,
-    states_since_start,
-    with_motion,
-    written_distance,
-)
 from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import FloatArray, Movement
@@ -141,7 +135,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
     """What somebody does: come, follow a trajectory, go. Nothing for who stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
-    if (mover := with_motion(agent)) is not None:
+    if (mover := triggers.with_motion(agent)) is not None:
         yield from _own_events(xosc, cell, movement, mover)
         return
     if movement.stands:
@@ -163,15 +157,15 @@ def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) 
     """What it does until its motion starts, and from then on; past the map it is gone."""
     started_s, times_s = movement.started_s, cell.motion.times_s
     if agent.speed_mps > 0.0 and started_s != 0.0:
-        states = held_states(cell, agent)
+        states = triggers.held_states(cell, agent)
         follow = _follow(xosc, agent, times_s, states, is_relative=False)
         yield from _until_gone(
             xosc, agent, states, _event(xosc, f"{agent.id} goes on", follow, 0.0)
         )
-    by_clock = isinstance(motion_in(agent).start, AtTime)
+    by_clock = isinstance(triggers.motion_in(agent).start, AtTime)
     if started_s is None and (by_clock or agent.speed_mps > 0.0):
         return  # after the end; or where its path begins would depend on the ego
-    states = states_since_start(cell, agent, started_s or 0.0)
+    states = triggers.states_since_start(cell, agent, started_s or 0.0)
     if np.isnan(states).all():
         return  # it has left the map by then
     since_s = times_s + (started_s or 0.0) if by_clock else times_s
@@ -195,10 +189,10 @@ def _until_gone(xosc: Any, agent: TrafficAgent, states: FloatArray, event: Any) 
 
 def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None) -> Any:
     """The moment at which a motion starts."""
-    start, name = motion_in(agent).start, f"{agent.id} sets out"
+    start, name = triggers.motion_in(agent).start, f"{agent.id} sets out"
     if isinstance(start, AtTime):
         return _at(xosc, name, start.after_s)
-    apart = written_distance(cell, agent, start, started_s, _ahead_m)
+    apart = triggers.written_distance(cell, agent, start, started_s, _ahead_m)
     given = apart.within_m, xosc.Rule.lessOrEqual
     kind = xosc.RelativeDistanceType.euclidianDistance
     condition = xosc.RelativeDistanceCondition(*given, kind, EGO_ID, freespace=False)
@@ -242,7 +236,7 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
 
 def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: TrafficAgent) -> None:
     """Say what of a motion's start holds with our ego alone."""
-    start, started_s = motion_in(agent).start, movement.started_s
+    start, started_s = triggers.motion_in(agent).start, movement.started_s
     if agent.type in _THINGS:
         report.lose(f"{agent.id}: moves, and players may leave obstacles standing")
     if isinstance(start, AtTime):
@@ -251,7 +245,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
         text = "the motion is left out: where it begins hangs on when it starts, and it never does"
         report.lose(f"{agent.id}: {text}", changes_scene=True)
         return
-    apart = written_distance(cell, agent, start, started_s, _ahead_m)
+    apart = triggers.written_distance(cell, agent, start, started_s, _ahead_m)
     text = "its distance is told between rear axles: the same moment with our ego, else up to"
     report.lose(f"{agent.id}: {text} {apart.off_m:.1f} m off")
     if apart.early_s > 0.0:
@@ -263,7 +257,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
 def _report(cell: Cell, report: LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
     for one in cell.motion.others:
-        if (agent := with_motion(one.agent)) is not None:
+        if (agent := triggers.with_motion(one.agent)) is not None:
             _report_start(cell, report, one, agent)
     names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")

@@ -21,13 +21,7 @@ from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.intent import Intent
 from augment.services.judging.measures import Measure
-from augment.services.scenarios.editing import (
-    editable_ground,
-    give_preset,
-    presets_of,
-    read_edit,
-    snap,
-)
+from augment.services.scenarios import editing
 from augment.services.scenarios.scenes import ground_of, intent_of
 
 _WAY_STEPS = 10
@@ -123,12 +117,12 @@ def check_edit(
         preset: What somebody is made to do first, as `PresetEdit` has it.
     """
     try:
-        modification = read_edit(scenario, document)
+        modification = editing.read_edit(scenario, document)
         if snapped:
-            modification = snap(scenario, modification, snapped)
+            modification = editing.snap(scenario, modification, snapped)
         if preset is not None:
-            modification = give_preset(scenario, modification, preset)
-        ground, intent = editable_ground(scenario), intent_of(scenario)
+            modification = editing.give_preset(scenario, modification, preset)
+        ground, intent = editing.editable_ground(scenario), intent_of(scenario)
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification, CannotPlace, UnknownName) as error:
         return Checked(problem=str(error))
@@ -137,7 +131,7 @@ def check_edit(
         modification=modification_to_document(modification),
         findings=_worst_first(findings),
         is_against_intent=intent is not None,
-        presets=presets_of(scenario, modification),
+        presets=editing.presets_of(scenario, modification),
         ways={
             one.agent.id: one.states[one.is_present, :2][::_WAY_STEPS].round(2).tolist()
             for one in (motion.others if motion else ())

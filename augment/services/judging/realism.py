@@ -13,19 +13,10 @@ import numpy as np
 
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
+from augment.metrics import realism as metric
 from augment.metrics.displacement import CLASS_OF
 from augment.metrics.realism import REALISM_VERSION as REALISM_VERSION
 from augment.metrics.realism import SCORES as SCORES
-from augment.metrics.realism import (
-    PlacedObject,
-    Realism,
-    RecordedCounts,
-    count_recorded,
-    judge,
-    measure_change,
-    measure_recorded,
-    place_at_random,
-)
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification
@@ -136,7 +127,7 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
 # --- Private -----------------------------------------------------------------------------------
 
 
-_Beside = tuple[Realism | None, Realism | None]
+_Beside = tuple[metric.Realism | None, metric.Realism | None]
 """That of a change, and of what was recorded in its scene."""
 
 
@@ -151,11 +142,11 @@ class Surroundings:
         random: Of the pattern's objects, placed at random.
     """
 
-    recorded: Realism | None
-    reference: tuple[Realism | None, ...]
-    random: tuple[Realism | None, ...]
+    recorded: metric.Realism | None
+    reference: tuple[metric.Realism | None, ...]
+    random: tuple[metric.Realism | None, ...]
 
-    def by_subject(self) -> dict[Subject, tuple[Realism | None, ...]]:
+    def by_subject(self) -> dict[Subject, tuple[metric.Realism | None, ...]]:
         """Return the values for a table."""
         return {
             Subject.RECORDING: (self.recorded,),
@@ -173,12 +164,12 @@ class _Recorded:
     """What is learned from the scenes of this installation."""
 
     def __init__(self) -> None:
-        self.counts = {key: count_recorded(_objects_of(*key)) for key in _learned_scenes()}
-        self._total = sum(self.counts.values(), RecordedCounts())
+        self.counts = {key: metric.count_recorded(_objects_of(*key)) for key in _learned_scenes()}
+        self._total = sum(self.counts.values(), metric.RecordedCounts())
 
-    def without(self, scene: BaseScene) -> RecordedCounts:
+    def without(self, scene: BaseScene) -> metric.RecordedCounts:
         """Return the histograms of all other scenes."""
-        return self._total - self.counts.get(_key(scene), RecordedCounts())
+        return self._total - self.counts.get(_key(scene), metric.RecordedCounts())
 
 
 class _Judged:
@@ -189,28 +180,31 @@ class _Judged:
         self._ground = Ground.of(scene_of(scenario))
         self._recorded = learned.without(scenario.base_scene)
 
-    def of(self, change: Modification | None) -> Realism | None:
+    def of(self, change: Modification | None) -> metric.Realism | None:
         """Return the realism of a change, None where it can't be judged."""
         if change is None:
             return None
         try:
-            return self._judge(measure_change(self._ground, change))
+            return self._judge(metric.measure_change(self._ground, change))
         except InvalidModification:
             return None
 
-    def recording(self, pattern: Modification) -> Realism | None:
+    def recording(self, pattern: Modification) -> metric.Realism | None:
         """Return that of what was recorded here, of the classes that the pattern changes."""
         classes = {CLASS_OF[one.type] for one in pattern.changed}
         objects = _objects_of(*_key(self._scenario.base_scene))
         return self._judge([one for one in objects if one.object_class in classes])
 
-    def random(self, pattern: Modification) -> list[Realism | None]:
+    def random(self, pattern: Modification) -> list[metric.Realism | None]:
         """Return those of the pattern's objects anywhere; always the same for a scenario."""
         rng = np.random.default_rng(seed_of(self._scenario.slug))
-        return [self.of(place_at_random(self._ground, pattern, rng)) for _ in range(RANDOM_DRAWS)]
+        return [
+            self.of(metric.place_at_random(self._ground, pattern, rng))
+            for _ in range(RANDOM_DRAWS)
+        ]
 
-    def _judge(self, objects: list[PlacedObject]) -> Realism | None:
-        realism = judge(objects, self._recorded)
+    def _judge(self, objects: list[metric.PlacedObject]) -> metric.Realism | None:
+        realism = metric.judge(objects, self._recorded)
         return None if realism.mean is None else realism
 
 
@@ -224,9 +218,9 @@ def _name_learned_scenes() -> str:
     return str(_learned_scenes())
 
 
-def _judge_rows(ids: Collection[int]) -> dict[int, Realism]:
+def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
     learned = _Recorded()
-    found: dict[int, Realism] = {}
+    found: dict[int, metric.Realism] = {}
     for scenario, rows in _by_scenario(ids):
         judged = _Judged(scenario, learned)
         values = {row.pk: judged.of(_change_of(row)) for row in rows}
@@ -249,7 +243,7 @@ def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
     return found
 
 
-REALISM = Measure("realism", Realism, _judge_rows, _name_learned_scenes)
+REALISM = Measure("realism", metric.Realism, _judge_rows, _name_learned_scenes)
 """The realism of augmentations; none of what can't be judged."""
 SURROUNDINGS = Measure("surroundings", Surroundings, _judge_surroundings, _name_learned_scenes)
 
@@ -260,10 +254,10 @@ def _key(scene: BaseScene) -> tuple[UUID, str]:
 
 
 @lru_cache(maxsize=4 * MOST_SCENES)
-def _objects_of(code: UUID, content_hash: str) -> tuple[PlacedObject, ...]:
+def _objects_of(code: UUID, content_hash: str) -> tuple[metric.PlacedObject, ...]:
     """Return what was recorded in a scene; a quarter of a second for a hundred objects."""
     document = BaseScene.objects.values_list("document", flat=True).get(code=code)
-    return tuple(measure_recorded(Ground.of(scene_from_document(document))))
+    return tuple(metric.measure_recorded(Ground.of(scene_from_document(document))))
 
 
 def _by_scenario(ids: Collection[int]) -> Iterator[tuple[Scenario, list[Augmentation]]]:

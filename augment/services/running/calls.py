@@ -20,14 +20,7 @@ from django.db import connection, transaction
 from django.db.models import Q, QuerySet
 from django.utils import timezone
 
-from augment.errors import (
-    BudgetSpent,
-    JobCancelled,
-    LeaseLost,
-    ModelFault,
-    NotSent,
-    QuestionInFlight,
-)
+from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
@@ -63,13 +56,13 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
         JobCancelled: Its job is cancelled.
     """
     if not held.is_held(lock=lock):
-        raise LeaseLost
+        raise errors.LeaseLost
     cancelled = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
     if cancelled.filter(augmentations=held.pk).exists():
-        raise JobCancelled
+        raise errors.JobCancelled
 
 
-def sentence_of(fault: ModelFault) -> str:
+def sentence_of(fault: errors.ModelFault) -> str:
     """Return what broke, with the HTTP status where there was one."""
     text = str(fault)
     if fault.status is None or str(fault.status) in text:
@@ -202,7 +195,7 @@ class CallTranscript(ABC):
                 self._in_flight[self._numbers] = _CallInFlight(pk, worst, price)
                 return self._numbers
             if room == budget.Room.SPENT:
-                raise BudgetSpent(self.limit())
+                raise errors.BudgetSpent(self.limit())
             self._sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
@@ -216,9 +209,9 @@ class CallTranscript(ABC):
         workers.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._in_flight[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
-            raise LeaseLost
+            raise errors.LeaseLost
 
-    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+    def answered(self, number: int, reply: Reply, fault: errors.ModelFault | None = None) -> None:
         """Store the raw answer to that call and what it used.
 
         An answer with a fault is kept and paid for, but never served again.
@@ -232,11 +225,11 @@ class CallTranscript(ABC):
             _columns_of(reply) | {"fault": fault_text},
         )
 
-    def broke(self, number: int, fault: ModelFault) -> None:
+    def broke(self, number: int, fault: errors.ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._in_flight.pop(number)
         columns: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
-        if isinstance(fault, NotSent):
+        if isinstance(fault, errors.NotSent):
             columns["sent_at"] = None
         used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
         self._settle(call.pk, used, columns)
@@ -272,7 +265,7 @@ class CallTranscript(ABC):
         self.insist()
         _hold_question(columns["request_hash"])
         if self.calls_with(columns["request_hash"]).filter(_in_flight()).exists():
-            raise QuestionInFlight
+            raise errors.QuestionInFlight
         room = self.reserve(worst, price)
         if room != budget.Room.TAKEN:
             return room, 0

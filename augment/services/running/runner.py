@@ -14,18 +14,9 @@ from django.conf import settings
 from django.db import Error
 from django.db.models import Max, Q, QuerySet
 
+from augment import errors
 from augment.baselines.registry import PLACERS, RULE_PLACER
 from augment.benchmark.values import EntryStatus
-from augment.errors import (
-    AugmentError,
-    BudgetSpent,
-    CannotPlace,
-    Conflict,
-    InvalidModification,
-    JobCancelled,
-    ModelFault,
-    Unwanted,
-)
 from augment.llm.client import ChatClient
 from augment.llm.messages import shorten
 from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
@@ -122,15 +113,15 @@ class Augmentations(WorkKind[Augmentation]):
             held.note(**columns)  # a second try only has to draw
             image = picture_of(row.scenario, modification, camera_of(row.scenario))
             return Settlement(state=State.DONE, columns=columns | {"image": image})
-        except JobCancelled as cancelled:
+        except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
-        except (Unwanted, BudgetSpent):
+        except (errors.Unwanted, errors.BudgetSpent):
             raise
-        except ModelFault as fault:
+        except errors.ModelFault as fault:
             reason = sentence_of(fault)
-        except InvalidModification as error:
+        except errors.InvalidModification as error:
             reason = f"The modification does not fit the scene: {error}"
-        except AugmentError as error:
+        except errors.AugmentError as error:
             reason = str(error)
         return Settlement(state=State.FAILED, reason=reason)
 
@@ -210,7 +201,7 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
     if contestant.kind == Kind.REFERENCE:
         reference = reference_of(row.scenario)
         if reference is None:
-            raise Conflict("The scenario has no reference modification.")
+            raise errors.Conflict("The scenario has no reference modification.")
         return Outcome(status=OutcomeStatus.DONE, modification=reference)
     if contestant.kind == Kind.SUBMISSION:
         entry = find_entry(contestant, row.scenario.slug, row.sample)
@@ -226,13 +217,13 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         return _ask_model(row, contestant.endpoint, scene, held, connect)
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
     if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
-        raise Conflict(f"A job can't run contestants of kind {contestant.kind!r}.")
+        raise errors.Conflict(f"A job can't run contestants of kind {contestant.kind!r}.")
     slug = row.scenario.slug
     # Each sample has a seed of its own; the first keeps that of jobs without samples.
     seed = seed_of(slug if row.sample == 1 else f"{slug}#{row.sample}")
     try:
         placed = PLACERS[placer].place(scene, intent_of(row.scenario), seed=seed)
-    except CannotPlace as refusal:
+    except errors.CannotPlace as refusal:
         return Outcome(status=OutcomeStatus.REFUSED, reason=refusal.reason)
     return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
 
