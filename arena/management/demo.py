@@ -18,16 +18,7 @@ from arena.results.exports.writers import FORMATS, plain_text
 from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
-from augment.models import (
-    Augmentation,
-    BaseScene,
-    Benchmark,
-    Contestant,
-    Endpoint,
-    GenerationJob,
-    Scenario,
-    Simulation,
-)
+from augment import models
 from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.progress import count_rows
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
@@ -53,15 +44,15 @@ def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     demo.load_scenarios()
     load_catalogue(sets=["moving"])
-    scenarios, scenes = Scenario.objects.count(), BaseScene.objects.count()
+    scenarios, scenes = models.Scenario.objects.count(), models.BaseScene.objects.count()
     say(f"Catalogue: {scenarios} scenarios on {scenes} scenes")
-    if not Benchmark.objects.exists():
+    if not models.Benchmark.objects.exists():
         make_benchmark(
             BenchmarkRequest(slug="paper", title="The paper’s types", scenarios=["set:paper"])
         )
-    Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
+    models.Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
-    say(f"Contestants: {', '.join(Contestant.objects.values_list('slug', flat=True))}")
+    say(f"Contestants: {', '.join(models.Contestant.objects.values_list('slug', flat=True))}")
     known = set(User.objects.values_list("username", flat=True))
     for username, role in PEOPLE:
         if username not in known:
@@ -71,7 +62,7 @@ def prepare(say: Callable[[str], None]) -> None:
 
 def generate(
     scenarios: list[str], say: Callable[[str], None], look: Callable[[], None]
-) -> GenerationJob:
+) -> models.GenerationJob:
     """Every contestant on every one of the scenarios, through the workers.
 
     Args:
@@ -96,7 +87,7 @@ def generate(
     ends = {state.value: number for state, number in now.by_state.items() if number}
     say(f"Augmentations: {', '.join(f'{number} {state}' for state, number in ends.items())}")
     if now.failed:
-        reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
+        reasons = job.augmentations.filter(state=models.Augmentation.State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
     return job
 
@@ -107,7 +98,7 @@ def start_drives() -> list[int]:
     Returns:
         The keys of the drives.
     """
-    rows = Scenario.objects.filter(slug__in=demo.scenarios_of(DRIVEN_PER_TYPE))
+    rows = models.Scenario.objects.filter(slug__in=demo.scenarios_of(DRIVEN_PER_TYPE))
     waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
     return waiting
@@ -120,7 +111,9 @@ def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
         DemoFailed: They take longer than STUCK_S.
     """
     give_up_at = time.monotonic() + STUCK_S
-    under_way = Simulation.objects.filter(pk__in=drives, state__in=Simulation.UNDER_WAY)
+    under_way = models.Simulation.objects.filter(
+        pk__in=drives, state__in=models.Simulation.UNDER_WAY
+    )
     while left := under_way.count():
         look()
         if time.monotonic() > give_up_at:

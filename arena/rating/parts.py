@@ -7,16 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arena.rating import remarks
-from arena.rating.bootstrap import (
-    RatedRounds,
-    Rounds,
-    percentile_interval,
-    place_on_one_scale,
-    rate_rounds,
-    resample,
-    rounds_to_draw,
-)
+from arena.rating import bootstrap, remarks
 from arena.rating.comparisons import (
     BoolArray,
     Comparisons,
@@ -73,7 +64,7 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     if rules.method is Method.ELO:
         samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
         point = _Point(rating=np.median(samples, axis=1))
-        rounds = RatedRounds.of_values(samples)
+        rounds = bootstrap.RatedRounds.of_values(samples)
     else:
         counts = count_pairs(votes)
         met = Meetings(len(votes.names), counts)
@@ -89,7 +80,7 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
         note=(remarks.NO_INTERVAL,) * len(votes.names),
         warnings=(remarks.ELO_NOTE,) if rules.method is Method.ELO else (),
     )
-    values, reference = place_on_one_scale(point.rating, rounds)
+    values, reference = bootstrap.place_on_one_scale(point.rating, rounds)
     found = _find_intervals(point, values, reference, rules)
     if found is None or (votes.score == 0.5).all():
         why = remarks.why_no_intervals(votes, rules.unit)
@@ -169,7 +160,7 @@ def _fit_votes(
 
 def _rate_rounds(
     votes: Comparisons, counts: PairCounts, met: Meetings, rules: Rules, point: _Point
-) -> RatedRounds:
+) -> bootstrap.RatedRounds:
     """Rate resampled votes.
 
     For intervals in closed form the rounds only say who is determined; their ratings are those of
@@ -177,7 +168,7 @@ def _rate_rounds(
     """
     is_closed = rules.intervals is Intervals.CLOSED_FORM
 
-    def refit(rounds: Rounds, together: BoolArray | None) -> FloatArray:
+    def refit(rounds: bootstrap.Rounds, together: BoolArray | None) -> FloatArray:
         if is_closed:
             return np.repeat(point.rating[:, None], rounds.games.shape[1], axis=1)
         if point.tie_strength is None:
@@ -192,9 +183,9 @@ def _rate_rounds(
         )[:-1]
         return to_elo(found)
 
-    number = rounds_to_draw(votes, counts, rules.rounds) if is_closed else rules.rounds
-    blocks = resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
-    return rate_rounds(votes, counts, blocks, refit)
+    number = bootstrap.rounds_to_draw(votes, counts, rules.rounds) if is_closed else rules.rounds
+    blocks = bootstrap.resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
+    return bootstrap.rate_rounds(votes, counts, blocks, refit)
 
 
 # --- Intervals -----------------------------------------------------------------------------------
@@ -222,7 +213,7 @@ def _find_intervals(
         rules: By which.
     """
     rating, members = point.rating, np.flatnonzero(reference)
-    lower, upper = percentile_interval(values)
+    lower, upper = bootstrap.percentile_interval(values)
     if np.isnan([lower, upper]).all():
         return None
     spread = None

@@ -9,15 +9,9 @@ from arena.models import LabelTask, Study
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.services.events import log_change
-from augment.services.scenarios import editing
+from augment.services.scenarios import editing, scenes
 from augment.services.scenarios.benchmarks import refuse_handed_out
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import (
-    ScenarioContent,
-    change_surroundings,
-    derive_intent,
-    set_wording,
-)
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"
@@ -80,7 +74,7 @@ def _refuse_judged(scenario: Scenario) -> None:
 
 @transaction.atomic
 def change_scenario(
-    scenario: Scenario, content: ScenarioContent, *, actor: User | None = None
+    scenario: Scenario, content: scenes.ScenarioContent, *, actor: User | None = None
 ) -> Scenario:
     """Set what a scenario says and draws.
 
@@ -98,7 +92,7 @@ def change_scenario(
     refuse_handed_out(row)
     before, drawn = _state(row), row.reference
     row.reference = content.reference if isinstance(content.reference, dict) else None
-    change_surroundings(
+    scenes.change_surroundings(
         row, keep_traffic=content.keep_traffic, density=content.density, goal=content.goal
     )
     row.reference = editing.reference_document(row, content.reference)
@@ -106,8 +100,8 @@ def change_scenario(
         _refuse_judged(row)
     type, instruction = content.type, content.instruction
     if content.derives:
-        type, instruction = derive_intent(row, type, instruction)
-    set_wording(row, instruction, type)
+        type, instruction = scenes.derive_intent(row, type, instruction)
+    scenes.set_wording(row, instruction, type)
     if _state(row) != before:
         _refuse_needed(row, "changed")
     row.save()

@@ -20,12 +20,7 @@ from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, steps_to
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
-from augment.services.scenarios.pictures import (
-    SceneView,
-    draw_with_ids,
-    reference_picture,
-    scene_picture,
-)
+from augment.services.scenarios import pictures
 from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
 from augment.tasks import enqueue_augmentation
 
@@ -128,10 +123,10 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
-            name = reference_picture(find_scenario(code))
-        case _ if kind in set(SceneView):
+            name = pictures.reference_picture(find_scenario(code))
+        case _ if kind in set(pictures.SceneView):
             scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
-            name = scene_picture(scene, SceneView(kind))
+            name = pictures.scene_picture(scene, pictures.SceneView(kind))
         case _:
             raise Http404
     return sized_picture_response(request, name)
@@ -139,7 +134,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 
 def _labelled_picture(code: uuid.UUID) -> HttpResponse:
     try:
-        png = draw_with_ids(_augmentation(code))
+        png = pictures.draw_with_ids(_augmentation(code))
     except AugmentError as error:
         raise Http404 from error
     return HttpResponse(png, content_type="image/png")

@@ -9,16 +9,8 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.scenarios import queries, services
+from arena.site import acts
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import (
-    Confirmation,
-    ask,
-    is_sure,
-    looks_again,
-    refusals_told,
-    send_later,
-    wait_for_workers,
-)
 from arena.site.forms import read_code, read_json
 from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
@@ -89,8 +81,8 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     is_waiting = not scenario.original_image or (
         scenario.reference is not None and not has_picture
     )
-    if is_waiting and not looks_again(request):
-        send_later(request, enqueue_scenario, scenario.pk)
+    if is_waiting and not acts.looks_again(request):
+        acts.send_later(request, enqueue_scenario, scenario.pk)
     readers = EndpointModel.objects.select_related("endpoint")
     context = {
         "scenario": scenario,
@@ -98,7 +90,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "follow_ups": scenario.follow_ups.filter(retired_at=None),
         "has_picture": has_picture,
         "reference_name": reference,
-        **wait_for_workers(waits=is_waiting),
+        **acts.wait_for_workers(waits=is_waiting),
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),
         "statements": statements_of(scenario.intent),
@@ -171,7 +163,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     reading = plan_reading(
         scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=user_of(request)
     )
-    send_later(request, enqueue_reading, reading.pk)
+    acts.send_later(request, enqueue_reading, reading.pk)
     messages.success(request, f"{reader.model} reads it now.")
 
 
@@ -182,16 +174,16 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
 def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     """Delete a scenario or scene that nothing depends on, once that is confirmed."""
     row: Any = get_object_or_404(Scenario if kind == "scenario" else BaseScene, code=code)
-    if not is_sure(request):
+    if not acts.is_sure(request):
         facts = ("Only what no job, study or scenario needs is deleted. There is no way back.",)
-        question = Confirmation(
+        question = acts.Confirmation(
             title=f"Delete “{row.slug}”?",
             facts=facts,
             button="Delete",
             back=reverse(kind, args=[code]),
         )
-        return ask(request, question)
-    with refusals_told(request):
+        return acts.ask(request, question)
+    with acts.refusals_told(request):
         services.delete(row, actor=user_of(request))
         messages.success(request, f"“{row.slug}” is deleted.")
         return redirect(f"{kind}s")

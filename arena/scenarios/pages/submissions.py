@@ -20,12 +20,7 @@ from augment.models import Benchmark, Submission
 from augment.services.endpoints.contestants import free_slug_of
 from augment.services.inputs import inputs_of, read_request
 from augment.services.running.entering import AcceptRequest, accept_submission
-from augment.services.scenarios.submissions import (
-    decline_submission,
-    entries_of,
-    keep_submission,
-    withdraw_submission,
-)
+from augment.services.scenarios import submissions
 from augment.services.scenarios.uploads import most_megabytes
 from augment.tasks import enqueue_job, enqueue_submission
 
@@ -73,7 +68,7 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
     elif form.is_valid():
         with refusals_in(form, "file"):
             file = form.cleaned_data["file"]
-            row = keep_submission(
+            row = submissions.keep_submission(
                 Benchmark.objects.get(code=form.cleaned_data["benchmark"]),
                 name=file.name,
                 content=file,
@@ -102,7 +97,7 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("job", code=job.code)
     elif not form.is_bound:
         form.initial = {"slug": free_slug_of(row.title), "name": row.title, "runs": True}
-    page = Paginator(entries_of(row), AT_ONCE).get_page(page_asked(request))
+    page = Paginator(submissions.entries_of(row), AT_ONCE).get_page(page_asked(request))
     context = {
         "submission": row,
         "form": form if is_admin and is_waiting(row) else None,
@@ -119,14 +114,14 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def decline(request: HttpRequest, code: uuid.UUID) -> None:
     """Decline a submission, with the reason that its sender reads."""
     reason = request.POST.get("reason", "")
-    decline_submission(_find(request, code), reason=reason, actor=user_of(request))
+    submissions.decline_submission(_find(request, code), reason=reason, actor=user_of(request))
 
 
 @act_for(*STAFF, ENTRANT, back="submission")
 def withdraw(request: HttpRequest, code: uuid.UUID) -> None:
     """Take one's own submission back before it is decided."""
     own = submissions_for(user_of(request)).filter(uploaded_by=user_of(request))
-    withdraw_submission(get_object_or_404(own, code=code), actor=user_of(request))
+    submissions.withdraw_submission(get_object_or_404(own, code=code), actor=user_of(request))
     messages.success(request, "It is withdrawn, and its file removed.")
 
 

@@ -13,28 +13,13 @@ from django.utils.text import slugify
 
 from arena.exports.formats import download
 from arena.jobs.exports.sweeps import SWEEP_FORMATS
+from arena.site import acts
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import (
-    Confirmation,
-    ask,
-    is_sure,
-    refusals_told,
-    send_later,
-    tell_errors,
-    wait_for_workers,
-)
 from arena.site.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
 from augment.services.inputs import inputs_of, read_request
+from augment.services.judging import sweeps
 from augment.services.judging.simulations import allowed_planners
-from augment.services.judging.sweeps import (
-    LARGEST_FAMILY,
-    SweepRequest,
-    add_family,
-    delete_sweep,
-    numbers_of,
-    plan_sweep,
-)
 from augment.services.judging.thresholds import driver_of, result_of
 from augment.tasks import enqueue_scenario, enqueue_sweep
 
@@ -45,13 +30,13 @@ KEPT = ("number", "low", "high", "count", "planner", "offsets")
 class SweepForm(RequestForm):
     """Which number of a scenario is swept."""
 
-    inputs = inputs_of(SweepRequest)
+    inputs = inputs_of(sweeps.SweepRequest)
     number = forms.ChoiceField(label="Number")
     planner = forms.ChoiceField(label="Planner under test")
 
     def __init__(self, scenario: Scenario, data: Any = None, **more: Any) -> None:
         super().__init__(data, **more)
-        numbers = numbers_of(scenario).items()
+        numbers = sweeps.numbers_of(scenario).items()
         offer(self, "number", [(name, f"{name} (now {value:g})") for name, value in numbers])
         offer(self, "planner", [(name, name) for name in allowed_planners()])
 
@@ -60,7 +45,7 @@ class FamilyForm(forms.Form):
     """How many scenarios are drawn."""
 
     count = forms.IntegerField(
-        label="Scenarios", min_value=1, max_value=LARGEST_FAMILY, initial=10
+        label="Scenarios", min_value=1, max_value=sweeps.LARGEST_FAMILY, initial=10
     )
     seed = forms.IntegerField(label="Seed", min_value=0, max_value=2**31 - 1, initial=0)
 
@@ -85,12 +70,12 @@ def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     scenario = _scenario(code)
     form = SweepForm(scenario, request.POST)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
     else:
-        with refusals_told(request):
-            asked = read_request(SweepRequest, form.cleaned_data)
-            sweep = plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
-            send_later(request, enqueue_sweep, sweep.pk)
+        with acts.refusals_told(request):
+            asked = read_request(sweeps.SweepRequest, form.cleaned_data)
+            sweep = sweeps.plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
+            acts.send_later(request, enqueue_sweep, sweep.pk)
             return redirect("sweep", code=sweep.code)
     given = urlencode({name: request.POST.get(name, "") for name in KEPT})
     return redirect(f"{reverse('sweeps', args=[code])}?{given}")
@@ -101,13 +86,13 @@ def draw_family(request: HttpRequest, code: uuid.UUID) -> None:
     """Add scenarios with numbers drawn from the intent's ranges."""
     form = FamilyForm(request.POST)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return
-    rows, refused = add_family(
+    rows, refused = sweeps.add_family(
         scenario=_scenario(code), **form.cleaned_data, actor=user_of(request)
     )
     for row in rows:
-        send_later(request, enqueue_scenario, row.pk)
+        acts.send_later(request, enqueue_scenario, row.pk)
     for member in refused:
         messages.warning(request, f"Refused: {member.refusal}")
     if rows:
@@ -128,7 +113,7 @@ def sweep_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "done": result.planned - result.under_way,
         "finer": sorted(result.edges[0]) if result.edges else (),
         "forms": list(SWEEP_FORMATS),
-        **wait_for_workers(waits=bool(result.under_way)),
+        **acts.wait_for_workers(waits=bool(result.under_way)),
     }
     return render(request, "scenarios/sweep.html", context)
 
@@ -145,15 +130,15 @@ def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse
 def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Delete a sweep with its drives, once that is confirmed."""
     sweep = _sweep(code)
-    if not is_sure(request):
-        question = Confirmation(
+    if not acts.is_sure(request):
+        question = acts.Confirmation(
             title=f"Delete the sweep of {sweep.number}?",
             facts=("Its drives are deleted with it; a scenario that it kept stays.",),
             button="Delete",
             back=reverse("sweep", args=[code]),
         )
-        return ask(request, question)
-    delete_sweep(sweep, actor=user_of(request))
+        return acts.ask(request, question)
+    sweeps.delete_sweep(sweep, actor=user_of(request))
     messages.success(request, f"The sweep of {sweep.number} is deleted.")
     return redirect("sweeps", code=sweep.scenario.code)
 
