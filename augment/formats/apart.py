@@ -25,12 +25,7 @@ from augment.formats import sandbox
 from augment.formats.nuplan_log import vehicles_at
 from augment.formats.readers import READERS, find_input, reader_of, recognise
 from augment.formats.reading import LogReader, Moment, Reader, Reading
-from augment.scene.codec import (
-    recording_from_document,
-    recording_to_document,
-    scene_from_document,
-    scene_to_document,
-)
+from augment.scene import codec
 
 WHAT = "zip"
 _DEEPEST = 50
@@ -77,8 +72,8 @@ class UntrustedInput:
         source, found = self._ask("read", item=item, frame=frame, name=name)
         recording = found["recording"]
         return source, Reading(
-            scene=scene_from_document(found["scene"]),
-            recording=None if recording is None else recording_from_document(recording),
+            scene=codec.scene_from_document(found["scene"]),
+            recording=None if recording is None else codec.recording_from_document(recording),
             notes=_TEXTS.validate_python(found["notes"]),
             moment=_MOMENT.validate_python(found["moment"]),
         )
@@ -134,8 +129,10 @@ def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> 
         return vehicles_at(path, more["tokens"])
     found = reader.read(path, **more)
     return {
-        "scene": scene_to_document(found.scene),
-        "recording": None if found.recording is None else recording_to_document(found.recording),
+        "scene": codec.scene_to_document(found.scene),
+        "recording": None
+        if found.recording is None
+        else codec.recording_to_document(found.recording),
         "notes": found.notes,
         "moment": asdict(found.moment),
     }

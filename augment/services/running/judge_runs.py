@@ -16,14 +16,7 @@ from django.core.files.storage import default_storage
 from django.db import connection, transaction
 from django.db.models import Avg, Exists, OuterRef, Q, QuerySet
 
-from augment.errors import (
-    Conflict,
-    JobCancelled,
-    LeaseLost,
-    ModelFault,
-    ModelRefused,
-    ReplyUnreadable,
-)
+from augment import errors
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import shorten
@@ -101,7 +94,7 @@ def estimate_judge(request: JudgeRequest, pairs: int, longest: str) -> JudgeEsti
     """
     endpoint = find_endpoint(request.endpoint)
     if facts_of(endpoint=endpoint, model=request.model).vision is False:
-        raise Conflict(
+        raise errors.Conflict(
             f"{request.model} at {endpoint.label} can’t see pictures, so it can’t judge them. "
             "Choose another model; where this is wrong, probe the model again."
         )
@@ -132,7 +125,9 @@ def plan_judge(
     """
     estimate_judge(request, len(pairs), "")
     if not pairs:
-        raise Conflict("No pair was judged by experts yet, so there is nothing to compare with.")
+        raise errors.Conflict(
+            "No pair was judged by experts yet, so there is nothing to compare with."
+        )
     endpoint = find_endpoint(request.endpoint)
     is_priced = price_of(endpoint, request.model) is not None
     unpriced = [] if is_priced else [f"{request.model} at {endpoint.label}"]
@@ -165,7 +160,7 @@ def cancel_judge(run: JudgeRun, actor: User | None = None) -> None:
         pk=run.pk, state__in=(RunState.RUNNING, RunState.STOPPED_AT_CAP)
     )
     if not open_runs.update(state=RunState.CANCELLED, finished_at=DATABASE_TIME):
-        raise Conflict("This judge is done already.")
+        raise errors.Conflict("This judge is done already.")
     log_change(run, "cancel", actor)
 
 
@@ -207,9 +202,9 @@ class Judgements(WorkKind[PairJudgement]):
                 for order, shown in (("first", pictures), ("second", pictures[::-1])):
                     better, reason = _ask(row, shown, client, transcript)
                     columns |= {order: better, f"{order}_reason": reason}
-        except JobCancelled as cancelled:
+        except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
-        except ModelFault as fault:
+        except errors.ModelFault as fault:
             return Settlement(state=State.FAILED, reason=sentence_of(fault))
         return Settlement(state=State.DONE, columns=columns)
 
@@ -240,9 +235,9 @@ class JudgeTranscript(CallTranscript):
 
     def insist(self) -> None:
         if not self._held.is_held(lock=connection.in_atomic_block):
-            raise LeaseLost
+            raise errors.LeaseLost
         if self._runs.filter(state=RunState.CANCELLED).exists():
-            raise JobCancelled
+            raise errors.JobCancelled
 
     def reserve(self, worst: WorstCase, price: Price | None) -> Room:
         return budget.reserve(jobs=self._runs, worst=worst, price=price)
@@ -264,7 +259,9 @@ def _read_picture(name: str) -> bytes:
         Conflict: It is gone.
     """
     if not name or not default_storage.exists(name):
-        raise Conflict(f"The picture {name!r}, which experts were shown, is not stored any more.")
+        raise errors.Conflict(
+            f"The picture {name!r}, which experts were shown, is not stored any more."
+        )
     with default_storage.open(name) as file:
         return bytes(file.read())
 
@@ -285,6 +282,6 @@ def _ask(
             model=row.run.model,
             transcript=transcript,
         )
-    except (ReplyUnreadable, ModelRefused) as fault:
+    except (errors.ReplyUnreadable, errors.ModelRefused) as fault:
         return UNREADABLE, shorten(make_storable(str(fault)), LONGEST_WHY)
     return answer.better, " ".join(make_storable(answer.reason).split())

@@ -11,12 +11,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.services.endpoints.contestants import (
-    LONGEST_NAME,
-    ContestantRequest,
-    add_contestant,
-    free_slug,
-)
+from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.variants.options import ContestantOptions, names_for, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
@@ -82,14 +77,14 @@ def add_cells(rows: Sequence[Contestant], *, actor: User | None = None) -> list[
     for row in rows:
         if row._state.adding:
             assert row.endpoint is not None
-            request = ContestantRequest(
+            request = contestants.ContestantRequest(
                 slug=row.slug,
                 variant=row.variant,
                 endpoint=row.endpoint.label,
                 model=row.model,
                 options=row.options,
             )
-            add_contestant(request, actor)
+            contestants.add_contestant(request, actor)
     return [row.slug for row in rows]
 
 
@@ -121,8 +116,10 @@ def _contestant(key: str, options: ContestantOptions) -> Contestant:
     chosen = options_from_document(document)
     endpoint = Endpoint.objects.get(label=label)
     return Contestant(
-        slug=free_slug(model, variant, document),
-        name=f"{model} {spell_variant(variant)} {chosen.describe()}".strip()[:LONGEST_NAME],
+        slug=contestants.free_slug(model, variant, document),
+        name=f"{model} {spell_variant(variant)} {chosen.describe()}".strip()[
+            : contestants.LONGEST_NAME
+        ],
         kind=Contestant.Kind.SIMULATED if endpoint.is_simulated else Contestant.Kind.LLM,
         variant=variant,
         endpoint=endpoint,
