@@ -45,10 +45,14 @@ def document(*added: TrafficAgent, **parts: tuple[object, ...]) -> dict[str, obj
     return modification_to_document(Modification(added=added, **parts))  # type: ignore[arg-type]
 
 
-def set_reference(here: Scenario, given: object, **more: Any) -> Scenario:
+def set_reference(
+    here: Scenario, given: object, actor: User | None = None, **more: Any
+) -> Scenario:
     names = ("instruction", "type", "keep_traffic", "goal")
     same = {name: getattr(here, name) for name in names} | {"density": here.traffic_density}
-    return guarded.change_scenario(here, ScenarioContent(**same | more, reference=given))
+    return guarded.change_scenario(
+        here, ScenarioContent(**same | more, reference=given), actor=actor
+    )
 
 
 def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:

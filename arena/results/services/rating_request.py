@@ -11,7 +11,7 @@ from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, Choices
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.services.inputs import InputKind, input_field
-from augment.services.scenarios.scenes import types_named
+from augment.services.scenarios.choosing import types_named
 
 INTERVALS = {
     Intervals.CLOSED_FORM.value: "in closed form",

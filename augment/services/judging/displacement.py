@@ -22,7 +22,7 @@ from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
 from augment.services.judging.measures import Measure
-from augment.services.scenarios.scenes import ground_of, type_rank
+from augment.services.scenarios.scenes import ground_of
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State
@@ -141,7 +141,9 @@ def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
 def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
     """Return a rank and a heading: variants as the paper has them, combinations, then none."""
     if by is By.TYPE:
-        return type_rank(row.scenario.type), row.scenario.get_type_display()
+        kind, types = row.scenario.type, [*ScenarioType]
+        rank = types.index(ScenarioType(kind)) if kind in types else len(types)
+        return rank, row.scenario.get_type_display()
     if by is By.CONTESTANT:
         return 0, row.contestant.name
     known, variant = list(SPELLING), row.contestant.variant.lower()

@@ -1,4 +1,4 @@
-"""What people mean when they name scenarios."""
+"""What people mean when they name scenarios or their types."""
 
 import fnmatch
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ from django.db.models import QuerySet
 from augment.errors import UnknownName
 from augment.models import Scenario
 from augment.scene.entities import CatalogueSet
+from augment.services.scenarios.scenes import type_choices
 
 ALL, SET = "all", "set:"
 
@@ -35,6 +36,21 @@ def resolve_scenarios(given: Sequence[str]) -> list[str]:
         else:
             slugs += several.values_list("slug", flat=True)
     return list(dict.fromkeys(slugs))
+
+
+def types_named(names: Sequence[str]) -> tuple[str, ...]:
+    """Return scenario types by their names, or all there are by the word `all`.
+
+    Raises:
+        UnknownName: There is no such type.
+    """
+    known = [name for name, _ in type_choices()]
+    if list(names) == ["all"]:
+        return tuple(known)
+    for name in names:
+        if name not in known:
+            raise UnknownName("scenario type", name, ["all", *known])
+    return tuple(names)
 
 
 def _several(word: str) -> QuerySet[Scenario] | None:

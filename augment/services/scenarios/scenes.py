@@ -43,21 +43,6 @@ def type_choices() -> list[tuple[str, str]]:
     return [*((one.value, one.label) for one in ScenarioType), *labels.items()]
 
 
-def types_named(names: Sequence[str]) -> tuple[str, ...]:
-    """Return scenario types by their names, or all there are by the word `all`.
-
-    Raises:
-        UnknownName: There is no such type.
-    """
-    known = [name for name, _ in type_choices()]
-    if list(names) == ["all"]:
-        return tuple(known)
-    for name in names:
-        if name not in known:
-            raise UnknownName("scenario type", name, ["all", *known])
-    return tuple(names)
-
-
 def type_label(name: str) -> str:
     """Return what people read for a type; a type that nobody knows is its own label."""
     return dict(type_choices()).get(name, name)
@@ -66,12 +51,6 @@ def type_label(name: str) -> str:
 def type_of(name: str) -> ScenarioType | None:
     """The one of the five, None for a type of one's own."""
     return ScenarioType(name) if name in list(ScenarioType) else None
-
-
-def type_rank(name: str) -> int:
-    """The place of one of the five in their order; one's own come behind them."""
-    known = [one.value for one in ScenarioType]
-    return known.index(name) if name in known else len(known)
 
 
 def label_for(name: str) -> str:
