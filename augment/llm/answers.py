@@ -8,7 +8,7 @@ What is too long is cut here, at the border: a run and its replay from the store
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
@@ -34,14 +34,19 @@ MOST_TOKENS = 100_000_000
 """A count beyond is none: no model reads or writes so much at once."""
 
 _ANSWER = "answer"
-_REASONING = ("reasoning_content", "reasoning", "reasoning_details")
+_REASONING = ("reasoning_content", "reasoning", "reasoning_details", "thinking")
 _FIELDS = frozenset({"content", "refusal", "tool_calls", "function_call", *_REASONING})
 _KINDS = {"refusal": "refusal"} | dict.fromkeys(
     ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
 )
-_WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal")
+_WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal", "parts")
 """Names under which a part of a message holds its text."""
-_CACHED = ("cached_tokens", "prompt_cache_hit_tokens", "cache_read_input_tokens")
+_CACHED = (
+    *("cached_tokens", "num_cached_tokens", "prompt_cache_hit_tokens", "cached_content_tokens"),
+    *("cache_read_input_tokens", "cache_read_tokens"),
+)
+_DETAILS = ("", "prompt_tokens_details.", "input_tokens_details.")
+_CREATED = ("cache_creation_input_tokens", "cache_creation_tokens", "cache_write_tokens")
 
 _PASSING = frozenset({408, 409, 425, 429})
 _SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
@@ -50,8 +55,17 @@ _SENTENCES = re.compile(
     r"(error_?)?(message|msg|description)|errors?|details?|reason|title|status_msg|"
 )
 _CODES = ("code", "error_code", "error_type", "type", "status", "reason", "error")
+_BLOCKED = ("blockReason", "block_reason", "flagged_input")
 _FLAGS = ("filtered", "input_sensitive", "output_sensitive")
 _FILTERED = ("code", "content_filter")
+
+# Headers, and Google's word in the body, that ask to wait.
+_WAITS = ("retry-after-ms", "retry-after", "retryDelay")
+_WAIT = re.compile(
+    r"(?:PT)?(?:(?P<minutes>\d+)\s*m(?:in\w*)?)?\s*"
+    r"(?:(?P<number>-?\d+(?:\.\d+)?(?:e\d+)?)\s*(?P<unit>ms|s(?:ec\w*)?)?)?",
+    re.IGNORECASE,
+)
 
 # What a request can do without, or say in another way.
 _DROPPABLE: tuple[str, ...] = ("temperature", "seed", "reasoning_effort", *LengthName)
@@ -99,15 +113,18 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
     )
-    reason = _read(doubts, choice, "finish_reason", str, "choices.0.") or ""
-    error = read_error([answer.get("error"), choice.get("error")])
+    given = choice.get("finish_reason") or choice.get("native_finish_reason")
+    given = given.get("type", given) if isinstance(given, dict) else given  # as SGLang has it
+    reason = doubts.read(_ANSWER, read_as, given, str, "choices.0.finish_reason") or ""
+    # Without a choice the answer itself is the error, whatever its form.
+    error = read_error([answer.get("error"), choice.get("error")] if choice else answer)
     around = [{**answer, "choices": 0, "usage": 0}, {**choice, "message": 0}]
     if error.is_withheld or _FILTERED in _leaves(around) or says("withheld", reason):
         reason = reason if says("withheld", reason) else "content_filter"
         refusals = refusals or ([error.message] if error.message else [])
     else:
         is_usable = bool("".join(texts) or calls or refusals)
-        _insist_on_answer(choice, error, [] if is_usable else unread)
+        _insist_on_answer(choice, reason, error, [] if is_usable else unread)
     notes = doubts.faults[_ANSWER]
     notes.extend(f"left out: {text}" for text in unread)
     usage = _read(doubts, answer, "usage", dict) or {}
@@ -137,10 +154,10 @@ def read_error(body: object) -> ForeignError:
     codes = [text for key in _CODES for name, text in leaves if name == key and " " not in text]
     return ForeignError(
         message=message,
-        code=next((text for name, text in leaves if name in _CODES[:3]), ""),
+        code=next((text for name, text in leaves if name in _CODES[:3] and text != "0"), ""),
         parameter=next((text for name, text in leaves if name == "param"), ""),
         is_withheld=any(says("withheld", code) for code in codes)
-        or says("withheld_sentence", message),
+        or (says("withheld_sentence", message) and not says("about_account", message)),
     )
 
 
@@ -169,7 +186,7 @@ def fault_of_status(
     if refused:
         return ParameterRefused(refused, text, status=status)
     passing = (status in _PASSING or status >= 500) and error.code not in _SPENT
-    wait_s, remark = _read_wait(headers) if passing else (None, "")
+    wait_s, remark = _read_wait({**dict(_leaves(body)), **headers}) if passing else (None, "")
     return ModelFault(text + remark, retryable=passing, status=status, retry_after_s=wait_s)
 
 
@@ -187,8 +204,9 @@ def _read_message(
 ) -> tuple[list[tuple[str, str]], list[ToolCall]]:
     """Return text, thoughts, refusal and what can't be read, each by its kind, and the calls."""
     thoughts = next((message[name] for name in _REASONING if message.get(name)), None)
+    content, uses = _split_calls(message.get("content"))
     pieces = [
-        *_pieces(message.get("content"), "content"),
+        *_pieces(content, "content"),
         *_pieces(thoughts, "reasoning", "thought"),
         *_pieces(message.get("refusal") or None, "refusal", "refusal"),
     ]
@@ -196,6 +214,7 @@ def _read_message(
         pieces.append(("unread", "the message has none of the fields of a message"))
     made: list[ToolCall] = []
     calls = message.get("tool_calls")
+    calls = calls or uses or calls
     if calls is None and message.get("function_call"):
         calls = [{"function": message["function_call"]}]  # as it was called before 2024
     if calls is not None and not isinstance(calls, list):
@@ -235,6 +254,18 @@ def _read_message(
     return pieces, made
 
 
+def _split_calls(content: object) -> tuple[object, list[object]]:
+    """Return a message's content, and the calls that Anthropic puts among its parts."""
+    parts = content if isinstance(content, list) else []
+    uses = [part for part in parts if isinstance(part, dict) and part.get("type") == "tool_use"]
+    named = [{"name": part.get("name"), "arguments": part.get("input")} for part in uses]
+    calls = [
+        {"id": part.get("id"), "function": function}
+        for part, function in zip(uses, named, strict=True)
+    ]
+    return [part for part in parts if part not in uses] if uses else content, [*calls]
+
+
 def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str, str]]:
     """Yield the texts of a message's field by their kind: a text, a part, or a list of either."""
     if isinstance(value, str):
@@ -247,6 +278,7 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
         if name is None:
             yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
         else:
+            kind = "thought" if value.get("thought") is True else kind  # as Google has it
             yield from _pieces(value[name], path, _KINDS.get(str(value.get("type")), kind))
     elif value is True and kind == "refusal":
         yield kind, ""
@@ -255,25 +287,26 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
 
 
 def _insist_on_answer(
-    choice: Mapping[str, object], error: ForeignError, unread: list[str]
+    choice: Mapping[str, object], reason: str, error: ForeignError, unread: list[str]
 ) -> None:
     """Return where there is an answer that nobody broke off.
 
     Args:
         choice: The first; empty without one.
+        reason: Why it ended.
         error: What stands beside it.
         unread: What is there instead of anything that can be used.
 
     Raises:
         ModelFault: There is none.
     """
-    reason, message = choice.get("finish_reason"), choice.get("message")
-    is_passing = True
-    if isinstance(reason, str) and says("broken", reason):
+    message, is_passing = choice.get("message"), error.code not in _SPENT
+    if says("broken", reason):
         problem = f"broke off its answer, finish_reason {shorten(reason, 40)!r}{error}"
     elif str(error):
         problem = f"answered 200 with an error{error}"
-        is_passing = not re.fullmatch(r"4\d\d", error.code) or int(error.code) in _PASSING
+        is_final = re.fullmatch(r"4\d\d", error.code) and int(error.code) not in _PASSING
+        is_passing = is_passing and not is_final
     elif not choice:
         problem = "answered without a choice"
     elif not isinstance(message, dict):
@@ -295,23 +328,31 @@ def _read_usage(
     is then more than the prompt, or what lacks to the total or to what was sent.
     """
 
-    def count(*names: str, part: Mapping[str, object] = usage, path: str = "usage.") -> int | None:
-        rows = ((part.get(name), f"{path}{name}", 0, MOST_TOKENS) for name in names)
-        return next(iter(doubts.read_all(_ANSWER, read_whole, rows)), None)
+    def count(*names: str, parts: Iterable[str] = ("",)) -> int | None:
+        values = [
+            (f"{part}{name}", counts.get(f"{part}{name}")) for part in parts for name in names
+        ]
+        rows = ((value, f"usage.{path}", 0, MOST_TOKENS) for path, value in values)
+        return max(doubts.read_all(_ANSWER, read_whole, rows), default=None)
 
+    counts = _name_counts(usage)
+    for name in _DETAILS[1:]:
+        details = _read(doubts, counts, name.removesuffix("."), dict, "usage.") or {}
+        counts |= {f"{name}{key}": value for key, value in _name_counts(details).items()}
     prompt = count("prompt_tokens", "input_tokens")
-    completion = count("completion_tokens", "output_tokens")
-    cached = count(*_CACHED)
-    for name in ("prompt_tokens_details", "input_tokens_details"):
-        details = _read(doubts, usage, name, dict, "usage.") or {}
-        within = count(*_CACHED, part=details, path=f"usage.{name}.")
-        cached = within if cached is None else cached
-    beside = (cached or 0) + (count("cache_creation_input_tokens") or 0)
+    completion = count("completion_tokens", "output_tokens", "candidates_tokens")
+    cached = count(*_CACHED, parts=_DETAILS)
+    beside = (cached or 0) + (count(*_CREATED, parts=_DETAILS) or 0)
     total, least = count("total_tokens"), FAR_BELOW * least_prompt
+    if usage and not any("tokens" in name for name in counts):
+        doubts.faults[_ANSWER].append(f"usage has no count of tokens: {shorten(str(usage), 100)}")
     if prompt is not None and beside:
         whole = prompt + beside
         if beside > prompt or total == whole + (completion or 0) or prompt < least <= whole:
             prompt = whole
+    if prompt and total and completion is not None and has_output:
+        # Google and xAI count thoughts in the total alone.
+        completion = max(completion, total - prompt)
     if completion == 0 and (has_output or not prompt):
         completion = None
     if prompt and prompt < least:
@@ -321,6 +362,12 @@ def _read_usage(
     return prompt or None, completion, cached
 
 
+def _name_counts(usage: Mapping[str, object]) -> dict[str, object]:
+    """Return counts by OpenAI's kind of names: promptTokenCount as prompt_tokens."""
+    names = {name: re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in usage}
+    return {names[name].replace("token_count", "tokens"): usage[name] for name in usage}
+
+
 def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
     """Yield each text and number of an error body with the name that it stands under."""
     if isinstance(value, dict):
@@ -328,7 +375,7 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(place, list) and place and isinstance(value.get("msg"), str):
             yield "param", str(place[-1])
             value = {**value, "msg": f"{place[-1]}: {value['msg']}"}
-        blocked = value.get("blockReason") or value.get("block_reason")
+        blocked = any(value.get(name) for name in _BLOCKED)
         if blocked or any(value.get(flag) is True for flag in _FLAGS):
             yield _FILTERED
         for key, inner in value.items():
@@ -364,18 +411,22 @@ def _refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str |
     return None
 
 
-def _read_wait(headers: Mapping[str, str]) -> tuple[float | None, str]:
-    """Return the seconds that the headers ask to wait, and a remark on what can't be read."""
-    name = "retry-after-ms" if "retry-after-ms" in headers else "retry-after"
-    given = headers.get(name, "")
-    try:
-        seconds = float(given) / (1000.0 if name == "retry-after-ms" else 1.0)
-    except ValueError:
+def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
+    """Return the seconds that an answer asks to wait, and a remark on what can't be read."""
+    given = {name: fields[name].strip() for name in _WAITS if fields.get(name, "").strip()}
+    for name, text in given.items():
+        match = _WAIT.fullmatch(text)
         try:
-            until = parsedate_to_datetime(given).replace(tzinfo=UTC)  # HTTP knows GMT alone
-            seconds = (until - datetime.now(UTC)).total_seconds()
+            if match is not None:
+                is_ms = name.endswith("-ms") or match["unit"] == "ms"
+                seconds = float(match["number"] or 0) / (1000.0 if is_ms else 1.0)
+                seconds += 60.0 * float(match["minutes"] or 0)
+            else:
+                until = parsedate_to_datetime(text).replace(tzinfo=UTC)  # HTTP knows GMT alone
+                seconds = (until - datetime.now(UTC)).total_seconds()
         except (ValueError, OverflowError):
-            seconds = math.nan
-    if math.isfinite(seconds):
-        return max(0.0, seconds), ""
-    return None, f" (its {name} can't be read: {given[:40]!r})" if given else ""
+            continue
+        if math.isfinite(seconds):
+            return max(0.0, seconds), ""
+    unread = next(iter(given.items()), None)
+    return None, f" (its {unread[0]} can't be read: {unread[1][:40]!r})" if unread else ""

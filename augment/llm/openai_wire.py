@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import time
 from collections.abc import Callable
@@ -37,6 +38,8 @@ _HERE = ("localhost", "127.0.0.1", "::1")
 # Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY.
 _KEYLESS = "no-key"
 _BROKEN_JSON = "the endpoint's answer is not valid JSON"
+_ERROR_EVENT = re.compile(r"^data:[ ]*(\{[ ]*\"error\".*)$", re.MULTILINE)
+_STREAM = "the endpoint answered with a stream of events, which was not asked for"
 _PAGE = "the endpoint answered with a page of text instead of JSON: is its base URL right?"
 # A stand-in server is used with keys like "x"; those are no secret.
 _SHORTEST_SECRET = 8
@@ -123,8 +126,10 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
                 reply = read_completion(document, least_prompt=least)
                 return replace(reply, latency_s=latency_s)
             is_json = "json" in answer.headers.get("content-type", "")
+            is_stream = document.startswith(("data:", "event:", ":"))
+            problem = _STREAM if is_stream else _BROKEN_JSON if is_json else _PAGE
             fault: ModelFault | Unwanted | Reply = ModelFault(
-                _BROKEN_JSON if is_json else _PAGE, retryable=is_json, status=200
+                problem, retryable=problem == _BROKEN_JSON, status=200
             )
         except openai.APIStatusError as error:
             fault = fault_of_status(
@@ -170,9 +175,10 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         return text.replace(self._key, "[key]") if len(self._key) >= _SHORTEST_SECRET else text
 
     def _read(self, text: str) -> object:
-        """Return the document of a body, or its text where that is no JSON."""
+        """Return the document of a body or an error in its events, or the text that is no JSON."""
+        error = _ERROR_EVENT.search(text)
         try:
-            return self._clear(json.loads(text))
+            return self._clear(json.loads(error[1] if error else text))
         except (ValueError, RecursionError):
             return self._clear(text)
 

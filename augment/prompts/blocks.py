@@ -27,6 +27,10 @@ _FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re
 _STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
 _STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
+_THOUGHTS_END = re.compile(
+    r"</(?:seed:)?(?:think|thinking|thought|reasoning)>|\[/THINK\]|◁/think▷"
+    r"|<\|channel\|>final<\|message\|>"
+)
 _Loaded = TypeVar("_Loaded")
 
 
@@ -136,7 +140,7 @@ def declines(answer: str) -> bool:
 
 def without_thoughts(answer: str) -> str:
     """Return what follows the last reasoning tag of models that think aloud."""
-    return answer.rpartition("</think>")[2]
+    return _THOUGHTS_END.split(answer)[-1]
 
 
 # Private

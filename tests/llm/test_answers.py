@@ -138,6 +138,8 @@ def test_what_nobody_can_read_is_a_fault_alone_and_a_remark_beside_a_text() -> N
 
 
 def test_calls_in_other_forms_are_calls() -> None:
+    part = {"type": "tool_use", "id": "c", "name": "f", "input": {"a": 1}}
+    assert [one.arguments for one in read(answer({"content": [part]})).tool_calls] == ['{"a": 1}']
     calls = [
         {"function": {"name": "f", "arguments": {"a": 1}}},
         {"id": 3, "function": {"name": "f", "arguments": None}},
@@ -211,14 +213,18 @@ def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -
     [
         ({"retry-after-ms": "800", "retry-after": "1"}, 0.8),
         ({"retry-after": "45"}, 45.0),
+        ({"retry-after": "1m30s"}, 90.0),
+        ({"retry-after-ms": "x", "retry-after": "5 seconds"}, 5.0),
         ({"retry-after": "Wed, 21 Oct 2015 07:28:00 GMT"}, 0.0),
+        ({"body": "37.5s"}, 37.5),
         ({"retry-after": "soon"}, None),
     ],
 )
 def test_the_wait_that_is_asked_for_has_three_forms(
     headers: dict[str, str], wait_s: float | None
 ) -> None:
-    fault = fault_of_status(429, {"message": "Slower."}, headers, sent={})
+    body = {"details": [{"retryDelay": headers.pop("body", "")}]}
+    fault = fault_of_status(429, body, headers, sent={})
     assert isinstance(fault, ModelFault)
     assert fault.retry_after_s == wait_s
     assert ("can't be read: 'soon'" in str(fault)) == (wait_s is None)

@@ -164,6 +164,8 @@ def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
         (b'{"choices": []}', "200 OK", "json", True, "without a choice"),
         (b'{"choices"', "200 OK", "json", True, "not valid JSON"),
         (b"<p>Sign in</p>", "200 OK", "html", False, "instead of JSON"),
+        (b'data: {"id":"x"}\n\n', "200 OK", "event-stream", False, "a stream of events"),
+        (b': hi\ndata: {"error":{"code":502,"message":"Up."}}', "200 OK", "x", True, "Up."),
     ],
 )
 def test_what_is_no_answer_says_why(

@@ -53,6 +53,8 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
     [
         (["I'm sorry, but I can't help with that."] * 2, OutcomeStatus.REFUSED),
         (["<think>Hm.</think>Sorry, this is unsafe.", "I cannot do this."], OutcomeStatus.REFUSED),
+        (["[THINK]Hm.[/THINK]Regrettably, I can't.", "Lo siento."], OutcomeStatus.REFUSED),
+        (["Thank you, but I'm not comfortable.", "I have to decline."], OutcomeStatus.REFUSED),
         (["I can\u2019t assist with this request.", GOOD], OutcomeStatus.DONE),
         (["I'm sorry, I can't.", "The car stands ahead."], OutcomeStatus.UNREADABLE),
         (["I must place the car ahead of the ego."] * 2, OutcomeStatus.UNREADABLE),
