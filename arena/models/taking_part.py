@@ -15,10 +15,10 @@ from augment.models import Augmentation, Contestant, Scenario, account_column
 
 
 class Invitation(Coded):
-    """One link for one expert of one study. Its token is sent once and kept only as a hash.
+    """One link for one expert, from a study or from the page of people.
 
-    A new link replaces the one before, so at most one link of an expert and study is alive, and
-    each can be taken back by itself.
+    Its token is sent once and kept only as a hash. A new link replaces the one before from the
+    same place, and each can be taken back by itself.
     """
 
     class State(models.TextChoices):
@@ -29,7 +29,7 @@ class Invitation(Coded):
 
     ALIVE: ClassVar = frozenset({State.UNUSED, State.USED})
 
-    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="invitations")
+    study = models.ForeignKey(Study, models.CASCADE, related_name="invitations", null=True)
     expert = models.ForeignKey(
         settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="invitations"
     )
@@ -96,6 +96,9 @@ class Enrolment(Coded):
         help_text="who is silent for so long and not done loses the place; none: nobody does",
     )
     is_open = models.BooleanField(default=True)
+    completes_with = models.CharField(
+        max_length=200, blank=True, help_text="a code or address for all; empty: each has a code"
+    )
     made_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
@@ -120,6 +123,8 @@ class EnrolledVoter(Coded):
         settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="enrolled"
     )
     external_id = models.CharField(max_length=120, help_text="a name, or the id at a platform")
+    platform_study = models.CharField(max_length=120, blank=True, help_text="Prolific's STUDY_ID")
+    platform_session = models.CharField(max_length=120, blank=True, help_text="its SESSION_ID")
     consent_sha256 = models.CharField(max_length=64, help_text="of the text that was agreed to")
     completion_code = models.CharField(
         max_length=20, unique=True, default=fresh_completion_code, editable=False

@@ -4,21 +4,14 @@ from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.urls import reverse
 from rest_framework import serializers
 
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
 from arena.api.views import ApiView, Given, operation
-from arena.people.links import make_api_token
+from arena.people.links import accept, find_invitation, make_api_token, make_link_path
 from arena.people.queries import ROLES, role_given, role_of
-from arena.people.services import (
-    accept_welcome,
-    create_person,
-    end_of_link,
-    make_first_admin,
-    make_welcome_token,
-)
+from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin
 
 DAYS = 30
 """Lifetime of the token that a link is exchanged for."""
@@ -34,7 +27,8 @@ class NewPersonDocument(serializers.Serializer[Any]):
     is_active = serializers.BooleanField()
     has_password = serializers.BooleanField(source="has_usable_password")
     link = serializers.CharField(
-        help_text="Lets its owner set a password, or `POST /welcome` make a token; works once."
+        help_text="Lets its owner in, or `POST /welcome` make a token; all but experts set a "
+        "password by it, once."
     )
 
     def get_role(self, user: User) -> str | None:
@@ -61,10 +55,12 @@ class FirstBody(StrictSerializer):
 
 
 class WelcomeBody(StrictSerializer):
-    """The password of an account."""
+    """The link of an account, and its password unless it is an expert's."""
 
     link = TextField(max_length=2000, help_text="As it was given, or the end of it.")
-    password = TextField(max_length=500, trim_whitespace=False)
+    password = TextField(
+        max_length=500, trim_whitespace=False, required=False, help_text="Experts need none."
+    )
 
 
 class TokenDocument(serializers.Serializer[Any]):
@@ -87,7 +83,7 @@ class PeopleView(ApiView):
         The link is shown this once.
         """
         made = create_person(**given, password=None, actor=self.user)
-        path = reverse("welcome", args=[make_welcome_token(made, actor=self.user)])
+        path = make_link_path(made, actor=self.user)
         made.link = self.request.build_absolute_uri(path)  # type: ignore[attr-defined]
         return made
 
@@ -118,12 +114,15 @@ class WelcomeView(ApiView):
 
     @operation(TokenDocument, takes=WelcomeBody, status=201, name="acceptWelcome")
     def post(self, given: Given) -> dict[str, Any]:
-        """Set the password of an account by its link.
+        """Exchange the link of an account for a token in its role.
 
-        Answers with a token of the account, in its role.
+        Anybody but an expert sets a password by it.
         """
+        end = end_of_link(given["link"])
         with transaction.atomic():  # the link stays valid where no token can be made
-            user = accept_welcome(token=end_of_link(given["link"]), password=given["password"])
+            if find_invitation(end) is not None:
+                return _token(accept(token=end).expert, "welcome")
+            user = accept_welcome(token=end, password=given.get("password", ""))
             return _token(user, "welcome")
 
 

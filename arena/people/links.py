@@ -10,13 +10,14 @@ from datetime import timedelta
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Case, F, Q, Value, When
+from django.urls import reverse
 from django.utils import timezone
 from django.utils.translation import gettext as _
 
 from arena.errors import LinkOver, NotYours, TokenOver, TooManyRequests
 from arena.models import ApiToken, Authorship, Invitation, Study, token_digest
 from arena.people.queries import TOKEN_ROLES, effective_role, may_be_let_in, role_of
-from arena.people.services import end_sessions
+from arena.people.services import end_links, end_sessions, make_welcome_token
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_change
 from augment.services.texts import one_line
@@ -84,13 +85,13 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
 
 
 @transaction.atomic
-def revoke_api_token(*, token: ApiToken, actor: User) -> None:
+def revoke_api_token(*, token: ApiToken, actor: User | None) -> None:
     """Revoke a token; twice changes nothing."""
     if ApiToken.objects.filter(pk=token.pk, revoked_at=None).update(revoked_at=timezone.now()):
         _log_token(token, "revoke", actor)
 
 
-def _log_token(token: ApiToken, verb: str, actor: User) -> None:
+def _log_token(token: ApiToken, verb: str, actor: User | None) -> None:
     facts = {"name": token.name, "role": token.role, "owner": str(token.owner.person.code)}
     log_change(token, verb, actor, after=facts | {"expires_at": token.expires_at.isoformat()})
 
@@ -148,26 +149,49 @@ class FreshLink:
 
 
 @transaction.atomic
-def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLink:
-    """Make a link that lets this expert into the study for 14 days; it replaces the one before.
+def make_link_path(user: User, *, study: Study | None = None, actor: User | None = None) -> str:
+    """Return the path of a new link that lets the owner of an account in.
+
+    An expert's signs in without a password; anybody else sets a password by theirs. One that leads
+    to no study replaces all older ones.
+
+    Raises:
+        Conflict, NotYours: See `invite`.
+    """
+    if study is None and role_of(user) != "expert":
+        return reverse("welcome", args=[make_welcome_token(user, actor=actor)])
+    if study is None:
+        end_links(user)
+    return reverse("invitation", args=[invite(study=study, expert=user, actor=actor).token])
+
+
+@transaction.atomic
+def invite(*, study: Study | None, expert: User, actor: User | None = None) -> FreshLink:
+    """Make a link that signs this expert in for 14 days; it replaces the one before.
 
     Who is signed in by the older link stays so; only `revoke` ends that.
+
+    Args:
+        study: Where the link leads, while it is open; None leads home.
+        expert: Whose link it is.
+        actor: Who makes it, for the log.
 
     Raises:
         NotYours: The account does not take part in the study.
         Conflict: The study was cancelled, or the account can't be let in by a link: it is
             simulated, inactive, or more than an expert.
     """
-    _must_take_part(study, expert)
-    if study.state == Study.State.CANCELLED:
-        raise Conflict(f"The study '{study.name}' was cancelled; nobody is invited.")
+    if study is not None:
+        _must_take_part(study, expert)
+        if study.state == Study.State.CANCELLED:
+            raise Conflict(f"The study '{study.name}' was cancelled; nobody is invited.")
     if not may_be_let_in(expert):
         raise Conflict(
             f"{expert.get_username()} can't be invited by a link: links are for active "
             "experts who are neither simulated nor researchers or admins."
         )
     # Held, so that of two links made at once the second one sees the first, which it replaces.
-    Study.objects.select_for_update(no_key=True).get(pk=study.pk)
+    User.objects.select_for_update(no_key=True).get(pk=expert.pk)
     now = timezone.now()
     older = Invitation.objects.select_for_update().filter(
         study=study, expert=expert, revoked_at=None
@@ -182,8 +206,7 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
         invited_by=actor,
         expires_at=now + LINK_LIVES,
     )
-    facts = {"study": str(study.code), "expert": str(expert.person.code)}
-    log_change(row, "invite", actor, before={"replaced": replaced}, after=facts)
+    log_change(row, "invite", actor, before={"replaced": replaced}, after=_facts_about(row))
     return FreshLink(invitation=row, token=token)
 
 
@@ -201,7 +224,7 @@ def lets_in(invitation: Invitation) -> bool:
 
 @transaction.atomic
 def accept(*, token: str) -> Invitation:
-    """Let the expert of a link in; it goes on working on their other devices until it ends.
+    """Let the expert of a link in; it works until it ends.
 
     Raises:
         LinkOver: It is nobody's, expired, was taken back, or its account may not be let in.
@@ -219,15 +242,25 @@ def accept(*, token: str) -> Invitation:
 
 @transaction.atomic
 def revoke(*, invitation: Invitation, actor: User | None = None) -> None:
-    """Revoke a link and sign out whoever came in by a link to the same study."""
+    """Revoke a link and sign out whoever came in by a link from the same place.
+
+    Tokens of an account without a password are revoked, too: nothing but a link led to them.
+    """
     row = Invitation.objects.select_for_update().get(pk=invitation.pk)
     if row.revoked_at is None:
         row.revoked_at = timezone.now()
         row.save(update_fields=["revoked_at"])
     same = Invitation.objects.filter(study=row.study_id, expert=row.expert_id)
     end_sessions(SESSION_KEY, {str(code) for code in same.values_list("code", flat=True)})
-    facts = {"study": str(row.study.code), "expert": str(row.expert.person.code)}
-    log_change(row, "revoke", actor, after=facts)
+    if not row.expert.has_usable_password():
+        for token in ApiToken.objects.filter(owner=row.expert, revoked_at=None):
+            revoke_api_token(token=token, actor=actor)
+    log_change(row, "revoke", actor, after=_facts_about(row))
+
+
+def _facts_about(row: Invitation) -> dict[str, str | None]:
+    study = None if row.study is None else str(row.study.code)
+    return {"study": study, "expert": str(row.expert.person.code)}
 
 
 # --- Authorships -------------------------------------------------------------------------------

@@ -12,9 +12,9 @@ from django.contrib.auth.decorators import login_not_required
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm, SetPasswordForm
 from django.contrib.auth.models import User
 from django.contrib.auth.views import LoginView
+from django.db.models import Prefetch
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
-from django.urls import reverse
 from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, ngettext
@@ -22,8 +22,8 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods
 
 from arena.errors import LinkOver
-from arena.models import ApiToken
-from arena.people import services
+from arena.models import ApiToken, Invitation, Study
+from arena.people import links, services
 from arena.people.links import DAYS, REQUESTS, make_api_token, revoke_api_token
 from arena.people.queries import (
     ROLES,
@@ -68,7 +68,7 @@ USUAL_DAYS = 30
 
 
 class AccountForm(forms.Form):
-    """A new account; its owner sets the password by a link."""
+    """A new account; its owner comes in by a link."""
 
     username = forms.CharField(max_length=150, label="Username")
     pseudonym = forms.CharField(
@@ -214,7 +214,7 @@ def people_page(request: HttpRequest) -> HttpResponse:
             user = services.create_person(
                 **form.cleaned_data, password=None, actor=user_of(request)
             )
-            return _link_page(request, user)
+            return show_new_links(request, [user])
     context = {"lines": _list_accounts(), "form": form, "roles": ROLE_NAMES.items()}
     return render(request, "people/list.html", context)
 
@@ -226,7 +226,8 @@ def _list_accounts() -> list[dict[str, Any]]:
     of their study lists.
     """
     accounts = User.objects.filter(person__is_simulated=False, enrolled=None)
-    accounts = accounts.select_related("person").prefetch_related("groups")
+    live = Prefetch("invitations", Invitation.objects.filter(revoked_at=None))
+    accounts = accounts.select_related("person").prefetch_related("groups", live)
     places = {role: place for place, role in enumerate((*ROLES, None))}
     by_role = sorted(by_pseudonym(accounts), key=lambda user: places[role_given(user)])
     return [
@@ -238,17 +239,20 @@ def _list_accounts() -> list[dict[str, Any]]:
 @act_for(ADMIN, back="people")
 @never_cache
 def make_link(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """A link to set a password, for who is new or has forgotten it."""
-    return _link_page(request, find_account(code))
+    """A link for who is new, has forgotten the password or can't come in any more."""
+    return show_new_links(request, [find_account(code)])
 
 
 @act_for(ADMIN, back="people")
 def change_person(request: HttpRequest, code: uuid.UUID) -> None:
-    """Pause, resume, or give another role: what the pressed button says."""
+    """Pause, resume, take links back, or give another role: what the pressed button says."""
     user, actor = find_account(code), user_of(request)
     act = request.POST.get("act", "")
     if act in ("pause", "resume"):
         services.set_active(user=user, is_active=act == "resume", actor=actor)
+    elif act == "take-back":
+        for invitation in user.invitations.filter(revoked_at=None):
+            links.revoke(invitation=invitation, actor=actor)
     else:
         services.set_role(user=user, role=request.POST.get("role", ""), actor=actor)
     messages.success(request, f"{user.person.pseudonym} is changed.")
@@ -259,11 +263,16 @@ def find_account(code: uuid.UUID) -> User:
     return get_object_or_404(User.objects.select_related("person"), person__code=code)
 
 
-def _link_page(request: HttpRequest, user: User) -> HttpResponse:
-    token = services.make_welcome_token(user, actor=user_of(request))
-    address = request.build_absolute_uri(reverse("welcome", args=[token]))
-    context = {"made": user, "address": address}
-    return render(request, "people/link.html", context, status=CREATED)
+def show_new_links(
+    request: HttpRequest, owners: list[User], study: Study | None = None
+) -> HttpResponse:
+    """Make a link for each of these accounts of one role, and show them this once."""
+    lines = []
+    for owner in owners:
+        path = links.make_link_path(owner, study=study, actor=user_of(request))
+        lines.append((owner, request.build_absolute_uri(path)))
+    context = {"study": study, "lines": lines, "is_expert": role_given(owners[0]) == EXPERT}
+    return render(request, "people/links.html", context, status=CREATED)
 
 
 # --- One's own tokens --------------------------------------------------------------------------

@@ -121,7 +121,7 @@ def make_first_admin(*, code: str, username: str, password: str) -> User:
 
 
 @transaction.atomic
-def make_welcome_token(user: User, *, actor: User) -> str:
+def make_welcome_token(user: User, *, actor: User | None) -> str:
     """Return the end of a link by which somebody sets a password; it works once, for 14 days.
 
     It is bound to the password and the last login, so that using it ends it. Of an account
@@ -184,7 +184,8 @@ def check_password_strength(password: str, user: User | None = None) -> None:
 
 
 def end_links(user: User) -> None:
-    """End the welcome links of an account without a password."""
+    """End the invitations of an account, and its welcome links if it has no password."""
+    user.invitations.filter(revoked_at=None).update(revoked_at=timezone.now())
     if not user.has_usable_password():
         user.set_unusable_password()  # they are bound to what stands for the password
         user.save(update_fields=["password"])

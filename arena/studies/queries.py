@@ -272,7 +272,7 @@ def enrolled_voters(study: Study) -> Voters:
     is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
     return (
         EnrolledVoter.objects.filter(enrolment__study=study)
-        .select_related("expert__person")
+        .select_related("expert__person", "enrolment")
         .annotate(
             planned=Count("expert__matchups", filter=mine, distinct=True),
             answered=Count("expert__matchups", filter=answered, distinct=True),

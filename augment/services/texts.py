@@ -40,6 +40,9 @@ LONGEST_NOTES = 20_000
 """Characters of a contestant's notes about its own work."""
 
 
+_BETWEEN_SIGNS = re.compile("[ \u00a0\u1680\u2000-\u200a\u200c\u200d\u202f\u205f\u3000]")
+
+
 def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
     """Return a name that people read, without blanks around it.
 
@@ -53,10 +56,20 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
         InvalidDocument: It is empty, too long, or has a character that does not print.
     """
     value = value.strip()
-    if not value or len(value) > longest or not value.isprintable():
+    if not 0 < len(value) <= longest or not is_readable_line(value):
         rule = f"1 to {longest} printable characters are needed"
         raise InvalidDocument(what, [(field, rule)])
     return value
+
+
+def is_readable_line(text: str) -> bool:
+    """Return whether the text prints on one line.
+
+    Python counts neither joiners as printable, which spell names in Persian or Malayalam, nor any
+    space but one.
+    """
+    seen = _BETWEEN_SIGNS.sub("", text)
+    return bool(seen) and seen.isprintable()
 
 
 def check_prose(field: str, value: str, *, what: str, longest: int) -> None:

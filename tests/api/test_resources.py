@@ -10,7 +10,8 @@ from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.api.urls import urlpatterns
-from arena.models import Snapshot
+from arena.models import Invitation, Snapshot
+from arena.people.links import revoke
 from arena.people.services import make_first_link_token
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
@@ -123,14 +124,21 @@ def test_links_let_in_once_and_only_with_a_password_that_holds() -> None:
     made = send(Client(), "first", **given, password="nine lives of a cat")
     admin = program(made.json()["token"])
     error_of(send(Client(), "first", **given, password="nine lives of a cat"), 410, "link_over")
-    grace = send(admin, "people", username="grace", role="expert").json()
+    grace = send(admin, "people", username="grace", role="researcher").json()
     invited = {"link": grace["link"], "password": "a bird in the hand"}
-    error_of(send(Client(), "welcome", **(invited | {"password": "1"})), 400, "refused")
-    expert = program(send(Client(), "welcome", **invited).json()["token"])
-    assert expert.get(API + "studies").status_code == 200
-    assert expert.get(API + "jobs").status_code == 403
+    for weak in ({"link": grace["link"]}, invited | {"password": "1"}):
+        error_of(send(Client(), "welcome", **weak), 400, "refused")
+    researcher = program(send(Client(), "welcome", **invited).json()["token"])
+    assert researcher.get(API + "jobs").status_code == 200
     error_of(send(Client(), "welcome", **invited), 410, "link_over")
     assert User.objects.get(username="grace").check_password("a bird in the hand")
+    eva = send(admin, "people", username="eva", role="expert").json()
+    expert = program(send(Client(), "welcome", link=eva["link"]).json()["token"])
+    assert expert.get(API + "studies").status_code == 200
+    assert expert.get(API + "jobs").status_code == 403
+    revoke(invitation=Invitation.objects.get())
+    assert expert.get(API + "studies").status_code == 401
+    error_of(send(Client(), "welcome", link=eva["link"]), 410, "link_over")
 
 
 # --- Blindness ---------------------------------------------------------------------------------

@@ -91,11 +91,11 @@ class Hand:
         self.click("button.main")
 
     def add_expert(self, username: str) -> str:
-        """Return the link by which they choose a password."""
+        """Return the link that signs them in."""
         self.press("People")
         self.fill("username", username)
         self.click("section button.main")
-        return self.page.locator("#link").input_value()
+        return self.page.locator("#link-1").input_value()
 
     def vote(self, votes: int) -> None:
         """All pairs of the only study, from the start page on."""

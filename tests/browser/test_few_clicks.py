@@ -111,7 +111,7 @@ def _study(ada: Hand, browser: Browser, *, votes: int) -> str:
     expect(ada.page.get_by_role("heading", name="First study")).to_be_visible()
     grace = Hand.at(browser, ada.page.url)
     grace.page.goto(link)
-    grace.set_password()
+    grace.press("Accept and start")
     grace.vote(votes)
     ada.page.reload()
     return ada.close_and_export()

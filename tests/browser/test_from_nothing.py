@@ -101,7 +101,7 @@ def _work(home: Home, address: str, model: str, gate: threading.Event, files: Pa
         _open_study(ada)
         grace = Hand.at(browser, address)
         grace.page.goto(link)
-        grace.set_password()
+        grace.press("Accept and start")
         grace.vote(VOTES)
         admin.reload()
         return ada.close_and_export()

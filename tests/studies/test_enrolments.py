@@ -129,13 +129,20 @@ def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: S
 
 def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: Study) -> None:
     admin = create_person(username="root", password=None, role="admin")
-    voter = join(link(study), "w-secret")
+    enrolment = link(study)
+    voter = enrol(
+        token=enrolment.token,
+        external_id="w-secret",
+        agreed_sha256=enrolment.consent_sha256,
+        platform_study="s-secret",
+        platform_session="t-secret",
+    )
     assert not [
-        event.pk for event in Event.objects.all() if "w-secret" in f"{event.before} {event.after}"
+        event.pk for event in Event.objects.all() if "-secret" in f"{event.before} {event.after}"
     ]
     forget_identity(user=voter.expert, actor=admin)
     voter.refresh_from_db()
-    assert voter.external_id == ""
+    assert [voter.external_id, voter.platform_study, voter.platform_session] == ["", "", ""]
 
 
 @pytest.mark.parametrize(("answered", "free"), [(0, 1), (2, 1), (6, 0)])

@@ -4,10 +4,11 @@ import csv
 import io
 
 import pytest
+from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Enrolment, Study
+from arena.models import Enrolment, Person, Study
 from arena.studies.services.taking_part import set_enrolment
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
@@ -15,23 +16,29 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 
+RULES = {
+    "consent": "I agree <fully>.\nReally.",
+    "asks_for": "Your Prolific ID",
+    "places": 2,
+    "votes_each": 6,
+    "drop_out_after_h": 24,
+}
+UNFILLED = (
+    "PROLIFIC_PID={{%PROLIFIC_PID%}} PROLIFIC_PID=%7B%7B%25PROLIFIC_PID%25%7D%7D&STUDY_ID=s "
+    "id=w-1&SESSION_ID={{%SESSION_ID%}} workerId=${workerId} id=a%0Ab id=" + 121 * "x"
+).split()
+FROM_PROLIFIC = "?PROLIFIC_PID=w-1&STUDY_ID=s-9&SESSION_ID=secret-3"
+
+
 @pytest.fixture
 def enrolment() -> Enrolment:
-    return set_enrolment(
-        study=a_study(votes_per_expert=3),
-        rules={
-            "consent": "I agree <fully>.\nReally.",
-            "asks_for": "Your Prolific ID",
-            "places": 2,
-            "votes_each": 6,
-            "drop_out_after_h": 24,
-        },
-    )
+    return set_enrolment(study=a_study(votes_per_expert=3), rules=RULES)
 
 
-def join(client: Client, enrolment: Enrolment, **changes: str) -> int:
+def join(client: Client, enrolment: Enrolment, query: str = "", **changes: str) -> int:
     given = {"external_id": "w-1", "agreed": "on", "agreed_sha256": enrolment.consent_sha256}
-    return client.post(reverse("enrol", args=[enrolment.token]), given | changes).status_code
+    url = reverse("enrol", args=[enrolment.token]) + query
+    return client.post(url, given | changes).status_code
 
 
 def test_the_page_says_what_one_agrees_to_and_takes_the_id_from_the_address(
@@ -58,6 +65,77 @@ def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enr
     assert again["Location"] == reverse("vote", args=[study.code])
 
 
+@pytest.mark.parametrize("query", UNFILLED)
+def test_ids_that_the_platform_did_not_fill_in_take_nobody_on(
+    enrolment: Enrolment, query: str
+) -> None:
+    url = reverse("enrol", args=[enrolment.token]) + f"?{query}"
+    assert Client().get(url).status_code == 422
+    assert join(Client(), enrolment, f"?{query}") == 422
+    assert join(Client(), enrolment, external_id="{{%PROLIFIC_PID%}}") == 422
+    assert not enrolment.voters.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "status"),
+    [
+        *(("\u0639\u0644\u06cc\u200c\u0631\u0636\u0627", 302), ("\u0d28\u0d4d\u200d", 302)),
+        *(("Ada  King\u00a0L\u3000X", 302), ("\u200d", 422), ("a\u202eb", 422), ("a\u2028b", 422)),
+    ],
+)
+def test_a_name_may_hold_joiners_and_spaces(enrolment: Enrolment, name: str, status: int) -> None:
+    assert join(Client(), enrolment, external_id=name) == status
+    admin = signed_in(people()["admin"])
+    admin.post(reverse("people"), {"username": "x", "pseudonym": name, "role": "expert"})
+    expected = [name] * (status == 302)
+    assert [row.external_id for row in enrolment.voters.all()] == expected
+    assert [row.pseudonym for row in Person.objects.filter(user__username="x")] == expected
+
+
+def test_who_comes_again_from_prolific_goes_on_at_that_device_alone(enrolment: Enrolment) -> None:
+    first, second, stranger = Client(), Client(), Client()
+    assert join(first, enrolment, FROM_PROLIFIC) == 302
+    set_enrolment(study=enrolment.study, rules={**RULES, "places": 1})
+    url = reverse("enrol", args=[enrolment.token])
+    ballot = reverse("vote", args=[enrolment.study.code])
+    for query in ("?PROLIFIC_PID=w-1", f"{FROM_PROLIFIC}4", "?SESSION_ID=secret-3"):
+        assert stranger.post(url + query, {"go_on": "1"}).status_code == 422
+    page = second.get(url + FROM_PROLIFIC)
+    assert page.headers["Referrer-Policy"] == "strict-origin"
+    assert "Go on here" in page.content.decode()
+    assert join(second, enrolment, FROM_PROLIFIC) == 200, "asks as well"
+    assert [one.get(ballot).status_code for one in (first, second)] == [200, 302]
+    assert second.post(url + FROM_PROLIFIC, {"go_on": "1"})["Location"] == ballot
+    assert [one.get(ballot).status_code for one in (first, second)] == [302, 200]
+    User.objects.filter(enrolled__isnull=False).update(is_active=False)
+    assert "Go on here" not in stranger.get(url + FROM_PROLIFIC).content.decode()
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        *(("C1ABCD", 302), ("https://app.prolific.com/submissions/complete?cc=C1", 302)),
+        *(("javascript:alert(1)", 422), ("http://x.org/", 422), ("www.x.org/done", 422)),
+    ],
+)
+def test_a_study_has_its_own_code_or_return_address(
+    enrolment: Enrolment, text: str, status: int
+) -> None:
+    url = reverse("enrolment", args=[enrolment.study.code])
+    given = {**RULES, "completes_with": text, "is_open": "on"}
+    assert signed_in(people()["admin"]).post(url, given).status_code == status
+    enrolment.refresh_from_db()
+    voter = Client()
+    join(voter, enrolment)
+    row = enrolment.voters.get()
+    for matchup in matchups_of(enrolment.study, row.expert.username):
+        vote(matchup)
+    page = voter.get(reverse("vote", args=[enrolment.study.code])).content.decode()
+    shown = text if status == 302 else row.completion_code
+    assert (f'href="{shown}"' if "/" in shown else f">{shown}<") in page
+    assert (row.completion_code in page) == (status == 422)
+
+
 def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:
     client = Client()
     join(client, enrolment)
@@ -69,10 +147,7 @@ def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:
 
 def test_an_admin_makes_the_link_and_changes_it(enrolment: Enrolment) -> None:
     admin, url = people()["admin"], reverse("enrolment", args=[enrolment.study.code])
-    given = {
-        **{"consent": "Yes.", "asks_for": "ID", "places": 9, "votes_each": 4},
-        **{"drop_out_after_h": "", "is_open": "on"},
-    }
+    given = RULES | {"places": 9, "drop_out_after_h": "", "is_open": "on"}
     assert signed_in(admin).post(url, given).status_code == 302
     enrolment.refresh_from_db()
     assert (enrolment.places, enrolment.drop_out_after_h) == (9, None)
@@ -82,7 +157,7 @@ def test_an_admin_makes_the_link_and_changes_it(enrolment: Enrolment) -> None:
 
 def test_the_file_says_whom_to_pay_and_holds_no_formula(enrolment: Enrolment) -> None:
     join(Client(), enrolment, external_id="=1+1")
-    join(Client(), enrolment, external_id="w-2")
+    join(Client(), enrolment, FROM_PROLIFIC, external_id="w-2")
     done = enrolment.voters.get(external_id="w-2")
     for matchup in matchups_of(enrolment.study, done.expert.username):
         vote(matchup)
@@ -92,3 +167,7 @@ def test_the_file_says_whom_to_pay_and_holds_no_formula(enrolment: Enrolment) ->
     assert (first["id"], first["is_done"], first["completion_code"]) == ("'=1+1", "0", "")
     assert (second["id"], second["answered"]) == ("w-2", "6")
     assert second["completion_code"] == done.completion_code
+    assert [(row["study_id"], row["session_id"]) for row in (first, second)] == [
+        ("", ""),
+        ("s-9", "secret-3"),
+    ]

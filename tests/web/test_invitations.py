@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from arena.config.logs import HideKeys
 from arena.models import Invitation, Study
-from arena.people.links import invite
+from arena.people.links import invite, make_api_token
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 
@@ -63,6 +63,36 @@ def test_the_button_signs_in_for_thirty_days_and_leads_to_the_first_pair(study: 
     assert who(client) == "eva"
     assert client.session.get_expiry_age() == 30 * 24 * 3600
     assert Invitation.objects.get().used_at is not None
+
+
+def test_a_second_device_takes_over_after_a_confirmation(study: Study) -> None:
+    first, second, url = Client(), Client(), link(study)
+    assert "signs you out on every other device" not in text(first.get(url).content)
+    first.post(url)
+    assert "signs you out on every other device" in text(second.get(url).content)
+    assert first.get(reverse("home")).status_code == 200, "a look signs nobody out"
+    second.post(url)
+    assert [one.get(reverse("home")).status_code for one in (first, second)] == [302, 200]
+
+
+def test_an_expert_from_the_list_of_people_comes_in_without_a_password(study: Study) -> None:
+    admin = signed_in(people()["admin"])
+    made = admin.post(reverse("people"), {"username": "grace", "role": "expert"})
+    grace = User.objects.get(username="grace")
+    pages = [made, admin.post(reverse("person-link", args=[grace.person.code]))]
+    older, url = (re.findall(r'"(http://testserver/[^"]+)"', text(x.content))[0] for x in pages)
+    assert Client().get(older).status_code == 410
+    guest = Client()
+    assert guest.post(url)["Location"] == reverse("home")
+    assert not grace.has_usable_password()
+    link(study)
+    assert Client().get(url).status_code == 200, "another one's changes nothing"
+    token = make_api_token(owner=grace, name="mine", role="expert", days=1).token
+    admin.post(reverse("person-change", args=[grace.person.code]), {"act": "take-back"})
+    token.refresh_from_db()
+    assert token.revoked_at is not None
+    assert guest.get(reverse("home")).status_code == 302
+    assert Client().post(url).status_code == 410
 
 
 def test_another_account_on_the_device_is_named_and_signed_out(study: Study) -> None:
@@ -122,7 +152,11 @@ def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study) -> None:
 
 
 def test_no_log_line_holds_a_key() -> None:
-    paths = ("/invitation/aB-c_9/", "/welcome/aB-c_9/", "/first/aB-c_9/")
+    paths = (
+        "/invitation/aB-c_9/",
+        "/welcome/aB-c_9/",
+        "/enrol/aB-c_9/?PROLIFIC_PID=x&SESSION_ID=y",
+    )
     line = logging.LogRecord("x", logging.INFO, "", 1, "GET %s %s %s", paths, None)
     assert HideKeys().filter(line)
-    assert line.getMessage() == "GET /invitation/.../ /welcome/.../ /first/.../"
+    assert line.getMessage() == "GET /invitation/.../ /welcome/.../ /enrol/.../"

@@ -12,6 +12,7 @@ from django.urls import reverse
 from pytest_django import Settings
 
 from arena.models import Study, Vote
+from arena.people.links import invite
 from arena.people.queries import find_admins
 from arena.people.services import (
     LINK_LIVES_S,
@@ -95,7 +96,7 @@ class FasterVisitor:
 
 
 def test_of_two_who_use_a_link_at_once_the_second_finds_it_used(settings: Settings) -> None:
-    grace = create_person(username="grace", password=None, role="expert")
+    grace = create_person(username="grace", password=None, role="researcher")
     token = make_welcome_token(grace, actor=people()["admin"])
     settings.AUTH_PASSWORD_VALIDATORS = [
         {"NAME": f"{__name__}.FasterVisitor", "OPTIONS": {"token": token}}
@@ -119,12 +120,14 @@ def test_a_paused_account_is_signed_out_and_can_go_on_later() -> None:
     accounts = people()
     expert = accounts["expert"]
     theirs = signed_in(expert)
+    link = reverse("invitation", args=[invite(study=None, expert=expert).token])
     change(accounts["admin"], expert, act="pause")
     assert theirs.get(reverse("home")).status_code == 302
     assert Session.objects.count() == 1, "the admin's own"
     assert not can_sign_in("the-expert", "a password")
     change(accounts["admin"], expert, act="resume")
     assert can_sign_in("the-expert", "a password")
+    assert Client().get(link).status_code == 410
 
 
 def test_a_role_is_changed_for_another_and_logged() -> None:

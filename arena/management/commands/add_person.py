@@ -15,8 +15,8 @@ class Command(TerminalCommand):
     """Make an account of any role."""
 
     help = (
-        "Make an account. The password is asked for; where nobody can be asked it is made up and "
-        "printed once."
+        "Make an account. Experts come in by a link and have no password. Else it is asked for; "
+        "where nobody can be asked it is made up and printed once."
     )
 
     arguments = {
@@ -27,9 +27,11 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the account."""
-        asked = sys.stdin.isatty()
-        password = getpass.getpass("Password: ") if asked else secrets.token_urlsafe(12)
-        if not password:
+        is_expert, is_asked = options["role"] == "expert", sys.stdin.isatty()
+        password = None
+        if not is_expert:
+            password = getpass.getpass("Password: ") if is_asked else secrets.token_urlsafe(12)
+        if password == "":
             raise CommandError("An empty password is no password; nothing was made.")
         user = create_person(
             username=options["username"],
@@ -38,5 +40,7 @@ class Command(TerminalCommand):
             pseudonym=options["pseudonym"],
         )
         self.stdout.write(f"Made {options['role']} {user.username} ({user.person.pseudonym}).")
-        if not asked:
+        if is_expert:
+            self.stdout.write("Its link: People, or `manage.py invite STUDY` once it takes part.")
+        elif not is_asked:
             self.stdout.write(f"Password (shown once): {password}")

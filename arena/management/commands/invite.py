@@ -2,16 +2,14 @@
 
 from typing import Any
 
-from django.urls import reverse
-
-from arena.people.links import LINK_LIVES, invite
+from arena.people.links import LINK_LIVES, make_link_path
 from arena.serving.stack import Web
 from arena.studies.queries import expert_lines, expert_named, study_named
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.people.services.invite."""
+    """Make links for the experts of a study."""
 
     help = (
         "Print a link for every expert of a study who has none that works; each is shown once. "
@@ -38,12 +36,10 @@ class Command(TerminalCommand):
                 for line in expert_lines(study)
                 if line.may_be_invited and not line.has_live_link
             ]
-        made = [(expert, invite(study=study, expert=expert)) for expert in chosen]
-        address = options["address"]
-        for expert, fresh in made:
-            path = reverse("invitation", args=[fresh.token])
+        made = [(expert, make_link_path(expert, study=study)) for expert in chosen]
+        for expert, path in made:
             name = f"{expert.username} ({expert.person.pseudonym})"
-            self.stdout.write(f"{name}: {address.rstrip('/')}{path}")
+            self.stdout.write(f"{name}: {options['address'].rstrip('/')}{path}")
         if made:
             self.stdout.write(f"Each works for {LINK_LIVES.days} days and is not shown again.")
         else:

@@ -6,23 +6,20 @@ from typing import Any
 from django import forms
 from django.contrib import messages
 from django.contrib.auth import login
-from django.contrib.auth.decorators import login_not_required
 from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods
 
 from arena.errors import EnrolmentOver, LinkOver
 from arena.exports.cells import csv_text
 from arena.exports.formats import attach
-from arena.models import Enrolment, Invitation, Study
-from arena.people import links
-from arena.people.pages import find_account, link_page, with_own_language
-from arena.site.access import ADMIN, BACKEND, CREATED, GONE, act_for, form_for, page_for, user_of
+from arena.models import Enrolment, Study
+from arena.people import links, services
+from arena.people.pages import find_account, link_page, show_new_links, with_own_language
+from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
 from arena.studies.forms import AuthorForm
@@ -30,10 +27,13 @@ from arena.studies.queries import enrolled_voters, expert_lines, state_of
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
     LONGEST_ID,
+    check_id,
     enrol,
+    find_returning,
     forget_identity,
     set_enrolment,
 )
+from augment.errors import Conflict
 
 SESSION_S = 30 * 24 * 3600
 
@@ -41,9 +41,13 @@ PAGE = 100
 ID_PARAMETERS = ("id", "worker", "workerId", "PROLIFIC_PID")
 """In an address, what the platforms call the id of whom they send."""
 
+PLATFORM_COLUMNS = {"STUDY_ID": "platform_study", "SESSION_ID": "platform_session"}
+PROLIFIC = "?PROLIFIC_PID={{%PROLIFIC_PID%}}&STUDY_ID={{%STUDY_ID%}}&SESSION_ID={{%SESSION_ID%}}"
+
 COLUMNS = (
     *("voter", "id", "planned", "answered", "skipped"),
-    *("enrolled_at", "last_vote_at", "dropped_at", "is_done", "completion_code"),
+    *("enrolled_at", "last_vote_at", "dropped_at", "is_done"),
+    *("completion_code", "study_id", "session_id"),
 )
 CONSENT = (
     "I take part of my own free will and may stop at any time. My answers, the time that they "
@@ -61,6 +65,13 @@ class EnrolmentForm(forms.Form):
     drop_out_after_h = forms.IntegerField(
         min_value=1, max_value=10_000, required=False, initial=24
     )
+    completes_with = forms.RegexField(
+        r"\A(https://[^\s/@]+(/\S*)?|[\w -]+)\Z",
+        max_length=200,
+        required=False,
+        strip=True,
+        error_messages={"invalid": "A code, or an address that begins with https://."},
+    )
     is_open = forms.BooleanField(required=False, initial=True)
 
 
@@ -74,14 +85,6 @@ class NewcomerForm(forms.Form):
         error_messages={"required": gettext_lazy("You take part only if you agree.")}
     )
     agreed_sha256 = forms.CharField(max_length=64)
-
-    def clean_external_id(self) -> str:
-        """Return the id if it can be shown on one line."""
-        text: str = self.cleaned_data["external_id"]
-        if not text.isprintable():
-            wanted = _("1 to %(most)s printable characters are needed.")
-            raise forms.ValidationError(wanted % {"most": LONGEST_ID})
-        return text
 
 
 # --- The experts of a study --------------------------------------------------------------------
@@ -152,22 +155,16 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None
     if not chosen:
         messages.info(request, "Nobody was left to invite; no link was made.")
         return None
-    made = []
-    for expert in chosen:
-        fresh = links.invite(study=study, expert=expert, actor=user_of(request))
-        address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
-        made.append({"invitation": fresh.invitation, "address": address})
-    context = {"study": study, "links": made}
-    return render(request, "studies/links.html", context, status=CREATED)
+    return show_new_links(request, chosen, study)
 
 
 @act_for(ADMIN, back="study")
 def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one link; whoever came in by it is signed out."""
-    invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
-    links.revoke(invitation=invitation, actor=user_of(request))
+    study = get_object_or_404(Study, invitations__code=code)
+    links.revoke(invitation=study.invitations.get(code=code), actor=user_of(request))
     messages.success(request, "The link was taken back.")
-    return redirect("study", code=invitation.study.code)
+    return redirect("study", code=study.code)
 
 
 @link_page
@@ -178,51 +175,72 @@ def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
         raise Http404
     if request.method == "POST":
         invitation = links.accept(token=token)
-        is_open = invitation.study.state == Study.State.OPEN
-        answer = redirect("vote", code=invitation.study.code) if is_open else redirect("home")
-        _sign_in(request, invitation.expert)
+        answer = _sign_in(request, invitation.expert, invitation.study)
         request.session[links.SESSION_KEY] = str(invitation.code)
-        return with_own_language(answer, invitation.expert)
+        return answer
     if not links.lets_in(invitation):
         raise LinkOver
     return render(request, "invitation.html", {"invitation": invitation})
 
 
-def _sign_in(request: HttpRequest, expert: User) -> None:
+def _sign_in(request: HttpRequest, expert: User, study: Study | None) -> HttpResponse:
+    """Sign an expert in here and out on every other device, and lead to the study."""
+    if expert.last_login is not None:
+        services.end_sessions(services.SIGNED_IN, {str(expert.pk)})
     login(request, expert, backend=BACKEND)
     request.session.set_expiry(SESSION_S)
+    answer = redirect("home") if study is None else redirect("vote", code=study.code)
+    return with_own_language(answer, expert)
 
 
 # --- Enrolment ---------------------------------------------------------------------------------
 
 
-@login_not_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@link_page
 def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
-    """What the study is, what one agrees to, and a form for the id; then the first pair."""
+    """What the study is, what one agrees to, and a form for the id; then the first pair.
+
+    Whoever comes again from a platform goes on at this device if they say so.
+    """
     enrolment = get_object_or_404(Enrolment.objects.select_related("study"), token=token)
     user, study = request.user, enrolment.study
     if user.is_authenticated and enrolment.voters.filter(expert=user).exists():
         return redirect("vote", code=study.code)
-    given = next((request.GET[name] for name in ID_PARAMETERS if name in request.GET), "")
-    form = NewcomerForm(request.POST or None, initial={"external_id": given[:LONGEST_ID]})
-    is_over = not enrolment.is_open or study.state != Study.State.OPEN
+    try:
+        ids = _read_ids(request)
+    except Conflict as error:
+        return render(request, "enrol_over.html", {"problem": error}, status=422)
+    voter = find_returning(enrolment, ids["external_id"], ids["platform_session"])
+    if voter is None:
+        return _take_on(request, enrolment, ids)
+    if "go_on" in request.POST:
+        return _sign_in(request, voter.expert, study)
+    return render(request, "enrol.html", {"enrolment": enrolment, "voter": voter})
+
+
+def _read_ids(request: HttpRequest) -> dict[str, str]:
+    ids = {"external_id": next(filter(None, map(request.GET.get, ID_PARAMETERS)), "")}
+    ids |= {column: request.GET.get(name, "") for name, column in PLATFORM_COLUMNS.items()}
+    return {column: text and check_id(text) for column, text in ids.items()}
+
+
+def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) -> HttpResponse:
+    form = NewcomerForm(request.POST or None, initial=ids)
+    is_over = not enrolment.is_open or enrolment.study.state != Study.State.OPEN
     if form.is_valid():
         with refusals_in(form, "external_id"):
             try:
                 voter = enrol(
-                    token=token,
-                    external_id=form.cleaned_data["external_id"],
+                    token=enrolment.token,
                     agreed_sha256=form.cleaned_data["agreed_sha256"],
+                    **ids | {"external_id": form.cleaned_data["external_id"]},
                 )
-                _sign_in(request, voter.expert)
-                return redirect("vote", code=study.code)
+                return _sign_in(request, voter.expert, enrolment.study)
             except EnrolmentOver:
                 is_over = True
         enrolment.refresh_from_db()
     if is_over:
-        return render(request, "enrol_over.html", {"study": study}, status=GONE)
+        return render(request, "enrol_over.html", {"study": enrolment.study}, status=GONE)
     context = {"enrolment": enrolment, "form": form}
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
 
@@ -242,8 +260,10 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("enrolment", code=code)
     context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}
     if enrolment is not None:
+        address = request.build_absolute_uri(reverse("enrol", args=[enrolment.token]))
         context |= {
-            "address": request.build_absolute_uri(reverse("enrol", args=[enrolment.token])),
+            "address": address,
+            "prolific": address + PROLIFIC,
             "state": state_of(enrolment),
             "page": read_page(request, enrolled_voters(study), size=PAGE),
         }
@@ -268,5 +288,6 @@ def _line_of(voter: Any) -> tuple[object, ...]:
         *(voter.planned, voter.answered, voter.skipped),
         *(None if at is None else at.isoformat() for at in times),
         int(voter.is_done),
-        voter.completion_code if voter.is_done else "",
+        (voter.enrolment.completes_with or voter.completion_code) if voter.is_done else "",
+        *(voter.platform_study, voter.platform_session),
     )

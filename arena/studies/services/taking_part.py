@@ -1,5 +1,6 @@
 """Changes of who takes part: pairs handed over, enrolment by link, drop-outs, forgetting."""
 
+import re
 import uuid
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -12,20 +13,22 @@ from django.utils import timezone
 from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
-from arena.models import EnrolledVoter, Enrolment, Invitation, Matchup, Person, Study
+from arena.models import EnrolledVoter, Enrolment, Matchup, Person, Study
 from arena.pairing.later import choose_for_newcomer, deal, judges, units_of
+from arena.people import services
 from arena.people.queries import experts as expert_accounts
-from arena.people.queries import forgotten_name
-from arena.people.services import SIGNED_IN, check_may_change, create_person, end_sessions
+from arena.people.queries import forgotten_name, may_be_let_in
 from arena.studies.queries import expert_named, find_silent, find_unfinished
 from arena.studies.services.drafts import rename_in_drafts
 from arena.studies.services.opening import find_named
 from arena.studies.services.planning import Planning, planned_so_far
 from augment.errors import Conflict
 from augment.services.events import log_change
-from augment.services.texts import one_line
+from augment.services.texts import is_readable_line, one_line
 
 LONGEST_CONSENT, LONGEST_ID = 5_000, 120
+_PLACEHOLDER = re.compile(r"\{\{|\}\}|\$\{")
+"""What platforms replace by an id, such as `{{%PROLIFIC_PID%}}` or `${workerId}`."""
 
 # --- Handing over ------------------------------------------------------------------------------
 
@@ -128,8 +131,8 @@ def set_enrolment(
 
     Args:
         study: An open one.
-        rules: Columns of Enrolment: consent, asks_for, places, votes_each, drop_out_after_h and
-            is_open. Agreements are kept with a digest of the consent.
+        rules: Columns of Enrolment: consent, asks_for, places, votes_each, drop_out_after_h,
+            completes_with and is_open. Agreements are kept with a digest of the consent.
         actor: Who does so, for the log.
 
     Raises:
@@ -150,21 +153,48 @@ def set_enrolment(
     return enrolment
 
 
+def check_id(text: str) -> str:
+    """Return the id or name of a voter, or an id of a platform, without blanks around it.
+
+    Raises:
+        Conflict: It is empty, too long or no line, or the platform has left its placeholder.
+    """
+    text = text.strip()
+    if len(text) > LONGEST_ID or not is_readable_line(text) or _PLACEHOLDER.search(text):
+        problem = gettext(
+            "“%(id)s” is no ID: 1 to %(most)s printable characters are needed, and no placeholder "
+            "that the platform has left. Please tell who runs the study."
+        )
+        raise Conflict(problem % {"id": text, "most": LONGEST_ID})
+    return text
+
+
+def find_returning(enrolment: Enrolment, name: str, session: str) -> EnrolledVoter | None:
+    """Return who comes again from a platform.
+
+    An id alone is no key: others may know it. The platform's session is known to nobody else.
+    """
+    voters = enrolment.voters.select_related("expert__person").exclude(platform_session="")
+    voter = voters.filter(external_id__iexact=name, platform_session=session).first()
+    return voter if voter is not None and may_be_let_in(voter.expert) else None
+
+
 @transaction.atomic
-def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
+def enrol(*, token: str, external_id: str, agreed_sha256: str, **platform: str) -> EnrolledVoter:
     """Give a newcomer a place, an account and a quota of pairs.
 
     Args:
         token: Of the link.
         external_id: What they entered; one id has one place, however its letters are cased.
         agreed_sha256: Of the text that they agreed to, as it was shown.
+        platform: Further ids by their columns of EnrolledVoter.
 
     Raises:
         EnrolmentOver: It is closed, the study too, or every place is taken.
-        Conflict: The id is enrolled already, or another text was agreed to than holds now.
-        InvalidDocument: The id is empty, too long or no line.
+        Conflict: The id is no id or enrolled already, or another text was agreed to than holds
+            now.
     """
-    external_id = one_line("id", external_id, what="enrolment", longest=LONGEST_ID)
+    external_id = check_id(external_id)
     study = Study.objects.select_for_update().get(enrolment__token=token)
     enrolment = study.enrolment
     if not enrolment.is_open or study.state != Study.State.OPEN:
@@ -182,13 +212,13 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
     taken = enrolment.voters.filter(dropped_at=None).count()
     if taken >= enrolment.places and not drop_silent(enrolment=enrolment):
         raise EnrolmentOver("Every place of this study is taken.")
-    return _take_on(study, enrolment, external_id)
+    return _take_on(study, enrolment, {"external_id": external_id, **platform})
 
 
-def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVoter:
+def _take_on(study: Study, enrolment: Enrolment, ids: Mapping[str, str]) -> EnrolledVoter:
     # Voters of all studies are counted on; the study's code keeps two studies apart.
     number = EnrolledVoter.objects.filter(enrolment__study=study).count() + 1
-    person = create_person(
+    person = services.create_person(
         username=f"voter-{uuid.uuid4().hex[:12]}",
         password=None,
         role="expert",
@@ -203,10 +233,7 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
     planning.store(planned, [person])
     study.experts.add(person)
     voter = EnrolledVoter.objects.create(
-        enrolment=enrolment,
-        expert=person,
-        external_id=external_id,
-        consent_sha256=enrolment.consent_sha256,
+        enrolment=enrolment, expert=person, consent_sha256=enrolment.consent_sha256, **ids
     )
     after = {
         "batch": planning.number,
@@ -269,23 +296,24 @@ def forget_identity(*, user: User, actor: User) -> None:
     Raises:
         Conflict: It is one's own, or the actor is no admin any more.
     """
-    check_may_change(user, actor)
+    services.check_may_change(user, actor)
     known_as, name = user.get_username(), forgotten_name(user.person)
     User.objects.filter(pk=user.pk).update(
         username=name, first_name="", last_name="", email="", is_active=False, last_login=None
     )
     user.refresh_from_db()
     user.set_unusable_password()
-    user.save(update_fields=["password"])
+    services.end_links(user)
     Person.objects.filter(user=user).update(pseudonym=f"Former person {name[5:]}", preferences={})
-    Invitation.objects.filter(expert=user, revoked_at=None).update(revoked_at=timezone.now())
     _rename_in_plans(known_as, name)  # locks the studies, which comes before what is in them
     give_up_places(expert=user, actor=actor)
-    EnrolledVoter.objects.filter(expert=user).update(external_id="")
+    EnrolledVoter.objects.filter(expert=user).update(
+        external_id="", platform_study="", platform_session=""
+    )
     rename_in_drafts(known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()
-    end_sessions(SIGNED_IN, {str(user.pk)})
+    services.end_sessions(services.SIGNED_IN, {str(user.pk)})
     log_change(user.person, "forget identity", actor)
 
 
