@@ -7,10 +7,9 @@ entry of PLACERS; slugs are kept in databases, so they stay.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
-from augment.baselines import quantised, rule_placer
+from augment.baselines import coarse_grid, rule_placer
 from augment.baselines.rule_placer import Placement
 from augment.scene.entities import Modification
 
@@ -39,8 +38,7 @@ class Placer:
 
 PLACERS: dict[str, Placer] = {
     RULE_PLACER: Placer("Rule placer", rule_placer.place, is_rule=True),
-    "quantised-5m": Placer("Quantised code, 5 m", partial(quantised.place, bin_m=5.0)),
-    "quantised-20m": Placer("Quantised code, 20 m", partial(quantised.place, bin_m=20.0)),
+    "quantised-5m": Placer("Coarse grid baseline, 5 m", coarse_grid.place),
 }
 
 

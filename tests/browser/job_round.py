@@ -35,8 +35,7 @@ def _try_one(page: Page) -> None:
     page.fill("[name=name]", "Round 1")
     page.get_by_text("Advanced").click()
     page.check(f"[name=cells][value='{BROKE}']")
-    for slug in ("quantised-5m", "quantised-20m"):
-        page.uncheck(f"[name=contestants][value={slug}]")
+    page.uncheck("[name=contestants][value=quantised-5m]")
     page.click("button[name=try]")
     expect(page.get_by_role("heading", name="Round 1, first try")).to_be_visible()
     _ends_in_part(page)

@@ -67,7 +67,6 @@ def test_the_builtin_contestants_are_made_once() -> None:
     contestants.ensure_builtin()
     contestants.ensure_builtin()
     assert list(Contestant.objects.values_list("slug", "kind")) == [
-        ("quantised-20m", "baseline"),
         ("quantised-5m", "baseline"),
         ("reference", "reference"),
         ("rule-placer", "rule"),

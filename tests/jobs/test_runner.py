@@ -15,6 +15,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.services.running import jobs, runner, workers
+from augment.services.running.choosing import resolve_contestants
 from augment.services.running.jobs import JobRequest
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import Model, Wire, llama_job, ran, reply
@@ -121,12 +122,19 @@ def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
     assert row.reason.startswith("The modification does not fit the scene: Agent9")
 
 
-def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
-    add_kind("someone", Contestant.Kind.SIMULATED)
-    Contestant.objects.filter(slug="someone").update(error_rates={"position": 0.1})
+@pytest.mark.parametrize(
+    ("slug", "kind", "rates"),
+    [("errors", "simulated", {"position": 0.1}), ("quantised-20m", "baseline", None)],
+)
+def test_contestants_of_an_earlier_version_run_no_more(
+    slug: str, kind: str, rates: dict[str, float] | None
+) -> None:
+    add_kind(slug, Contestant.Kind(kind))
+    Contestant.objects.filter(slug=slug).update(error_rates=rates)
     add_scenario("street")
-    with pytest.raises(Conflict, match="A job can't run someone"):
-        jobs.launch(JobRequest(name="R", contestants=["someone"], scenarios=["street"]))
+    with pytest.raises(Conflict, match=f"A job can't run {slug}: it was made elsewhere"):
+        jobs.launch(JobRequest(name="R", contestants=[slug], scenarios=["street"]))
+    assert slug not in resolve_contestants(["all"])
 
 
 @pytest.fixture(autouse=True)

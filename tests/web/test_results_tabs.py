@@ -119,7 +119,8 @@ def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, reader:
     assert (made.rounds, made.seed, made.resampling_unit) == (160, 9, "vote")
     assert made.filters["experts"] == [str(person.code)]
     assert 0 < made.votes_counted < 90
-    reader.post(reverse("study-rate", args=[study.code]), {"rounds": "99"})
+    for refused in ({"rounds": "99"}, {"method": "elo"}):
+        reader.post(reverse("study-rate", args=[study.code]), refused)
     assert study.snapshots.count() == 2
 
 

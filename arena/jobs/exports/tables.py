@@ -48,7 +48,6 @@ AUGMENTATIONS: Columns = {
     "displacement_mean_m": ("displacement.mean_m", Dtype.NUMBER),
     **displacement.KEPT,
     **Dtype.WHOLE.columns("wrong", "doubtful"),
-    **Dtype.NUMBER.columns("realism"),
     "calls": ("spending.calls", Dtype.WHOLE),
     "tokens": ("spending.tokens", Dtype.WHOLE),
     "cost_usd": ("spending.usd", Dtype.NUMBER),

@@ -94,15 +94,15 @@ def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatte
         for n, row in rated
         if (x := metres.get(row.slug)) is not None
     ]
-    by_name = {"displacement": Scatter(across="Median displacement (m)", points=far)}
-    for name, label in (("usd", "USD"), ("tokens", "Tokens")):
-        spent = [
-            Point(number=n, row=row, x=x, model_class=cost.model_class)
-            for n, row in rated
-            if (cost := costs.get(row.slug)) and (x := getattr(cost, name))
-        ]
-        across = f"{label} per scenario"
-        by_name[f"elo-{name}"] = Scatter(across=across, points=spent, is_log=True)
+    spent = [
+        Point(number=n, row=row, x=cost.usd, model_class=cost.model_class)
+        for n, row in rated
+        if (cost := costs.get(row.slug)) and cost.usd
+    ]
+    by_name = {
+        "displacement": Scatter(across="Median displacement (m)", points=far),
+        "elo-usd": Scatter(across="USD per scenario", points=spent, is_log=True),
+    }
     return {name: plot for name, plot in by_name.items() if plot.points}
 
 

@@ -212,7 +212,7 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
     return known[name]
 
 
-CHARTS = ("pairs", "types", "displacement", "elo-usd", "elo-tokens")
+CHARTS = ("pairs", "types", "displacement", "elo-usd")
 RATING_FILES = {
     "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
     "agreement": Export(

@@ -10,6 +10,7 @@ from django.http import HttpRequest
 
 from arena import tasks
 from arena.models import Question, Snapshot, Study
+from arena.rating.rules import METHOD_TEXTS
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
 from arena.site.forms import RequestForm, offer
@@ -41,6 +42,7 @@ class RatingForm(RequestForm):
         super().__init__(data)
         if study is not None:
             offer(self, "question", ((key, Question(key).label) for key in study.questions))
+        offer(self, "method", ((key, text) for key, text in METHOD_TEXTS.items() if key != "elo"))
         for name in ("method", "rounds", "seed"):
             self.fields[name].required = False
         offer(self, "types", type_choices())

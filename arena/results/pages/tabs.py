@@ -225,11 +225,9 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Elo against money and tokens, by class of model."""
+    """Elo against money, by class of model."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
-    titles = {"elo-usd": "Elo against money", "elo-tokens": "Elo against tokens"}
-    drawn = scatters_of(snapshot, table)
     lines = _numbered(table, {line.slug: line for line in snapshot.results.cost})
     return {
         "lines": [
@@ -240,7 +238,7 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
             }
             for line in lines
         ],
-        "charts": [(name, title) for name, title in titles.items() if name in drawn],
+        "has_chart": "elo-usd" in scatters_of(snapshot, table),
     }
 
 

@@ -28,7 +28,6 @@ from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, Scenario
 from augment.services.events import log_change
-from augment.services.judging.realism import REALISM_VERSION
 from augment.services.scenarios.benchmarks import Split, list_remarks
 from augment.services.texts import one_line
 
@@ -223,7 +222,7 @@ def make_document(
         votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
         left_out=dict(sorted(left_out.items())),
         notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
-        versions=_versions(),
+        versions={name: str(version) for name, version in software_versions().items()},
         includes_simulated=any(who.is_simulated for who in competitors)
         or any(vote.is_simulated for vote in votes),
     )
@@ -268,12 +267,6 @@ def _pooled(study: Study, votes: int) -> PooledStudy:
         preregistration=preregistration_sha256(study),
         challengers=tuple(study.rules.get("challengers", ())),
     )
-
-
-def _versions() -> dict[str, str]:
-    """Of what the numbers depend on, and of the metrics that have one of their own."""
-    versions = software_versions() | {"realism": REALISM_VERSION}
-    return {name: str(version) for name, version in versions.items()}
 
 
 def _without_equal_ranks(lines: Sequence[Line]) -> list[Line]:

@@ -44,7 +44,6 @@ class AugmentationLine:
         kept: What a follow-up was to leave alone, None without any.
         spending: None where no model was asked.
         wrong, doubtful: Findings of the checks, None where nothing was checked.
-        realism: None where it can't be judged.
     """
 
     row: Augmentation
@@ -53,16 +52,13 @@ class AugmentationLine:
     spending: Spending | None
     wrong: int | None = None
     doubtful: int | None = None
-    realism: float | None = None
 
 
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample."""
     ids = list(job.augmentations.values_list("pk", flat=True))
-    realism, found = REALISM.of(ids), FINDINGS.of(ids)
+    found = FINDINGS.of(ids)
     for line in _lines(job):
-        if line.row.pk in realism:
-            line = replace(line, realism=realism[line.row.pk].mean)
         if line.row.pk in found:
             counts = Counter(finding.severity for finding in found[line.row.pk])
             wrong, doubtful = counts[Severity.WRONG], counts[Severity.DOUBTFUL]

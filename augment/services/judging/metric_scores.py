@@ -9,7 +9,6 @@ from augment.checks import Severity
 from augment.models import Augmentation, Contestant, Simulation
 from augment.services.judging.displacement import of_rows
 from augment.services.judging.findings import FINDINGS
-from augment.services.judging.realism import REALISM
 from augment.services.judging.simulations import SCORES, Options
 
 SAME_M = 0.15
@@ -35,7 +34,7 @@ class MetricScores:
 
 def metric_scores(ids: Collection[int]) -> tuple[MetricScores, ...]:
     """Return the scores of the augmentations with these primary keys; a second for a hundred."""
-    return (_displacement(ids), _checks(ids), _realism(ids), *_driving(ids))
+    return (_displacement(ids), _checks(ids), *_driving(ids))
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -63,15 +62,6 @@ def _checks(ids: Collection[int]) -> MetricScores:
             doubts = min(counts[Severity.DOUBTFUL], 99) / 100
             scores[str(code)] = -counts[Severity.WRONG] - doubts
     return MetricScores(name="Checks", by_code=scores)
-
-
-def _realism(ids: Collection[int]) -> MetricScores:
-    found = REALISM.of(ids)
-    codes = Augmentation.objects.filter(pk__in=found).values_list("pk", "code")
-    means = {str(code): found[pk].mean for pk, code in codes}
-    return MetricScores(
-        name="Realism", by_code={code: mean for code, mean in means.items() if mean is not None}
-    )
 
 
 def _driving(ids: Collection[int]) -> list[MetricScores]:

@@ -15,7 +15,6 @@ from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics import realism as metric
 from augment.metrics.displacement import CLASS_OF
-from augment.metrics.realism import REALISM_VERSION as REALISM_VERSION
 from augment.metrics.realism import SCORES as SCORES
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
@@ -92,7 +91,7 @@ class RealismTable:
     job: str
     lines: tuple[RealismLine, ...]
     scenes: int
-    version: int = REALISM_VERSION
+    version: int = metric.REALISM_VERSION
 
 
 def realism_of_job(job: GenerationJob) -> RealismTable:

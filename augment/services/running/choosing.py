@@ -25,14 +25,14 @@ EVERYWHERE = Q(kind__in=_MADE_HERE, error_rates__isnull=True) | Q(
     kind=Kind.BASELINE, slug__in=PLACERS
 )
 """Whom a job can run on any scenario. Submissions answer for those of their benchmark, what humans
-and outside baselines made is imported, the simulated errors of earlier versions run no more."""
+and outside baselines made is imported, contestants dropped since run no more."""
 
 
 def find_obstacle(contestant: Contestant) -> str:
     """Return why no job can run a contestant, whatever the scenarios; empty where one can."""
     is_ours = contestant.kind == Kind.BASELINE and contestant.slug in PLACERS
     if not is_ours and (contestant.kind not in _KINDS or contestant.error_rates is not None):
-        return "what humans or outside programs made is imported"
+        return "it was made elsewhere or is of an earlier version"
     if contestant.kind == Kind.SUBMISSION and not hasattr(contestant, "submission"):
         return "its submission is not in this installation"
     try:

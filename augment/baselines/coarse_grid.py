@@ -1,4 +1,4 @@
-"""LCTGen-inspired quantised code, without its neural generator: what brackets alone cost.
+"""Coarse grid baseline, inspired by LCTGen's code of a scene: what brackets alone cost.
 
 The rule placer's own placement becomes a code, and the code alone is placed again: somewhere on
 the centrelines that it leaves open, drawn by a seed. Everything finer is lost, and what is no
@@ -25,6 +25,8 @@ from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 
 FURTHEST_M = 72.0
+BIN_M = 5.0
+"""Width of a bin of the distance, the finer of the two in LCTGen's prompts."""
 SPEED_BIN_MPS = 2.5
 _LEFT_FROM_M = 0.005
 """What lies on the ego's own axis is on its right; half a centimetre is no side."""
@@ -64,9 +66,9 @@ class Code:
         return 0.0 if self.speed_bin is None else (self.speed_bin + 0.5) * SPEED_BIN_MPS
 
 
-def code_of(agent: TrafficAgent, *, bin_m: float) -> Code:
-    """Return what is left of a vehicle, distances told in bins of that width."""
-    ahead, left, bins = _cells_of(np.array([[agent.x_m, agent.y_m]]), bin_m)
+def code_of(agent: TrafficAgent) -> Code:
+    """Return what is left of a vehicle."""
+    ahead, left, bins = _cells_of(np.array([[agent.x_m, agent.y_m]]))
     return Code(
         is_ahead=bool(ahead[0]),
         is_left=bool(left[0]),
@@ -77,11 +79,11 @@ def code_of(agent: TrafficAgent, *, bin_m: float) -> Code:
 
 
 def _cells_of(
-    points_m: NDArray[np.float64], bin_m: float
+    points_m: NDArray[np.float64],
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Return which points (P, 2) are ahead, which to the left, and their bins up to 72 m, (P,)."""
     away_m = np.minimum(np.hypot(points_m[:, 0], points_m[:, 1]), FURTHEST_M)
-    return points_m[:, 0] > 0.0, points_m[:, 1] > _LEFT_FROM_M, away_m // bin_m
+    return points_m[:, 0] > 0.0, points_m[:, 1] > _LEFT_FROM_M, away_m // BIN_M
 
 
 def _direction_of(heading_rad: float) -> Direction:
@@ -93,15 +95,12 @@ def _direction_of(heading_rad: float) -> Direction:
     return Direction.ACROSS_TO_LEFT if turn_rad > 0.0 else Direction.ACROSS_TO_RIGHT
 
 
-def place(
-    scene: Scene, intent: wish.Intent | None, *, bin_m: float, seed: int = 0
-) -> rule_placer.Placement:
+def place(scene: Scene, intent: wish.Intent | None, *, seed: int = 0) -> rule_placer.Placement:
     """Put vehicles where their codes allow; the same for the same seed.
 
     Args:
         scene: Where.
         intent: What is asked for.
-        bin_m: The width of a bin of the distance, 5 or 20 m in LCTGen's prompts.
         seed: Of the draws.
 
     Raises:
@@ -122,7 +121,7 @@ def place(
     added: list[TrafficAgent] = []
     notes = []
     for agent in right.changed:
-        drawn = places.draw(code_of(agent, bin_m=bin_m), bin_m, [*standing, *added], rng)
+        drawn = places.draw(code_of(agent), [*standing, *added], rng)
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
@@ -159,10 +158,10 @@ class _Places:
         self._points, self._headings, self._lane_ids = np.vstack(points), headings, ids
 
     def draw(
-        self, code: Code, bin_m: float, others: Sequence[TrafficAgent], rng: np.random.Generator
+        self, code: Code, others: Sequence[TrafficAgent], rng: np.random.Generator
     ) -> TrafficAgent | None:
         """Return a vehicle at a place of its code, None where every draw met somebody else."""
-        allowed = self._allowed_by(code, bin_m)
+        allowed = self._allowed_by(code)
         for _ in range(_DRAWS):
             index = int(rng.choice(allowed))
             x_m, y_m = self._points[index].round(3).tolist()
@@ -174,13 +173,13 @@ class _Places:
                 return vehicle
         return None
 
-    def _allowed_by(self, code: Code, bin_m: float) -> NDArray[np.intp]:
+    def _allowed_by(self, code: Code) -> NDArray[np.intp]:
         """Return the indices of the places that a code leaves open.
 
         Until some place is left, its side is given up, its direction, both, all but the bin, and
         in the end the bin, of which the nearest with a lane counts.
         """
-        ahead, left, bins = _cells_of(self._points, bin_m)
+        ahead, left, bins = _cells_of(self._points)
         gaps = np.abs(bins - code.distance_bin)
         same_end = (gaps == 0) & (ahead == code.is_ahead)
         in_quadrant = same_end & (left == code.is_left)

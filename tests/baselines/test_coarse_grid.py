@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.baselines import quantised, rule_placer
-from augment.baselines.quantised import Code, Direction, code_of
+from augment.baselines import coarse_grid, rule_placer
+from augment.baselines.coarse_grid import Code, Direction, code_of
 from augment.baselines.registry import PLACERS
 from augment.scene.entities import AgentType, TrafficAgent
 from bench.displacement import made, measured
@@ -34,7 +34,7 @@ def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float =
         length_m=4.8,
         speed_mps=speed_mps,
     )
-    return code_of(agent, bin_m=5.0)
+    return code_of(agent)
 
 
 @pytest.mark.parametrize(
@@ -69,38 +69,37 @@ def test_nothing_finer_than_the_code_gets_through(
     assert abs(code.speed_mps - speed_mps) <= 2.5
 
 
-@pytest.mark.parametrize("bin_m", [5.0, 20.0])
-def test_it_stands_on_a_centreline_within_its_code(bin_m: float) -> None:
+def test_it_stands_on_a_centreline_within_its_code() -> None:
     scene = street()
     (right,) = rule_placer.place(scene, PARKED, seed=3).modification.added
-    placed = quantised.place(scene, PARKED, bin_m=bin_m, seed=3)
+    placed = coarse_grid.place(scene, PARKED, seed=3)
     (made,) = placed.modification.added
     assert made.lane_id is not None
     lane = next(lane for lane in scene.lanes if lane.id == made.lane_id)
     assert lane.centerline.project(made.x_m, made.y_m).distance_m < 0.01
-    assert code_of(made, bin_m=bin_m) == code_of(right, bin_m=bin_m)
+    assert code_of(made) == code_of(right)
     assert (made.length_m, made.width_m, made.type) == (4.8, 2.0, AgentType.VEHICLE)
 
 
 def test_the_seed_alone_decides_where() -> None:
     def x_m(seed: int) -> float:
-        return quantised.place(street(), PARKED, bin_m=20.0, seed=seed).modification.added[0].x_m
+        return coarse_grid.place(street(), PARKED, seed=seed).modification.added[0].x_m
 
     assert x_m(1) == x_m(1)
     assert len({x_m(seed) for seed in range(8)}) > 4
-    assert all(20.0 <= x_m(seed) <= 40.0 for seed in range(8))
+    assert all(20.0 <= x_m(seed) <= 25.0 for seed in range(8))
 
 
 @cache
 def errors_m() -> dict[str, list[float]]:
-    """By contestant the distances of all it placed, where all three place something."""
+    """By contestant the distances of all it placed, where both place something."""
     found: defaultdict[str, list[float]] = defaultdict(list)
     for slug, seed in product(SLUGS, range(SEEDS)):
         tried = {}
         for name, placer in PLACERS.items():
             modification = made(placer.place, slug, seed)
             if modification is None:
-                break  # the others are not asked for what is not compared
+                break  # what one of them refuses is not compared
             tried[name] = modification
         else:
             for name, modification in tried.items():
@@ -108,9 +107,8 @@ def errors_m() -> dict[str, list[float]]:
     return dict(found)
 
 
-def test_finer_brackets_lose_less_and_none_lose_least_over_the_catalogue() -> None:
+def test_brackets_lose_what_none_keeps_over_the_catalogue() -> None:
     found = errors_m()
     assert min(len(values) for values in found.values()) > 15 * SEEDS
     for measure in (np.median, np.mean):
-        fine = measure(found["quantised-5m"])
-        assert measure(found["rule-placer"]) + 0.5 < fine < measure(found["quantised-20m"]) - 0.5
+        assert measure(found["rule-placer"]) + 0.5 < measure(found["quantised-5m"]) < 4.0
