@@ -16,7 +16,7 @@ from hypothesis import settings as hypothesis_settings
 from xdist.scheduler import LoadScopeScheduling
 
 import tests.properties  # noqa: F401
-from arena.management.catalogue import compile_catalogue
+from arena.management.commands.prepare import compile_catalogue
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
 from tests.on_postgres import FILES

@@ -1,13 +1,39 @@
-"""How values stand in a CSV file."""
+"""How values stand in a CSV file, and what the columns of a table hold; no Django."""
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from typing import Any
 
 AT_ONCE = 1000
 """So many lines of a streamed file are written together."""
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+
+
+class Dtype(StrEnum):
+    """What a column of a Parquet file can hold; every cell may be empty."""
+
+    TEXT = "string"
+    WHOLE = "int64"
+    NUMBER = "double"
+    YES_NO = "bool"
+
+    def columns(self, *names: str, of: str = "") -> "Columns":
+        """Return columns of this type, called like the attributes that they show.
+
+        Args:
+            names: Of columns and attributes.
+            of: The path to what has them, if that is not the line itself.
+        """
+        return {name: (f"{of}.{name}" if of else name, self) for name in names}
+
+
+Value = str | Callable[[Any], object]
+"""A dotted path of attributes or keys, or a function of a line."""
+Columns = Mapping[str, tuple[Value, Dtype]]
+"""By name: the value, and what the column holds."""
 
 
 def cell(value: object, number: str = ".2f") -> str:

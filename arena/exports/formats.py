@@ -7,36 +7,21 @@ import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum
+from enum import Enum
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 from uuid import UUID
 
 from django.http import Http404, HttpResponse
 
+from arena.exports.cells import Columns as Columns
+from arena.exports.cells import Dtype as Dtype
+from arena.exports.cells import Value as Value
 from arena.exports.cells import csv_text
 from augment.errors import UnknownName
 
 Table = TypeVar("Table")
 Named = TypeVar("Named")
-
-
-class Dtype(StrEnum):
-    """What a column of a Parquet file can hold; every cell may be empty."""
-
-    TEXT = "string"
-    WHOLE = "int64"
-    NUMBER = "double"
-    YES_NO = "bool"
-
-    def columns(self, *names: str, of: str = "") -> "Columns":
-        """Return columns of this type, called like the attributes that they show.
-
-        Args:
-            names: Of columns and attributes.
-            of: The path to what has them, if that is not the line itself.
-        """
-        return {name: (f"{of}.{name}" if of else name, self) for name in names}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,11 +115,6 @@ def attach(content: bytes | str, content_type: str, name: str) -> HttpResponse:
 
 
 # --- Tables with one line a row ----------------------------------------------------------------
-
-Value = str | Callable[[Any], object]
-"""A dotted path of attributes or keys, or a function of a line."""
-Columns = Mapping[str, tuple[Value, Dtype]]
-"""By name: the value, and what the column holds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,17 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from arena.exports.cells import csv_text
+from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
+from arena.exports.leaderboard import VOTES_FILE, WHOSE_FIRST, print_lines
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rate
-from arena.rating.lines import HEADS as PAPERS_HEADS
-from arena.rating.lines import (
-    PLACES_LEFT,
-    align_cells,
-    caption_text,
-    escape,
-    latex_table,
-    notes_by_reason,
-)
+from arena.rating.lines import notes_by_reason
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
@@ -43,23 +37,8 @@ HELP = (
 _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
 ROUNDS_OF_MANY, MANY_VOTES, MANY_MODELS = 1000, 500_000, 100
 
-COLUMNS = {
-    "model": "name",
-    "rank": "rank",
-    "elo": "rating",
-    "lower": "lower",
-    "upper": "upper",
-    "votes": "votes",
-    "note": "note",
-    "rank_best": "rank_best",
-    "rank_worst": "rank_worst",
-}
-"""Those of CSV and JSON, by the fields of a line; a new one comes at the end."""
-HEADS = {
-    **{"Model": "name", "Rank": "rank_text", "Elo": "elo_text"},
-    **{"95% CI": "interval_text", "Votes": "votes", "95% ranks": "ranks_text"},
-}
-"""Of the printed table, by the fields of a line; the paper's come first."""
+COLUMNS = {column.name: str(column.field) for column in WHOSE_FIRST if VOTES_FILE in column.of}
+"""Those of CSV and JSON, by the fields of a line."""
 _CLUSTERED = {
     Unit.VOTE: "single votes",
     Unit.EXPERT: "clustered by judge",
@@ -229,18 +208,9 @@ class RatedCsv:
         return notes_by_reason((line.name, line.note) for line in self.board.standings)
 
     @property
-    def heads(self) -> list[str]:
-        """Of the printed table: without places left where no line has any."""
-        has_places = any(line.rank_best is not None for line in self.board.lines)
-        return [head for head in HEADS if has_places or head != "95% ranks"]
-
-    @property
-    def cells(self) -> list[tuple[str, ...]]:
-        """What the lines have under the heads."""
-        return [
-            tuple(str(getattr(line, HEADS[head])) for head in self.heads)
-            for line in self.board.standings
-        ]
+    def has_places(self) -> bool:
+        """Whether some line has places left."""
+        return any(line.rank_best is not None for line in self.board.lines)
 
     @property
     def records(self) -> list[dict[str, Any]]:
@@ -252,8 +222,8 @@ class RatedCsv:
 
 
 def _write_table(rated: RatedCsv) -> str:
-    rows = [tuple(rated.heads), *rated.cells]
-    rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
+    rows = print_lines(rated.board.standings, has_places=rated.has_places)
+    rows = [[escape_controls(" ".join(row[0].split())), *row[1:]] for row in rows]
     lines = align_cells(rows)
     lines += ["", *(" ".join(f"{line}.".split()) for line in rated.missing)]
     board = rated.board
@@ -324,10 +294,11 @@ def _rounded(value: Any) -> Any:
 
 def _write_latex(rated: RatedCsv) -> str:
     board = rated.board
-    in_paper = board.intervals is Intervals.RESAMPLES  # whose table has no rank sets
-    heads = PAPERS_HEADS if in_paper else rated.heads
+    # The paper's table, whose intervals are resamples, has no rank sets.
+    has_places = rated.has_places and board.intervals is not Intervals.RESAMPLES
+    heads, *cells = print_lines(board.standings, has_places=has_places)
     return latex_table(
-        ((escape(name), *rest)[: len(heads)] for name, *rest in rated.cells),
+        ((escape(name), *rest) for name, *rest in cells),
         comments=(f"{rated.method}; {board.votes} votes", *rated.notes),
         heads=heads,
         notes=rated.missing,
@@ -337,7 +308,7 @@ def _write_latex(rated: RatedCsv) -> str:
             settled=0,
             experts=board.experts if Unit.EXPERT in board.unit.kinds else 0,
             scenarios=board.scenarios if Unit.SCENARIO in board.unit.kinds else 0,
-            more=PLACES_LEFT if "95% ranks" in heads else "",
+            more=PLACES_LEFT if has_places else "",
         ),
     )
 

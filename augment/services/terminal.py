@@ -5,6 +5,7 @@ would move the cursor, recolour or rewrite what stands on the screen. So each te
 its way out, whoever wrote the command.
 """
 
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -89,3 +90,18 @@ def _wrapped(given: OutputWrapper) -> TerminalOutput:
     made = TerminalOutput(given._out, ending=given.ending)  # type: ignore[arg-type]
     made.style_func = given.style_func
     return made
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """Return a reader of whole numbers from so many on, for argparse."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            raise ArgumentTypeError(f"{text!r} is no whole number") from None
+        if number < least:
+            raise ArgumentTypeError(f"{least} or more is needed, not {number}")
+        return number
+
+    return read

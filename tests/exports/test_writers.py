@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from arena.exports.latex import escape
 from arena.models import Snapshot, Study
-from arena.rating.lines import escape
 from arena.results.exports.tables import (
     EARLY_LOOK,
     SIMULATED_TABLE,

@@ -10,9 +10,9 @@ import numpy as np
 from django.db.models import Count, Q
 
 from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.latex import ValueColumns, latex_values
 from arena.jobs.exports.displacement import name_of
 from arena.models import FaultLabel
-from arena.rating.lines import ValueColumns, latex_values
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass

@@ -4,8 +4,8 @@ from functools import partial
 from typing import Any
 
 from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.latex import ValueColumns, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.rating.lines import ValueColumns, latex_values
 from arena.results.exports.tables import shown_name
 from augment.models import GenerationJob
 from augment.services.judging.realism import (

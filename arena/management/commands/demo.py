@@ -9,12 +9,11 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from arena.management import demo
-from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
 from arena.site.demo import JOB, scenarios_of
-from augment.services.terminal import TerminalCommand
+from augment.services.terminal import TerminalCommand, at_least
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
 

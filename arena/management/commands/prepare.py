@@ -6,15 +6,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import polib
 from django.conf import settings
 from django.core.management import call_command
 from django.db import connection
 
-from arena.management.catalogue import compile_catalogue
+from arena.exports.files import write_whole
 from arena.scenarios.services import redraw_pictures
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.terminal import TerminalCommand
 
+GERMAN = settings.BASE_DIR / "arena" / "locale" / "de" / "LC_MESSAGES" / "django.po"
+"""The German texts of voters' pages."""
 ADVISORY_LOCK = 7_264_101
 """Of PostgreSQL, per database; any number that nothing else on it uses."""
 
@@ -37,6 +40,13 @@ class Command(TerminalCommand):
             compile_catalogue()
             for slug, drawn in redraw_pictures():
                 self.stdout.write(f"Pictures of {slug} that were drawn anew: {drawn}")
+
+
+def compile_catalogue() -> None:
+    """Write the German texts to where Django looks; whoever reads meanwhile has a whole file."""
+    target = settings.LOCALE_PATHS[0] / "de" / "LC_MESSAGES" / "django.mo"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(target, polib.pofile(str(GERMAN)).to_binary())
 
 
 @contextmanager

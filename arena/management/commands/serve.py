@@ -5,12 +5,11 @@ from typing import Any
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from arena.management.arguments import at_least
 from arena.management.demo import login_lines
 from arena.people.services import make_first_link_token
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
-from augment.services.terminal import TerminalCommand
+from augment.services.terminal import TerminalCommand, at_least
 
 INTERRUPTED = 130
 """The exit code of what Ctrl-C ended before it was done, as shells have it."""

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.latex import escape, latex_table
 from arena.models import Question, Snapshot
 from arena.rating.agreement import AgreementLine, LineRole, agreement_sentence, share_text
-from arena.rating.lines import UNKNOWN, escape, latex_table
+from arena.rating.lines import UNKNOWN
 from augment.errors import Conflict
 
 METHOD = (

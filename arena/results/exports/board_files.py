@@ -14,7 +14,8 @@ from typing import Any
 from django.template.loader import render_to_string
 
 from arena.exports.files import write_whole
-from arena.exports.formats import Columns, Dtype, json_bytes, sheet_csv, sheet_of
+from arena.exports.formats import json_bytes, sheet_csv, sheet_of
+from arena.exports.leaderboard import BOARD, file_columns
 from arena.models import Board
 from arena.rating.board_table import BoardTableDocument
 from arena.rating.lines import Line
@@ -22,21 +23,6 @@ from arena.results.exports.charts import rows_chart
 from arena.results.exports.tables import Row
 
 STYLE, INDEX = "board.css", "index.html"
-
-_COLUMNS: Columns = {
-    **Dtype.WHOLE.columns("rank"),
-    "contestant": ("name", Dtype.TEXT),
-    "elo": ("rating", Dtype.NUMBER),
-    **Dtype.NUMBER.columns("lower", "upper"),
-    **Dtype.WHOLE.columns("votes", "wins", "ties", "losses"),
-    **Dtype.TEXT.columns("slug", "kind"),
-    "simulated": ("is_simulated", Dtype.YES_NO),
-    **Dtype.TEXT.columns("since"),
-    "authors": (lambda line: "; ".join(line.authors), Dtype.TEXT),
-    "open": ("is_open", Dtype.YES_NO),
-    **Dtype.TEXT.columns("note"),
-    **Dtype.WHOLE.columns("rank_best", "rank_worst"),
-}
 
 
 def write_table(table: BoardTableDocument) -> dict[str, str]:
@@ -46,7 +32,7 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
     return {
         "json": json_bytes(asdict(table)).decode(),
-        "csv": sheet_csv(sheet_of(table.lines, _COLUMNS, name="board-table")).decode(),
+        "csv": sheet_csv(sheet_of(table.lines, file_columns(BOARD), name="board-table")).decode(),
         "svg": chart.decode(),
         "html": render_to_string("boards/frozen.html", _shown(table)),
     }

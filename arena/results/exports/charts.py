@@ -235,8 +235,8 @@ def _scale_logarithmically(axes: Axes) -> None:
 
 def _interval_label(table: LeaderboardTable) -> str:
     marks = {
-        "simulated": table.is_simulated,
-        "early": table.early,
+        "simulated": table.snapshot.includes_simulated,
+        "early": table.snapshot.is_early,
         "only within groups comparable": table.has_parts,
     }
     has_intervals = any(row.has_bound for row in table.rows)

@@ -1,7 +1,6 @@
-"""A snapshot as a table, and its columns: what every writer, chart and page shows of it.
+"""A snapshot as a table: what every writer, chart and page shows of it.
 
-In: a snapshot. Out: its lines in order with all that must be said with them, and the value of each
-column with its name wherever it stands.
+In: a snapshot. Out: its lines in order with all that must be said with them.
 """
 
 import json
@@ -10,7 +9,6 @@ from typing import Any
 
 from django.db.models import F
 
-from arena.exports.formats import Dtype
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
 from arena.rating.lines import Line, join_counts, notes_by_reason, says_no_order, votes_text
@@ -122,34 +120,9 @@ class LeaderboardTable:
     hypotheses: tuple[Answered, ...] = ()
 
     @property
-    def study(self) -> str:
-        """The study's name."""
-        return self.snapshot.study.name
-
-    @property
-    def question(self) -> str:
-        """What was asked in the votes that are rated."""
-        return self.snapshot.question
-
-    @property
-    def votes_sha256(self) -> str:
-        """The SHA-256 of the file of counted votes."""
-        return self.snapshot.votes_sha256
-
-    @property
     def votes_text(self) -> str:
         """How many votes count, and apart from them the ties of pairs that nobody was shown."""
         return votes_text(self.snapshot.votes_cast, self.snapshot.results.board.settled_ties)
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether votes or contestants are simulated."""
-        return self.snapshot.includes_simulated
-
-    @property
-    def early(self) -> bool:
-        """Whether the study was still open."""
-        return self.snapshot.is_early
 
     @property
     def method_text(self) -> str:
@@ -164,7 +137,10 @@ class LeaderboardTable:
     @property
     def warnings(self) -> list[str]:
         """Sentences that no reader may miss, for files."""
-        marks = {SIMULATED_TABLE: self.is_simulated, EARLY_LOOK: self.early}
+        marks = {
+            SIMULATED_TABLE: self.snapshot.includes_simulated,
+            EARLY_LOOK: self.snapshot.is_early,
+        }
         said = [mark for mark, holds in marks.items() if holds]
         return [*said, *filter(None, [" ".join(self.reasons)]), *self.notes]
 
@@ -244,87 +220,3 @@ def _row(standing: Standing, part: int) -> Row:
         card=who.card if who else None,
         **stored_values(standing),
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
-    """A column, and where it stands: nowhere where the name for a place is empty.
-
-    A new column is an entry at the end of COLUMNS, so that what reads files by position goes on;
-    one that is stored needs a field of `arena.rating.lines.Line` and, with a migration, of
-    `Standing`.
-
-    Attributes:
-        name: In CSV and Parquet; `kind` is what Parquet holds.
-        field: Of a contestant's row, or of the whole table.
-        key: In JSON.
-        printed: Its head in LaTeX and in the terminal.
-        text_field: What is printed, in LaTeX and in the terminal.
-        identifies: Says whose line it is, which stands first in JSON and where it is printed.
-        is_old: Also of ratings that did not count settled ties apart.
-    """
-
-    name: str = ""
-    kind: Dtype = Dtype.TEXT
-    field: str
-    key: str = ""
-    printed: str = ""
-    text_field: str = ""
-    identifies: bool = False
-    is_old: bool = True
-
-    def value_of(self, table: LeaderboardTable, row: Row) -> object:
-        """What stands in files."""
-        return getattr(row if hasattr(row, self.field) else table, self.field)
-
-    def text(self, row: Row) -> str:
-        """What is printed."""
-        return str(getattr(row, self.text_field or self.field))
-
-
-def _column(name: str, kind: Dtype = Dtype.TEXT, **more: Any) -> Column:
-    """Return a column that unless said otherwise is called the same everywhere."""
-    return Column(**{"field": name, "name": name, "kind": kind, "key": name} | more)
-
-
-COLUMNS = (
-    _column("rank", Dtype.WHOLE, printed="Rank", text_field="rank_text"),
-    _column("model", printed="Model", identifies=True),
-    _column(
-        "elo", Dtype.NUMBER, field="rating", key="rating", printed="Elo", text_field="elo_text"
-    ),
-    _column("lower", Dtype.NUMBER),
-    _column("upper", Dtype.NUMBER),
-    Column(field="interval_text", printed="95% CI"),
-    _column("votes", Dtype.WHOLE, field="votes_cast", printed="Votes"),
-    _column("wins", Dtype.WHOLE),
-    _column("ties", Dtype.WHOLE, field="ties_cast"),
-    _column("losses", Dtype.WHOLE),
-    _column("slug", identifies=True),
-    _column("kind", identifies=True),
-    _column("simulated", Dtype.YES_NO, identifies=True),
-    _column("note"),
-    _column("study", key=""),
-    _column("method", key="", field="method_text"),
-    _column("study_simulated", Dtype.YES_NO, key="", field="is_simulated"),
-    _column("early", Dtype.YES_NO, key=""),
-    _column("rank_best", Dtype.WHOLE),
-    _column("rank_worst", Dtype.WHOLE),
-    _column("preregistration", key=""),
-    Column(field="ranks_text", printed="95% ranks"),
-    _column("options"),
-    _column("question", key=""),
-    _column("sends"),
-    _column("settled_ties", Dtype.WHOLE, is_old=False),
-    _column("votes_sha256", key="", is_old=False),
-)
-
-_WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
-PRINTED = tuple(column for column in _WHOSE_FIRST if column.printed)
-
-
-def columns_in(table: LeaderboardTable, *, is_json: bool = False) -> list[Column]:
-    """Return those of files, or of JSON, that the rating of a table has."""
-    is_new = table.snapshot.results.board.settled_ties is not None
-    columns, place = (_WHOSE_FIRST, "key") if is_json else (COLUMNS, "name")
-    return [one for one in columns if getattr(one, place) and (is_new or one.is_old)]

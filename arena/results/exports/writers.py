@@ -3,6 +3,7 @@
 The same snapshot always gives the same bytes.
 """
 
+from collections.abc import Iterable
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -22,21 +23,17 @@ from arena.exports.formats import (
     drawings,
     formats,
     json_bytes,
+    read_value,
     table_formats,
 )
+from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
+from arena.exports.leaderboard import COLUMNS, RATING, WHOSE_FIRST, Column, print_lines
 from arena.models import Snapshot
-from arena.rating.lines import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.agreement import FORMATS as AGREEMENT_FORMATS
 from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
-from arena.results.exports.tables import (
-    PRINTED,
-    LeaderboardTable,
-    Row,
-    columns_in,
-    leaderboard_table,
-)
+from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
@@ -51,11 +48,11 @@ MANIFEST = "manifest.json"
 
 def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
     """Return one row a contestant; in CSV numbers have two decimals."""
-    columns = columns_in(table)
+    columns = [column for column in _columns_in(table, COLUMNS) if column.name]
     return Sheet(
         name="leaderboard",
         columns={column.name: column.kind for column in columns},
-        rows=[[column.value_of(table, row) for column in columns] for row in table.rows],
+        rows=[[_value_of(column, table, row) for column in columns] for row in table.rows],
         number=".2f",
     )
 
@@ -77,10 +74,10 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
     return {
         "format": "scenario-arena/leaderboard",
         "version": 1,
-        "study": table.study,
-        "question": table.question,
-        "simulated": table.is_simulated,
-        "early": table.early,
+        "study": rating.study.name,
+        "question": rating.question,
+        "simulated": rating.includes_simulated,
+        "early": rating.is_early,
         "method": {
             "name": rating.method,
             "text": table.method_text,
@@ -104,11 +101,7 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
 
 def plain_text(table: LeaderboardTable) -> str:
     """The table for a terminal, with its method and warnings beneath."""
-    grid = [
-        [column.printed for column in PRINTED],
-        *([column.text(row) for column in PRINTED] for row in table.rows),
-    ]
-    lines = align_cells(grid)
+    lines = align_cells(print_lines(table.rows))
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
     lines += ["", *(f"{line}." for line in table.missing)]
     lines.append(f"{table.votes_text} counted; left out: {left_out or 'none'}.")
@@ -122,7 +115,7 @@ def plain_text(table: LeaderboardTable) -> str:
 def leaderboard_latex(table: LeaderboardTable) -> bytes:
     """Return the paper's table with comments."""
     rating, board = table.snapshot, table.snapshot.results.board
-    marks = {"simulated": table.is_simulated, "early": table.early}
+    marks = {"simulated": rating.includes_simulated, "early": rating.is_early}
     words = [word for word, holds in marks.items() if holds]
     caption = caption_text(
         table.method_text,
@@ -132,14 +125,12 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
         scenarios=board.scenarios,
         more=f"{PLACES_LEFT} Rating {rating.code} of {rating.made_at:%Y-%m-%d}.",
     )
+    heads, *cells = print_lines(table.rows)
     text = latex_table(
-        (
-            [_latex_name(row), *(column.text(row) for column in PRINTED if not column.identifies)]
-            for row in table.rows
-        ),
-        heads=[column.printed for column in PRINTED],
+        ([_latex_name(row), *rest] for row, (_, *rest) in zip(table.rows, cells, strict=True)),
+        heads=heads,
         comments=(
-            f"{table.study}: {table.votes_text}; {table.method_text}",
+            f"{rating.study.name}: {table.votes_text}; {table.method_text}",
             f"votes sha256 {rating.votes_sha256}",
             *((table.frozen_text,) if table.frozen_text else ()),
             *table.warnings,
@@ -248,9 +239,19 @@ def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _columns_in(table: LeaderboardTable, columns: Iterable[Column]) -> list[Column]:
+    """Return those that the rating of a table has."""
+    is_new = table.snapshot.results.board.settled_ties is not None
+    return [column for column in columns if RATING in column.of and (is_new or column.is_old)]
+
+
+def _value_of(column: Column, table: LeaderboardTable, row: Row) -> object:
+    return read_value(row if column.key else table, column.field, None)
+
+
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
-    columns = columns_in(table, is_json=True)
-    values = {column.key: column.value_of(table, row) for column in columns}
+    columns = [column for column in _columns_in(table, WHOSE_FIRST) if column.key]
+    values = {column.key: _value_of(column, table, row) for column in columns}
     part: dict[str, Any] = {"part": row.part} if table.has_parts else {}
     part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {
