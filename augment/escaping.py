@@ -9,14 +9,13 @@ def escape_controls(text: str) -> str:
     Control characters, among them those that begin terminal sequences, characters that turn the
     direction of reading or are invisible, and separators of lines. A line feed and a tab stay.
     """
-    return "".join(character if _is_plain(character) else _spelt(character) for character in text)
+    return "".join(
+        character if _is_plain(character) else character.encode("unicode_escape").decode("ascii")
+        for character in text
+    )
 
 
 def _is_plain(character: str) -> bool:
     if character in "\n\t" or " " <= character <= "~":
         return True
     return unicodedata.category(character) not in {"Cc", "Cf", "Cs", "Zl", "Zp"}
-
-
-def _spelt(character: str) -> str:
-    return character.encode("unicode_escape").decode("ascii")

@@ -7,7 +7,7 @@ are no longer computed are passed over.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any
 
@@ -305,13 +305,10 @@ def _document(value: Any, version: int) -> Any:
         return {
             field.name: _document(found, version)
             for field in fields(value)
-            if _is_known(field, found := getattr(value, field.name), version)
+            # What is set stays, whatever the version.
+            if (found := getattr(value, field.name)) != field.default
+            or version >= field.metadata.get("since", 0)
         }
     if isinstance(value, dict):
         return {str(key): _document(found, version) for key, found in value.items()}
     return [_document(one, version) for one in value] if isinstance(value, tuple) else value
-
-
-def _is_known(known: Field[Any], value: Any, version: int) -> bool:
-    """Whether a version has the field; what is set stays whatever it says."""
-    return bool(version >= known.metadata.get("since", 0) or value != known.default)

@@ -315,13 +315,13 @@ def _bend(task: Task, right: Modification, heard: Heard) -> Modification | None:
     return careless.bend(task.scene, right, rng, spared)[0]
 
 
-def _overlook(task: Task) -> list[Problem]:
-    """Find all problems or, as often, none."""
-    return problems_of(task) if careless.dice(task.prompt).random() < 0.5 else []
-
-
 GOOD = Character()
-CARELESS = Character(bend=_bend, judge=_overlook, leans=True)
+CARELESS = Character(
+    bend=_bend,
+    # As often as not it finds no problem.
+    judge=lambda task: problems_of(task) if careless.dice(task.prompt).random() < 0.5 else [],
+    leans=True,
+)
 LEARNING = Character(
     bend=lambda task, right, heard: (
         right if heard.feedback else careless.too_far(task.scene, right)

@@ -148,11 +148,9 @@ FORMATS: dict[str, Format[LeaderboardTable]] = {
 }
 
 
-def _draw(chart: Chart, *, file_format: str) -> bytes:
-    return chart(file_format=file_format)
-
-
-CHART_FORMATS: dict[str, Format[Chart]] = drawings(_draw)
+CHART_FORMATS: dict[str, Format[Chart]] = drawings(
+    lambda chart, *, file_format: chart(file_format=file_format)
+)
 
 
 # --- Everything in one zip ---------------------------------------------------------------------

@@ -154,15 +154,11 @@ def _shows(search: VoteSearch) -> Q:
     return shown
 
 
-def _first_votes(snapshot: Snapshot) -> QuerySet[Vote]:
-    """The vote that counts on what a hidden repeat shows again."""
-    return marked_votes(snapshot).filter(Q(mark=COUNTED), matchup=OuterRef("matchup__repeat_of"))
-
-
 def _repeats(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
     decided = rows.filter(matchup__kind=REPEAT, outcome__in=RATED)
     current = decided.exclude(Q(mark=LeftOut.SUPERSEDED.value))
-    return current.filter(Exists(_first_votes(snapshot)))
+    counted = marked_votes(snapshot).filter(Q(mark=COUNTED))
+    return current.filter(Exists(counted.filter(matchup=OuterRef("matchup__repeat_of"))))
 
 
 _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
