@@ -9,7 +9,7 @@ from django.test.utils import CaptureQueriesContext
 from arena.errors import AlreadyDecided, InvalidVote
 from arena.models import Study, Vote
 from arena.results.exports.votes import unrated_votes
-from arena.results.queries.access import latest_snapshot
+from arena.results.queries.access import ready_snapshots
 from arena.results.queries.votes import Filters, last_vote_of, vote_set
 from arena.results.services.ratings import rate_now
 from arena.studies.queries import progress_of
@@ -110,7 +110,7 @@ def test_each_question_has_a_rating_of_its_own_votes() -> None:
         for filters in (None, Filters(question="difficulty"))
     )
     assert [usual.question, other.question] == ["realism", "difficulty"]
-    assert latest_snapshot(study) == usual, "the primary question's, though an older one"
+    assert ready_snapshots(study).first() == usual, "the primary question's, though an older one"
     assert [usual.results.trust.tie_share, other.results.trust.tie_share] == [0.0, 1.0]
     with pytest.raises(UnknownName, match="beauty"):
         rate_now(study=study, filters=Filters(question="beauty"))

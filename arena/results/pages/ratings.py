@@ -160,7 +160,7 @@ def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
 
 
 def get_snapshot(request: HttpRequest, study: Study) -> Snapshot:
-    """The rating that the address names, else that of `latest_snapshot`.
+    """The rating that the address names, else the first of `ready_snapshots`.
 
     Raises:
         Http404: There is none.
@@ -188,7 +188,7 @@ def _asked_rating(request: HttpRequest) -> uuid.UUID | None:
 
 
 def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snapshot | None:
-    """The rating that the address names, else that of `latest_snapshot`; with its results."""
+    """The rating that the address names, else the first of `ready_snapshots`; with its results."""
     ready = [rating for rating in ratings if rating.state == Snapshot.State.READY]
     ready.sort(key=lambda rating: rating.question != study.questions[0])
     code = _asked_rating(request) or next((rating.code for rating in ready), None)

@@ -71,13 +71,11 @@ def votes_in(user: User, study: Study) -> bool:
     return study.experts.filter(pk=user.pk).exists()
 
 
-def latest_snapshot(study: Study) -> Snapshot | None:
-    """The rating that is shown unless another is asked for, None before the first."""
-    return ready_snapshots(study).first()
-
-
 def ready_snapshots(study: Study) -> QuerySet[Snapshot]:
-    """Ratings that are ready: those of the primary question first, of these the newest."""
+    """Return the ratings that are ready, first the one that is shown unless another is asked for.
+
+    Those of the primary question come first, of these the newest.
+    """
     primary = study.questions[0]
     is_primary = Q(filters__question=primary)
     if primary == Question.INSTRUCTION:  # ratings of before know of no other
@@ -92,7 +90,7 @@ def snapshots_of(study: Study) -> QuerySet[Snapshot]:
 
 
 def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
-    """The rating with that code, without one that of `latest_snapshot`.
+    """The rating with that code, without one the first of `ready_snapshots`.
 
     Raises:
         NoSnapshot: The study has not been rated yet, or not by that rating, or was cancelled.
