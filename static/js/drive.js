@@ -1,38 +1,31 @@
 // Plays the drives of one page in step: each canvas draws its own trace, one clock drives them all.
-import { coloursIn, View } from "./film.js";
+import { Drives, View } from "./film.js";
 
 const player = document.getElementById("player");
-class Player {
+class Player extends Drives {
   constructor(views) {
-    this.views = views;
-    this.last = Math.max(...views.map((view) => view.trace.steps)) - 1;
-    this.step = 0;
-    this.isPlaying = false;
-    this.scrub = document.getElementById("scrub");
-    this.scrub.max = this.last;
-    this.playButton = document.getElementById("play");
+    const [button, range, clock] = ["play", "scrub", "clock"].map((id) => document.getElementById(id));
+    super(views, { place: player, button, range, clock, labels: player.dataset });
     this.names = JSON.parse(document.getElementById("event-names").content.textContent);
     this.listen();
     this.listEvents();
-    const sizes = new ResizeObserver(() => this.resize());
-    for (const view of views) sizes.observe(view.canvas.parentNode);
-    this.resize();
+  }
+
+  options() {
+    const [follow, proposals] = ["follow", "proposals"].map((id) => document.getElementById(id).checked);
+    return { follow, proposals };
   }
 
   listen() {
-    this.playButton.addEventListener("click", () => (this.isPlaying ? this.pause() : this.play()));
     document.getElementById("back").addEventListener("click", () => this.jump(this.step - 1));
     document.getElementById("on").addEventListener("click", () => this.jump(this.step + 1));
-    this.scrub.addEventListener("input", () => this.jump(Number(this.scrub.value)));
+    const rate = document.getElementById("rate");
+    rate.addEventListener("change", () => this.setRate(Number(rate.value)));
+    this.setRate(Number(rate.value));
     for (const id of ["follow", "proposals"]) {
       document.getElementById(id).addEventListener("change", () => this.show(this.step));
     }
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show(this.step));
-  }
-
-  resize() {
-    for (const view of this.views) view.fit();
-    this.show(this.step);
   }
 
   listEvents() {
@@ -54,50 +47,6 @@ class Player {
       mark.style.left = `${(100 * event.step) / this.last}%`;
       document.getElementById("marks").append(mark);
     }
-  }
-
-  jump(step) {
-    this.pause();
-    this.show(step);
-  }
-
-  play() {
-    if (this.step >= this.last) this.step = 0;
-    this.isPlaying = true;
-    this.playButton.textContent = player.dataset.pause;
-    this.begun = performance.now();
-    this.from = this.step;
-    requestAnimationFrame((now) => this.tick(now));
-  }
-
-  pause() {
-    this.isPlaying = false;
-    this.playButton.textContent = player.dataset.play;
-  }
-
-  tick(now) {
-    if (!this.isPlaying) return;
-    const rate = Number(document.getElementById("rate").value);
-    if (rate !== this.rate) {
-      [this.rate, this.begun, this.from] = [rate, now, this.step];
-    }
-    this.show(this.from + Math.floor(((now - this.begun) / 100) * rate));
-    if (this.step >= this.last) this.pause();
-    else requestAnimationFrame((later) => this.tick(later));
-  }
-
-  show(step) {
-    this.step = Math.max(0, Math.min(step, this.last));
-    this.scrub.value = this.step;
-    const time = `${(this.step / 10).toFixed(1)} s`;
-    document.getElementById("clock").textContent = time;
-    this.scrub.setAttribute("aria-valuetext", time);
-    const options = {
-      follow: document.getElementById("follow").checked,
-      proposals: document.getElementById("proposals").checked,
-    };
-    const colours = coloursIn(player);
-    for (const view of this.views) view.draw(this.step, options, colours);
   }
 }
 

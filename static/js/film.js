@@ -149,6 +149,73 @@ export class View {
   }
 }
 
+const STEPS_PER_MS = 0.01;
+
+// Drives on one clock: all views stand at the step that the range says.
+export class Drives {
+  // place: what has the class "film"; labels: what play and pause are called.
+  constructor(views, { place, button, range, clock, labels }) {
+    Object.assign(this, { views, place, button, range, clock, labels, from: null, rate: 1 });
+    this.last = range.max = Math.max(...views.map((view) => view.trace.steps)) - 1;
+    button.addEventListener("click", () => (this.from === null ? this.play() : this.pause()));
+    range.addEventListener("input", () => this.jump(this.step));
+    this.sizes = new ResizeObserver(() => this.resize());
+    for (const view of views) this.sizes.observe(view.canvas.parentNode);
+    this.resize();
+  }
+
+  get step() {
+    return Number(this.range.value);
+  }
+
+  options() {
+    return { follow: true };
+  }
+
+  resize() {
+    for (const view of this.views) view.fit();
+    this.show(this.step);
+  }
+
+  jump(step) {
+    this.pause();
+    this.show(step);
+  }
+
+  play() {
+    [this.from, this.begun] = [this.step < this.last ? this.step : 0, performance.now()];
+    this.button.textContent = this.labels.pause;
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  pause() {
+    this.from = null;
+    this.button.textContent = this.labels.play;
+  }
+
+  // A new rate begins where the drives are.
+  setRate(rate) {
+    this.rate = rate;
+    if (this.from !== null) [this.from, this.begun] = [this.step, performance.now()];
+  }
+
+  tick(now) {
+    if (this.from === null) return;
+    this.show(this.from + Math.floor(Math.max(0, now - this.begun) * STEPS_PER_MS * this.rate));
+    if (this.step >= this.last) this.pause();
+    else requestAnimationFrame((later) => this.tick(later));
+  }
+
+  show(step) {
+    const at = Math.max(0, Math.min(step, this.last));
+    this.range.value = at;
+    this.clock.textContent = `${(at / 10).toFixed(1)} s`;
+    this.range.setAttribute("aria-valuetext", this.clock.textContent);
+    const colours = coloursIn(this.place);
+    for (const view of this.views) view.draw(at, this.options(), colours);
+  }
+}
+
 // The colours of a place in the page that has the class "film".
 export function coloursIn(place) {
   // Light or dark is settled by the browser: a probe says which colour a variable is right now.

@@ -1,9 +1,8 @@
 // How a planner drives both scenes of a pair, played in step under its pictures. This module, its
 // style and the drives are loaded when an expert asks for them first.
-import { coloursIn, View } from "./film.js";
+import { Drives, View } from "./film.js";
 import { at, note, text } from "./vote-page.js";
 
-const STEPS_PER_MS = 0.01;
 const ACROSS_M = 70;
 const KEPT = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 
@@ -20,73 +19,29 @@ const styled = new Promise((done) => {
   document.head.append(link);
 });
 
-class Replay {
+class Replay extends Drives {
   constructor(drives) {
-    this.matchup = matchup();
-    const copy = parts.content.cloneNode(true);
-    [this.bar, ...this.films] = copy.children;
-    [this.button, this.range, this.clock] = this.bar.children;
-    sides.after(this.bar);
-    this.films.forEach((film, place) => figures[place].append(film));
+    const [bar, ...films] = parts.content.cloneNode(true).children;
+    const [button, range, clock] = bar.children;
+    sides.after(bar);
+    films.forEach((film, place) => figures[place].append(film));
     document.body.classList.add("replays");
-    this.views = this.films.map((film, n) => new View(film.firstElementChild, [drives.a, drives.b][n], ACROSS_M));
-    this.last = Math.max(drives.a.steps, drives.b.steps) - 1;
-    this.range.max = this.last;
+    const views = films.map((film, n) => new View(film.firstElementChild, [drives.a, drives.b][n], ACROSS_M));
+    super(views, { place: films[0], button, range, clock, labels: button.dataset });
+    Object.assign(this, { bar, films, matchup: matchup() });
     this.listen();
-    this.resize();
     if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.play();
   }
 
   listen() {
-    this.button.addEventListener("click", () => (this.from === null ? this.play() : this.pause()));
-    this.range.addEventListener("input", () => {
-      this.pause();
-      this.show(Number(this.range.value));
-    });
     // Here arrows move in time; on the page they would vote.
     this.bar.addEventListener("keydown", (event) => {
       if (KEPT.includes(event.key)) event.stopPropagation();
     });
-    this.sizes = new ResizeObserver(() => this.resize());
-    this.films.forEach((film) => this.sizes.observe(film));
     // The next pair takes the place of the pictures, and its own number.
     this.pairs = new MutationObserver(() => matchup() !== this.matchup && this.close());
     figures.forEach((figure) => this.pairs.observe(figure.querySelector(".scene"), { childList: true }));
     this.pause();
-  }
-
-  resize() {
-    for (const view of this.views) view.fit();
-    this.show(Number(this.range.value));
-  }
-
-  play() {
-    const step = Number(this.range.value);
-    this.from = step < this.last ? step : 0;
-    this.begun = performance.now();
-    this.button.textContent = this.button.dataset.pause;
-    requestAnimationFrame((now) => this.tick(now));
-  }
-
-  pause() {
-    this.from = null;
-    this.button.textContent = this.button.dataset.play;
-  }
-
-  tick(now) {
-    if (this.from === null) return;
-    this.show(this.from + Math.floor(Math.max(0, now - this.begun) * STEPS_PER_MS));
-    if (Number(this.range.value) >= this.last) this.pause();
-    else requestAnimationFrame((later) => this.tick(later));
-  }
-
-  show(step) {
-    const at = Math.min(step, this.last);
-    this.range.value = at;
-    this.clock.textContent = `${(at / 10).toFixed(1)} s`;
-    this.range.setAttribute("aria-valuetext", this.clock.textContent);
-    const colours = coloursIn(this.films[0]);
-    for (const view of this.views) view.draw(at, { follow: true }, colours);
   }
 
   close() {
