@@ -18,7 +18,7 @@ from arena.exports.formats import (
 )
 from arena.results.exports.drawing import MARK, house_style, name_lines, write_figure
 from arena.results.exports.tables import shown_name
-from augment.models import Contestant, GenerationJob
+from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     HORIZON_S,
     PLACED_EXACTLY,
@@ -129,11 +129,6 @@ def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
     )
 
 
-def name_of(contestant: Contestant) -> str:
-    """Return a contestant's name, with "(simulated)" where that is so."""
-    return shown_name(contestant.name, contestant.is_simulated)
-
-
 KEPT: Columns = {
     **Dtype.WHOLE.columns("to_keep", "kept", of="kept"),
     **Dtype.NUMBER.columns("moved_mean_m", of="kept"),
@@ -142,7 +137,7 @@ KEPT: Columns = {
 
 GROUPS: Columns = {
     "group": ("heading", Dtype.TEXT),
-    "contestant": (lambda group: name_of(group.contestant), Dtype.TEXT),
+    "contestant": (lambda group: shown_name(group.contestant), Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("contestant.is_simulated", Dtype.YES_NO),
     **Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
@@ -265,7 +260,7 @@ def _stats(group: Group) -> dict[str, Any]:
 
 def _name(table: DisplacementTable, group: Group) -> str:
     """Return what a box is called: its group, and how many objects it stands for."""
-    name = name_of(group.contestant)
+    name = shown_name(group.contestant)
     heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
     summary = group.summary
     counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}

@@ -64,7 +64,7 @@ def _percent_of(kind: str, line: DrivingLine) -> float | None:
 
 
 COLUMNS: Columns = {
-    "scenarios": (lambda line: shown_name(line.name, line.is_simulated), Dtype.TEXT),
+    "scenarios": (shown_name, Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("is_simulated", Dtype.YES_NO),
     "score_percent": (lambda line: _percent(line.mean), Dtype.NUMBER),
@@ -101,7 +101,7 @@ def driving_sheet(table: DrivingScores) -> Sheet:
 def driving_latex(table: DrivingScores) -> bytes:
     """Return the paper's table with a second column for the scenes before the change."""
     columns: ValueColumns = {
-        "Scenarios": lambda line: shown_name(line.name, line.is_simulated),
+        "Scenarios": shown_name,
         "Mean Driving Score [%]": lambda line: _percent(line.mean),
         "n": lambda line: line.drives,
         "Before [%]": lambda line: _percent(line.before),

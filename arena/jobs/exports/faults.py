@@ -11,9 +11,9 @@ from django.db.models import Count, Q
 
 from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
 from arena.exports.latex import ValueColumns, latex_values
-from arena.jobs.exports.displacement import name_of
 from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
+from arena.results.exports.tables import shown_name
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
 
@@ -128,7 +128,7 @@ def _line(
     counted = len(labelled) + missed
     return {
         "name": who.name,
-        "shown_name": name_of(who),
+        "shown_name": shown_name(who),
         "slug": who.slug,
         "is_simulated": who.is_simulated,
         "all": sum(seen.values()) + missed if counted else None,

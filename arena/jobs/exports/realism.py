@@ -54,13 +54,9 @@ def answer_in_words(table: RealismTable) -> str:
         return "No contestant placed anything that could be judged."
     recorded = "--" if best.recorded is None else f"{best.recorded:.2f}"
     return (
-        f"The most realistic is {_name(best)} with {best.mean:.2f} over {best.changes} changes; "
-        f"recorded traffic has {recorded} in the same scenes."
+        f"The most realistic is {shown_name(best)} with {best.mean:.2f} over {best.changes} "
+        f"changes; recorded traffic has {recorded} in the same scenes."
     )
-
-
-def _name(line: RealismLine) -> str:
-    return shown_name(line.name, line.is_simulated)
 
 
 def _score(name: str, line: RealismLine) -> float | None:
@@ -69,7 +65,7 @@ def _score(name: str, line: RealismLine) -> float | None:
 
 COLUMNS: Columns = {
     "row": ("subject", Dtype.TEXT),
-    "name": (_name, Dtype.TEXT),
+    "name": (shown_name, Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("is_simulated", Dtype.YES_NO),
     "realism": ("mean", Dtype.NUMBER),
@@ -94,7 +90,7 @@ def realism_sheet(table: RealismTable) -> Sheet:
 def realism_latex(table: RealismTable) -> bytes:
     """Return the same as a LaTeX table."""
     columns: ValueColumns = {
-        "Changes": _name,
+        "Changes": shown_name,
         "Realism": lambda line: line.mean,
         "Recorded there": lambda line: line.recorded,
         **{name.capitalize(): partial(_score, name) for name in SCORES},

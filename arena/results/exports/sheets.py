@@ -102,7 +102,7 @@ def _sample_tile(contestant: Contestant, cell: Augmentation | None) -> Tile:
             pixels = imread(io.BytesIO(file.read()), format="png")
     word = _explain(cell)
     return Tile(
-        title=shown_name(contestant.name, contestant.is_simulated),
+        title=shown_name(contestant),
         is_simulated=contestant.is_simulated,
         pixels=pixels,
         word=word,

@@ -25,9 +25,9 @@ APART = -1
 """The part of those who are rated with nobody."""
 
 
-def shown_name(name: str, is_simulated: bool) -> str:
-    """The name, with "(simulated)" where that is so."""
-    return f"{name}{SIMULATED}" if is_simulated else name
+def shown_name(who: Any) -> str:
+    """Return the name of a contestant or a line, with "(simulated)" where that is so."""
+    return f"{who.name}{SIMULATED if who.is_simulated else ''}"
 
 
 def is_closed_form(rating: Snapshot) -> bool:
@@ -78,7 +78,7 @@ class Row(Line):
     @property
     def model(self) -> str:
         """The name, with "(simulated)" where that is so."""
-        return shown_name(self.name, self.simulated)
+        return f"{self.name}{SIMULATED if self.simulated else ''}"
 
     @property
     def votes_cast(self) -> int:

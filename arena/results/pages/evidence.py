@@ -49,7 +49,7 @@ class VoteSearchForm(forms.Form):
         data = {name: query.get(name, "") for name in self.base_fields}
         super().__init__(data | {"mark": data["mark"] or COUNTED})
         lines = snapshot.standings.order_by("name")
-        shown = [(line.slug, shown_name(line.name, line.is_simulated)) for line in lines]
+        shown = [(line.slug, shown_name(line)) for line in lines]
         fields: dict[str, Any] = self.fields
         fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
         fields["expert"].choices = [_ALL, *_experts(snapshot)]
