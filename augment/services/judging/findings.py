@@ -3,7 +3,6 @@
 The reference and anybody's labels stay out of it.
 """
 
-from collections import defaultdict
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from augment.models import Augmentation, Scenario
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.intent import Intent
-from augment.services.judging.measures import Measure
+from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios import editing
 from augment.services.scenarios.scenes import ground_of, intent_of
 
@@ -59,32 +58,16 @@ class Checked:
         return [finding for finding in self.findings if not finding.is_fault]
 
 
-def findings_of(row: Augmentation) -> tuple[Finding, ...]:
-    """Return the findings about a row that has a modification, the worst first.
-
-    Its scenario and scene are loaded.
-
-    Raises:
-        InvalidDocument: The stored scene, intent or modification can't be read.
-        InvalidModification: They do not fit together.
-    """
-    return _check(row, ground_of(row.scenario), intent_of(row.scenario))
-
-
 def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     """Check all rows that can be checked; a scene is read once."""
-    rows = Augmentation.objects.filter(pk__in=ids).exclude(modification=None).order_by("pk")
-    by_scenario: defaultdict[int, list[Augmentation]] = defaultdict(list)
-    for row in rows:
-        by_scenario[row.scenario_id].append(row)
-    scenarios = Scenario.objects.filter(pk__in=by_scenario).select_related("base_scene")
     found = {}
-    for scenario in scenarios.order_by("pk").iterator(chunk_size=10):
+    changed = Augmentation.objects.filter(pk__in=ids).exclude(modification=None)
+    for scenario, rows in rows_by_scenario(changed):
         try:
             ground, intent = ground_of(scenario), intent_of(scenario)
         except InvalidDocument:
             continue
-        for row in by_scenario[scenario.pk]:
+        for row in rows:
             with suppress(InvalidDocument, InvalidModification):
                 found[row.pk] = _check(row, ground, intent)
     return found
@@ -99,7 +82,7 @@ def check_augmentation(row: Augmentation) -> Checked | None:
     if row.modification is None:
         return None
     try:
-        findings = findings_of(row)
+        findings = _check(row, ground_of(row.scenario), intent_of(row.scenario))
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
     return Checked(findings=findings, is_against_intent=row.scenario.intent is not None)

@@ -8,11 +8,13 @@ its scene, and for realism the scenes that were learned from.
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from django.db.models import QuerySet
 from pydantic import TypeAdapter
 
 import augment
@@ -106,6 +108,18 @@ class Measure(Generic[Value]):
             unique_fields=("augmentation", "name"),
             update_fields=("key", "document"),
         )
+
+
+def rows_by_scenario(
+    rows: QuerySet[Augmentation],
+) -> Iterator[tuple[Scenario, list[Augmentation]]]:
+    """Yield each scenario with its rows; scenes are read one at a time."""
+    of: defaultdict[int, list[Augmentation]] = defaultdict(list)
+    for row in rows.defer("notes").order_by("pk"):
+        of[row.scenario_id].append(row)
+    scenarios = Scenario.objects.filter(pk__in=of).select_related("base_scene")
+    for scenario in scenarios.defer("base_scene__recording").iterator(chunk_size=10):
+        yield scenario, of[scenario.pk]
 
 
 def _digest(parts: Any) -> str:

@@ -1,7 +1,7 @@
 """How realistic stored augmentations are: one by one, and between floor and ceiling."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -19,7 +19,7 @@ from augment.metrics.realism import SCORES as SCORES
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification
-from augment.services.judging.measures import Measure
+from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios.scenes import reference_of, scene_of, seed_of
 
 MOST_SCENES = 40
@@ -106,16 +106,20 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
     answers = {
         scenario: list(group) for scenario, group in groupby(rows, key=lambda row: row.scenario_id)
     }
-    patterns = {scenario: _pattern_row(group).pk for scenario, group in answers.items()}
+    done = Augmentation.State.DONE
+    patterns = {  # the first row with an answer, else the first
+        scenario: next((row for row in group if row.state == done), group[0]).pk
+        for scenario, group in answers.items()
+    }
     surroundings = SURROUNDINGS.of(patterns.values())
     found: defaultdict[tuple[Subject, int], list[_Beside]] = defaultdict(list)
     for scenario, pattern in patterns.items():
-        beside = surroundings[pattern]
-        for subject, values in beside.by_subject().items():
-            found[subject, 0] += [(value, beside.recorded) for value in values]
+        (recorded,) = surroundings[pattern][Subject.RECORDING]
+        for subject, values in surroundings[pattern].items():
+            found[subject, 0] += [(value, recorded) for value in values]
         for row in answers[scenario]:
             if row.contestant.kind != Contestant.Kind.REFERENCE:
-                pair = (by_row.get(row.pk), beside.recorded)
+                pair = (by_row.get(row.pk), recorded)
                 found[Subject.CONTESTANT, row.contestant_id].append(pair)
     contestants = {row.contestant_id: row.contestant for row in rows}
     lines = [_line(subject, contestants.get(pk), pairs) for (subject, pk), pairs in found.items()]
@@ -128,35 +132,12 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
 
 _Beside = tuple[metric.Realism | None, metric.Realism | None]
 """That of a change, and of what was recorded in its scene."""
+Surroundings = dict[Subject, tuple[metric.Realism | None, ...]]
+"""The realism of what a scenario's answers are held against.
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Surroundings:
-    """The realism of what a scenario's answers are held against.
-
-    Attributes:
-        recorded: Of what was recorded in its scene, of the classes that its pattern changes; the
-            pattern is the reference, without one the first answer.
-        reference: Empty without a reference.
-        random: Of the pattern's objects, placed at random.
-    """
-
-    recorded: metric.Realism | None
-    reference: tuple[metric.Realism | None, ...]
-    random: tuple[metric.Realism | None, ...]
-
-    def by_subject(self) -> dict[Subject, tuple[metric.Realism | None, ...]]:
-        """Return the values for a table."""
-        return {
-            Subject.RECORDING: (self.recorded,),
-            Subject.REFERENCE: self.reference,
-            Subject.RANDOM: self.random,
-        }
-
-
-def _pattern_row(rows: Sequence[Augmentation]) -> Augmentation:
-    """Return the first row of a scenario with an answer, else the first."""
-    return next((row for row in rows if row.state == Augmentation.State.DONE), rows[0])
+That of what was recorded in its scene is of the classes that a pattern changes, and the pattern's
+objects are placed at random; the pattern is the reference, without one the first answer.
+"""
 
 
 class _Recorded:
@@ -220,7 +201,7 @@ def _name_learned_scenes() -> str:
 def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
     learned = _Recorded()
     found: dict[int, metric.Realism] = {}
-    for scenario, rows in _by_scenario(ids):
+    for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
         judged = _Judged(scenario, learned)
         values = {row.pk: judged.of(_change_of(row)) for row in rows}
         found |= {pk: value for pk, value in values.items() if value is not None}
@@ -229,16 +210,16 @@ def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
 
 def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
     learned = _Recorded()
-    found = {}
-    for scenario, rows in _by_scenario(ids):
+    found: dict[int, Surroundings] = {}
+    for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
         judged, reference = _Judged(scenario, learned), reference_of(scenario)
         for row in rows:
             pattern = reference or _change_of(row) or Modification()
-            found[row.pk] = Surroundings(
-                recorded=judged.recording(pattern),
-                reference=() if reference is None else (judged.of(reference),),
-                random=tuple(judged.random(pattern)),
-            )
+            found[row.pk] = {
+                Subject.RECORDING: (judged.recording(pattern),),
+                Subject.REFERENCE: () if reference is None else (judged.of(reference),),
+                Subject.RANDOM: tuple(judged.random(pattern)),
+            }
     return found
 
 
@@ -257,16 +238,6 @@ def _objects_of(code: UUID, content_hash: str) -> tuple[metric.PlacedObject, ...
     """Return what was recorded in a scene; a quarter of a second for a hundred objects."""
     document = BaseScene.objects.values_list("document", flat=True).get(code=code)
     return tuple(metric.measure_recorded(Ground.of(scene_from_document(document))))
-
-
-def _by_scenario(ids: Collection[int]) -> Iterator[tuple[Scenario, list[Augmentation]]]:
-    """Yield each scenario with its rows; scenes are read one at a time."""
-    of: defaultdict[int, list[Augmentation]] = defaultdict(list)
-    for row in Augmentation.objects.filter(pk__in=ids).defer("notes").order_by("pk"):
-        of[row.scenario_id].append(row)
-    scenarios = Scenario.objects.filter(pk__in=of).select_related("base_scene")
-    for scenario in scenarios.defer("base_scene__recording").iterator(chunk_size=10):
-        yield scenario, of[scenario.pk]
 
 
 def _change_of(row: Augmentation) -> Modification | None:
