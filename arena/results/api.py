@@ -52,7 +52,7 @@ class StandingDocument(serializers.Serializer[Any]):
     slug = serializers.CharField()
     name = serializers.CharField()
     kind = serializers.CharField()
-    simulated = serializers.BooleanField()
+    simulated = serializers.BooleanField(source="is_simulated")
     settled_ties = serializers.IntegerField(
         help_text="Ties on pairs that nobody was shown, which are no votes."
     )

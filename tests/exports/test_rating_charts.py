@@ -69,7 +69,7 @@ def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) ->
 
 
 def a_row(slug: str, *, simulated: bool = False) -> Row:
-    return Row(name=slug, slug=slug, kind="rule", simulated=simulated, rating=1000.0)
+    return Row(name=slug, slug=slug, kind="rule", is_simulated=simulated, rating=1000.0)
 
 
 def test_the_heat_map_mirrors_scores_and_says_nothing_without_votes() -> None:

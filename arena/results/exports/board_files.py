@@ -40,16 +40,8 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
 
 def rows_of(table: BoardTableDocument) -> list[Row]:
     """Return the lines as pages and charts of ratings take them."""
-    names = [one.name for one in fields(Line)]
-    return [
-        Row(
-            slug=line.slug,
-            kind=line.kind,
-            simulated=line.is_simulated,
-            **{name: getattr(line, name) for name in names},
-        )
-        for line in table.lines
-    ]
+    names = ["slug", "kind", "is_simulated", *(field.name for field in fields(Line))]
+    return [Row(**{name: getattr(line, name) for name in names}) for line in table.lines]
 
 
 def board_folder(board: Board) -> dict[str, bytes]:

@@ -169,7 +169,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         for a, b in zip(*map(list, np.nonzero(votes)), strict=True):
             text = f"{whole_percent(shares[a, b])}\n{votes[a, b]:.0f}"
             axes.text(b, a, text, ha="center", va="center")
-        name_lines(axes, names, [row.simulated for row in rows])
+        name_lines(axes, names, [row.is_simulated for row in rows])
         axes.grid(visible=False)
         axes.set_xticks(range(len(rows)), [str(n + 1) for n in range(len(rows))])
         axes.set_xlabel("Score of the row in percent,\na tie half a win; votes beneath")
@@ -193,7 +193,7 @@ def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
         axes.set_ylabel("Elo with 95 % interval")
         legend = figure.legend(loc="outside right upper", frameon=False, fontsize=7)
         for text, point in zip(legend.get_texts(), plot.points, strict=True):
-            text.set_color(SIMULATED if point.row.simulated else INK)
+            text.set_color(SIMULATED if point.row.is_simulated else INK)
         return write_figure(figure, file_format)
 
 
@@ -203,8 +203,8 @@ def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
 def _draw_intervals(axes: Axes, rows: Sequence[Row], intervals: Mapping[str, Interval]) -> None:
     for place, row in enumerate(rows):
         if row.slug in intervals:
-            draw_interval(axes, place, intervals[row.slug], simulated=row.simulated)
-    name_lines(axes, [row.model for row in rows], [row.simulated for row in rows])
+            draw_interval(axes, place, intervals[row.slug], simulated=row.is_simulated)
+    name_lines(axes, [row.model for row in rows], [row.is_simulated for row in rows])
 
 
 def _draw_point(axes: Axes, point: Point) -> None:
@@ -214,7 +214,7 @@ def _draw_point(axes: Axes, point: Point) -> None:
         axes,
         point.x,
         point.row.interval,
-        simulated=row.simulated,
+        simulated=row.is_simulated,
         colour=_CLASSES.get(point.model_class, MARK),
         upright=True,
         label=f"{point.number}  {name}" + (f" ({kind})" if kind else ""),

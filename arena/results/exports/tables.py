@@ -68,7 +68,7 @@ class Row(Line):
 
     slug: str
     kind: str
-    simulated: bool
+    is_simulated: bool
     variant: str = ""
     options: str = ""
     sends: str = ""
@@ -78,7 +78,7 @@ class Row(Line):
     @property
     def model(self) -> str:
         """The name, with "(simulated)" where that is so."""
-        return f"{self.name}{SIMULATED if self.simulated else ''}"
+        return shown_name(self)
 
     @property
     def votes_cast(self) -> int:
@@ -213,7 +213,7 @@ def _row(standing: Standing, part: int) -> Row:
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
         slug=standing.slug,
         kind=standing.kind,
-        simulated=standing.is_simulated,
+        is_simulated=standing.is_simulated,
         part=part,
         options=json.dumps(options, sort_keys=True) if options else "",
         sends=json.dumps(sends, sort_keys=True) if sends else "",
