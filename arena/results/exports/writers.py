@@ -24,6 +24,7 @@ from arena.exports.formats import (
     formats,
     json_bytes,
     read_value,
+    sheet_of,
     table_formats,
 )
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
@@ -48,13 +49,12 @@ MANIFEST = "manifest.json"
 
 def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
     """Return one row a contestant; in CSV numbers have two decimals."""
-    columns = [column for column in _columns_in(table, COLUMNS) if column.name]
-    return Sheet(
-        name="leaderboard",
-        columns={column.name: column.kind for column in columns},
-        rows=[[_value_of(column, table, row) for column in columns] for row in table.rows],
-        number=".2f",
-    )
+    columns = {
+        column.name: (partial(_value_of, column, table), column.kind)
+        for column in _columns_in(table, COLUMNS)
+        if column.name
+    }
+    return sheet_of(table.rows, columns, name="leaderboard", digits=None, number=".2f")
 
 
 def leaderboard_json(table: LeaderboardTable) -> bytes:
@@ -248,13 +248,12 @@ def _value_of(column: Column, table: LeaderboardTable, row: Row) -> object:
 
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
-    columns = [column for column in _columns_in(table, WHOSE_FIRST) if column.key]
-    values = {column.key: _value_of(column, table, row) for column in columns}
     part: dict[str, Any] = {"part": row.part} if table.has_parts else {}
     part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {
-        key: round(value, 4) if isinstance(value, float) else value
-        for key, value in values.items()
+        column.key: read_value(row, column.field)
+        for column in _columns_in(table, WHOSE_FIRST)
+        if column.key
     } | part
 
 
