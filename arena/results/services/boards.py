@@ -14,7 +14,7 @@ from arena.errors import StudyStillOpen
 from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
 from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy, anchor_lines
-from arena.rating.leaderboard import rate
+from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.lines import Line, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
@@ -211,8 +211,7 @@ def make_document(
         benchmark=str(board.benchmark or ""),
         benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
         question=str(Question(studies[0].questions[0]).label),
-        method=f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, "
-        f"clustered by {UNIT_TEXTS[rated.unit]}",
+        method=_method_text(rated),
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
         studies=tuple(
@@ -230,6 +229,11 @@ def make_document(
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _method_text(rated: Leaderboard) -> str:
+    by = UNIT_TEXTS[rated.unit]
+    return f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, clustered by {by}"
 
 
 _SHOWN = ("slug", "type", "instruction")
