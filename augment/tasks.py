@@ -20,11 +20,11 @@ from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.db import connection
-from django.db.models import Q, QuerySet
+from django.db.models import OuterRef, Q, QuerySet, Subquery
 from kombu.exceptions import OperationalError
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
-from augment.models import GenerationJob
+from augment.models import Augmentation, GenerationJob
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
 from augment.services.judging.analyses import count_unmeasured, measure_job
@@ -73,8 +73,11 @@ def work(self: Any, kind: str, pk: int) -> None:
     KINDS[kind].perform(pk, worker=worker[:120])
     enqueue(KINDS[kind], KINDS[kind].released_by(pk))
     if kind == AUGMENTATIONS.name:
+        # Others of its last rows see it finished as well; one message is enough.
+        ended = Augmentation.objects.filter(job=OuterRef("pk")).order_by("-finished_at", "-pk")
+        finished = GenerationJob.objects.filter(augmentations=pk)
         with suppress(QueueFault):  # who looks at the job asks again
-            enqueue_measures(GenerationJob.objects.filter(augmentations=pk))
+            enqueue_measures(finished.alias(last=Subquery(ended.values("pk")[:1])).filter(last=pk))
 
 
 @shared_task(name="augment.draw", acks_late=True, ignore_result=True)

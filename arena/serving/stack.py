@@ -1,6 +1,7 @@
-"""What the product needs on one machine: Redis, a worker, the web server, the stand-in model."""
+"""What the product needs on one machine: Redis, workers, the web server, the stand-in model."""
 
 import fcntl
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -66,13 +67,19 @@ def hold_alone() -> Iterator[None]:
 
 
 def background(*, concurrency: int) -> list[Program]:
-    """Redis where it is the private one, the stand-in models that are missing, and a worker.
+    """Redis where it is the private one, the stand-in models that are missing, and workers.
+
+    Args:
+        concurrency: How much is worked on at once, in as many processes as there are cores.
 
     Raises:
         ArenaError: Redis is needed and not here.
     """
     programs = [_private_redis()] if settings.REDIS_IS_PRIVATE else []
-    return [*programs, *missing_stand_ins(), _worker(concurrency)]
+    processes = min(concurrency, os.cpu_count() or 1)
+    threads = -(-concurrency // processes)
+    workers = [_worker(number + 1, threads) for number in range(processes)]
+    return [*programs, *missing_stand_ins(), *workers]
 
 
 def web_server(web: Web) -> Program:
@@ -133,12 +140,12 @@ def _private_redis() -> Program:
     return Program(name="redis", arguments=arguments, is_ready=is_ready, ready_within_s=15.0)
 
 
-def _worker(concurrency: int) -> Program:
-    # Threads: the work is waiting for models and drawing in Pillow, which both let go of the
-    # interpreter; one process starts faster, and nothing of it can be left behind.
+def _worker(number: int, threads: int) -> Program:
+    # Threads for waiting: for models and for the disk. Computing takes a process for each core.
     arguments = (
         *(sys.executable, "-m", "celery", "--app", "arena.config", "--quiet", "worker"),
-        *("--pool", "threads", "--concurrency", str(concurrency)),
+        *("--hostname", f"worker{number}@%h"),
+        *("--pool", "threads", "--concurrency", str(threads)),
         *("--loglevel", settings.LOG_LEVEL.lower()),
         *("--without-gossip", "--without-mingle"),
     )

@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import count
 from string import ascii_letters
 from typing import Any, TypeVar
@@ -213,6 +213,7 @@ def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
     return straight_curve(*points) if len(points) == 2 else CubicBezier(points)
 
 
+@lru_cache(maxsize=16)
 def scene_text(
     scene: entities.Scene,
     *,

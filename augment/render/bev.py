@@ -62,6 +62,7 @@ def draw(
     return ground.png()
 
 
+@lru_cache(maxsize=4)
 def draw_empty(scene: Scene, camera: Camera) -> bytes:
     """Draw what stays while everybody moves: road, goal, lights and scale, nobody on it."""
     corner = road.scale_corner(scene, camera)

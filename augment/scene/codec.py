@@ -22,7 +22,7 @@ from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
-from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path
+from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path, remember
 
 ENGLISH = "en"
 _ALWAYS_WRITTEN = ("requests", "kind", "body")
@@ -157,10 +157,12 @@ RECORDING = Codec("recording", TypeAdapter(Recording), _recording_problems)
 SCENE_FORMAT: str = SCENE.frame["format"]
 INTENT = Codec("intent", TypeAdapter(Intent), _intent_problems)
 
-scene_to_document, scene_from_document = SCENE.to_document, SCENE.from_document
+# Contestants of a scenario follow one another, and each needs them several times.
+scene_to_document, scene_from_document = SCENE.to_document, remember(SCENE.from_document, 8)
 modification_to_document = MODIFICATION.to_document
-modification_from_document = MODIFICATION.from_document
-recording_to_document, recording_from_document = RECORDING.to_document, RECORDING.from_document
+modification_from_document = remember(MODIFICATION.from_document, 256)
+recording_to_document = RECORDING.to_document
+recording_from_document = remember(RECORDING.from_document, 4)
 intent_from_document, intent_from_parts = INTENT.from_document, INTENT.from_parts
 
 

@@ -3,7 +3,8 @@
 Frame: the ego frame of t0 (the Scene's frame). T steps.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -66,7 +67,7 @@ class Track:
     states: _States
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
     """The log from t0 on.
 
@@ -84,6 +85,11 @@ class Recording:
     times_s: _Times
     ego: _States
     tracks: Annotated[tuple[Track, ...], Field(fail_fast=True, max_length=MOST_TRACKS)] = ()
+
+    @cached_property
+    def ego_alone(self) -> "Recording":
+        """The same without tracks; one value, so that what depends on it is kept."""
+        return replace(self, tracks=())
 
     @property
     def ego_is_seen(self) -> NDArray[np.bool_]:

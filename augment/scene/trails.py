@@ -4,6 +4,7 @@ Frame: ego frame of t0. P points.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Trail:
     sets_out: bool
 
 
+@lru_cache(maxsize=32)
 def trails_of(
     scene: Scene, modification: Modification, recording: Recording | None = None
 ) -> tuple[Trail, ...]:
@@ -80,6 +82,7 @@ def trails_of(
     return tuple(trails)
 
 
+@lru_cache(maxsize=8)
 def ego_spots(scene: Scene, recording: Recording | None = None) -> tuple[TrafficAgent, ...]:
     """Return the ego every second of a film, as recorded or at its speed."""
     motion = motion_of(replace(scene, agents=()), recording=recording)

@@ -71,11 +71,16 @@ class Settlement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lease(Generic[Row]):
-    """The right to write one row, as long as it carries the token."""
+    """The right to write one row, as long as it carries the token.
+
+    Attributes:
+        attempt: What `begun` has noted.
+    """
 
     kind: WorkKind[Row]
     pk: int
     token: uuid.UUID
+    attempt: Any = field(default=None, repr=False, compare=False)
     _is_lost: Event = field(default_factory=Event, repr=False, compare=False)
 
     @property
@@ -190,8 +195,9 @@ class WorkKind(ABC, Generic[Row]):
         """Return the waiting rows for which messages are sent."""
         return self.waiting()
 
-    def begun(self, pk: int, worker: str, now: Moment) -> None:
-        """Note that a worker has taken a row; in the same transaction."""
+    def begun(self, pk: int, worker: str, now: Moment) -> object:
+        """Note that a worker has taken a row, in the same transaction; returns the note."""
+        return None
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Note how a try ended: with an outcome or a TryEnd; in the same transaction."""
@@ -239,8 +245,7 @@ class WorkKind(ABC, Generic[Row]):
         taken = {**self.model.STARTED, "claim": token, "heartbeat_at": now, "finished_at": None}
         if not self.waiting().filter(pk=pk).update(**taken):
             return None
-        self.begun(pk, worker, now)
-        return Lease(kind=self, pk=pk, token=token)
+        return Lease(kind=self, pk=pk, token=token, attempt=self.begun(pk, worker, now))
 
     def perform(self, pk: int, *, worker: str = "") -> bool:
         """Take a row and work on it, anew where the database was locked.

@@ -1,11 +1,13 @@
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import timedelta
 from typing import Any
 
 import pytest
 from celery.exceptions import Reject
 from django.core.files.storage import default_storage
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from augment import tasks
@@ -70,6 +72,15 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
     assert call.request["model"] == "llama3.1"
     assert INSTRUCTION in json.dumps(call.request)
     assert call.prompt_version
+
+
+@pytest.mark.parametrize(("make", "most"), [(launch, 17), (llama_job, 29)])
+def test_a_row_asks_the_database_seldom(make: Callable[[], GenerationJob], most: int) -> None:
+    row = only_row(make())
+    with CaptureQueriesContext(connection) as captured:
+        ran(row, Wire(GOOD))
+    asked = [query["sql"] for query in captured if "SAVEPOINT" not in query["sql"]]
+    assert len(asked) <= most, "\n".join(sql[:100] for sql in asked)
 
 
 def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture() -> None:

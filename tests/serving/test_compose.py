@@ -41,6 +41,21 @@ def test_each_has_as_long_to_stop_as_serve_gives_it(services: dict[str, Any]) ->
     assert seconds(services["web"]["stop_grace_period"]) >= web.grace_s
 
 
+@pytest.mark.django_db
+@pytest.mark.parametrize(
+    ("cores", "concurrency", "workers", "threads"), [(2, 4, 2, 2), (2, 3, 2, 2), (8, 3, 3, 1)]
+)
+def test_work_runs_in_as_many_processes_as_there_are_cores(
+    monkeypatch: pytest.MonkeyPatch, cores: int, concurrency: int, workers: int, threads: int
+) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: cores)
+    programs = [one for one in background(concurrency=concurrency) if one.name == "worker"]
+    lines = [" ".join(one.arguments) for one in programs]
+    names = [f"--hostname worker{number + 1}@%h" for number in range(workers)]
+    assert all(name in line for name, line in zip(names, lines, strict=True))
+    assert all(f"--concurrency {threads} " in line for line in lines)
+
+
 def test_every_queue_has_a_worker_that_is_probed(services: dict[str, Any]) -> None:
     taken: list[str] = []
     for name in ("worker", "render-worker"):

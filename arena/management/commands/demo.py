@@ -52,7 +52,7 @@ class Command(TerminalCommand):
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
         scenarios = [*scenarios_of(per_type), *scenarios_of(1, "moving")]
-        supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
+        supervisor = Supervisor([*background(concurrency=4), *server], self._keep)
         with supervisor.signals():
             try:
                 supervisor.start()
@@ -63,7 +63,7 @@ class Command(TerminalCommand):
                 drives = demo.start_drives()
                 self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
                 if drives:
-                    self.stdout.write(f"{len(drives)} drives are under way.")
+                    self.stdout.write(f"{len(drives)} drives follow in the background.")
                 if not serve:
                     demo.finish_drives(drives, look)
                 self._show(web, time.monotonic() - started, serve=serve)

@@ -24,7 +24,7 @@ from augment.llm.client import ModelProfile, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
 from augment.models import CallLease, Endpoint
-from augment.services.clock import database_now, repeating
+from augment.services.clock import DATABASE_TIME, Moment, database_now, repeating
 from augment.services.endpoints.known_endpoints import key_of
 from augment.services.endpoints.known_models import profile_of, remember_refusal
 from augment.services.endpoints.treatments import Treatment
@@ -56,7 +56,7 @@ class Queue:
 
     longest_s: float
     still_wanted: Callable[[], None] = lambda: None
-    clock: Callable[[], datetime] = database_now
+    clock: Callable[[], Moment] = lambda: DATABASE_TIME
     sleep: Callable[[float], None] = time.sleep
     rng: random.Random = field(default_factory=random.Random)
     minute: timedelta = MINUTE
@@ -178,7 +178,7 @@ def place_at(endpoint: Endpoint, queue: Queue) -> Iterator[None]:
 
 @transaction.atomic
 def admit(
-    *, endpoint_pk: int, clock: Callable[[], datetime], minute: timedelta = MINUTE
+    *, endpoint_pk: int, clock: Callable[[], Moment], minute: timedelta = MINUTE
 ) -> uuid.UUID | float:
     """Take a place, or say in how many seconds to look again (0: when a call ends).
 
@@ -199,7 +199,7 @@ def admit(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _wait_s(endpoint: Endpoint, now: datetime, minute: timedelta) -> float | None:
+def _wait_s(endpoint: Endpoint, now: Moment, minute: timedelta) -> float | None:
     """Return None where there is room for a call now, else when to look again."""
     leases = CallLease.objects.filter(endpoint=endpoint)
     if leases.filter(finished_at=None, expires_at__gt=now).count() >= endpoint.max_concurrency:
@@ -210,7 +210,10 @@ def _wait_s(endpoint: Endpoint, now: datetime, minute: timedelta) -> float | Non
     recent = leases.filter(started_at__gt=now - minute).order_by("-started_at")
     # With as many starts in the last minute as are allowed, the oldest of them has to age.
     oldest = recent.values_list("started_at", flat=True)[limit - 1 : limit].first()
-    return None if oldest is None else (oldest + minute - now).total_seconds()
+    if oldest is None:
+        return None
+    now = now if isinstance(now, datetime) else database_now()
+    return (oldest + minute - now).total_seconds()
 
 
 def _wait_for_place(endpoint: Endpoint, queue: Queue) -> uuid.UUID:

@@ -95,9 +95,8 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
     return _profile(row)
 
 
-def price_of(endpoint: Endpoint, model: str) -> Price | None:
+def price_of(row: EndpointModel) -> Price | None:
     """Return the price of a model at an endpoint, None where it is unknown."""
-    row = facts_of(endpoint=endpoint, model=model)
     if row.price_in_usd is None or row.price_out_usd is None:
         return None
     return Price(

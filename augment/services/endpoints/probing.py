@@ -171,7 +171,7 @@ class _Prober:
 
     def __init__(self, *, client: ChatClient, row: EndpointModel) -> None:
         self._client, self._row = client, row
-        self._price = price_of(row.endpoint, row.model)
+        self._price = price_of(row)
         self.calls = 0
         self.profile = ModelProfile(
             reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens

@@ -8,6 +8,7 @@ is the whole set of its options: what was chosen when it was added, and the defa
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 from django.db import transaction
@@ -28,7 +29,7 @@ SAMPLING = frozenset({"temperature", "seed", "reasoning_effort"})
 """Options that some endpoints refuse."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Respondent:
     """A model at an endpoint that plays a role."""
 
@@ -38,9 +39,9 @@ class Respondent:
     def __str__(self) -> str:
         return f"{self.model} at {self.endpoint.label}"
 
-    @property
+    @cached_property
     def facts(self) -> EndpointModel:
-        """What is known of the model there."""
+        """What is known of the model there; looked up once."""
         return facts_of(endpoint=self.endpoint, model=self.model)
 
 
@@ -99,31 +100,19 @@ class Treatment:
         return profile
 
 
-@transaction.atomic
 def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respondent]) -> Treatment:
     """Return what a contestant sends; roles that never ran are fixed to what is known now.
 
     Args:
-        contestant: Who is about to run.
+        contestant: Who is about to run, as just read.
         respondents: Who plays its roles.
 
     Raises:
         Conflict: It ran with prompts that are not installed any more, or is told to.
     """
-    columns = Contestant.objects.values_list("sends", "frozen_options").get(pk=contestant.pk)
-    stored, frozen = columns[0] or {}, columns[1]
+    stored, frozen = contestant.sends or {}, contestant.frozen_options
     if frozen is None or any(role.value not in stored for role in respondents):
-        row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
-        before = row.sends or {}
-        new = {
-            role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
-            for role, one in respondents.items()
-            if role.value not in before
-        }
-        row.sends = stored = before | new
-        row.frozen_options = frozen = row.frozen_options or _completed(row).to_document()
-        row.save(update_fields=["sends", "frozen_options"])
-        log_change(row, "fix", after={"slug": row.slug, "sends": new, "options": frozen})
+        stored, frozen = _fix(contestant, respondents)
     options = options_from_document(frozen)
     if (unlike := other_prompts(contestant.slug, options)) is not None:
         raise Conflict(unlike)
@@ -173,7 +162,7 @@ def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """Return the models without a price that contestants ask, as "model at endpoint"."""
     asked = {one for row in contestants for one in respondents_of(row).values()}
-    return sorted(str(one) for one in asked if price_of(one.endpoint, one.model) is None)
+    return sorted(str(one) for one in asked if price_of(one.facts) is None)
 
 
 def options_of(contestant: Contestant) -> ContestantOptions:
@@ -230,6 +219,25 @@ def loosen_unanswered(contestants: Iterable[Contestant]) -> None:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+@transaction.atomic
+def _fix(
+    contestant: Contestant, respondents: Mapping[ModelRole, Respondent]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Fix what was left open of a contestant's roles and options; return both."""
+    row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
+    before = row.sends or {}
+    new = {
+        role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
+        for role, one in respondents.items()
+        if role.value not in before
+    }
+    row.sends = before | new
+    row.frozen_options = row.frozen_options or _completed(row).to_document()
+    row.save(update_fields=["sends", "frozen_options"])
+    log_change(row, "fix", after={"slug": row.slug, "sends": new, "options": row.frozen_options})
+    return row.sends, row.frozen_options
 
 
 def _completed(contestant: Contestant) -> ContestantOptions:

@@ -149,25 +149,32 @@ def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
 
 
 @transaction.atomic(savepoint=False)
-def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | None = None) -> None:
+def settle(
+    *, call: ModelCall, used: Used, now: Moment, answer: dict[str, Any] | None = None
+) -> None:
     """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
     A call that was settled because its worker was thought dead is corrected.
+
+    Args:
+        call: As it was in flight.
+        used: What it used.
+        now: When it ended.
+        answer: Columns that keep the answer.
     """
-    # Not the request and the answer, which are long.
-    call = (
-        ModelCall.objects.select_for_update()
-        .only("attempt_id", "judgement_id", *_COUNTED)
-        .get(pk=call_pk)
-    )
-    # The job's row last: all calls of a job wait for it until the transaction ends.
-    ModelCall.objects.filter(pk=call_pk).update(
-        spent_tokens=used.tokens,
-        cost_nano_usd=used.nano_usd,
-        is_cost_estimated=used.is_estimated,
-        settled_at=now,
+    columns = {
+        "spent_tokens": used.tokens,
+        "cost_nano_usd": used.nano_usd,
+        "is_cost_estimated": used.is_estimated,
+        "settled_at": now,
         **(answer or {}),
-    )
+    }
+    rows = ModelCall.objects.filter(pk=call.pk)
+    # The job's row last: all calls of a job wait for it until the transaction ends.
+    if not rows.filter(settled_at=None).update(**columns):
+        # Not the request and the answer, which are long.
+        call = rows.select_for_update().only("attempt_id", "judgement_id", *_COUNTED).get()
+        rows.update(**columns)
     job = _budgets_of(call)
     if job is None:
         return  # a reading sums up its calls itself
@@ -189,7 +196,7 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
         )
 
 
-@transaction.atomic
+@transaction.atomic(savepoint=False)
 def settle_unseen(*, now: Moment, of: Q) -> None:
     """Settle those calls that are still in flight; the worker of their row is gone.
 
@@ -198,11 +205,11 @@ def settle_unseen(*, now: Moment, of: Q) -> None:
     """
     # Locked, so that none is sent between the look at it and its settlement.
     calls = ModelCall.objects.select_for_update(of=("self",)).filter(settled_at=None)
-    for call in calls.filter(of).only(*_COUNTED):
+    for call in calls.filter(of).only("attempt_id", "judgement_id", *_COUNTED):
         fault = "nobody saw the end: its worker stopped"
         if call.sent_at is None:
             fault = "not sent: its worker stopped while it waited for a place"
-        settle(call_pk=call.pk, used=_used_unseen(call), now=now, answer={"fault": fault})
+        settle(call=call, used=_used_unseen(call), now=now, answer={"fault": fault})
 
 
 def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Used:

@@ -17,14 +17,15 @@ from typing import Any, NamedTuple
 
 from django.conf import settings
 from django.db import connection, transaction
-from django.db.models import Q, QuerySet
+from django.db.models import F, Q, QuerySet
 from django.utils import timezone
 
 from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services.endpoints.known_models import price_of
+from augment.services.endpoints.known_models import facts_of, price_of
+from augment.services.endpoints.treatments import Respondent
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
@@ -43,7 +44,7 @@ _COPIED = (
 
 
 class _CallInFlight(NamedTuple):
-    pk: int
+    row: ModelCall
     worst: WorstCase
     price: Price | None
 
@@ -55,10 +56,11 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
         LeaseLost: Another worker has the row now.
         JobCancelled: Its job is cancelled.
     """
-    if not held.is_held(lock=lock):
+    rows = held.row.select_for_update(of=("self",)) if lock else held.row
+    row = rows.only("pk").annotate(job_state=F("job__state")).first()
+    if row is None:
         raise errors.LeaseLost
-    cancelled = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
-    if cancelled.filter(augmentations=held.pk).exists():
+    if row.job_state == GenerationJob.State.CANCELLED:
         raise errors.JobCancelled
 
 
@@ -108,6 +110,10 @@ class CallTranscript(ABC):
             LeaseLost: Another worker has the row now.
             JobCancelled: Its job is cancelled.
         """
+
+    def price(self, role: ModelRole, model: str) -> Price | None:
+        """Return what a model costs that plays a role, None where that is unknown."""
+        return price_of(facts_of(endpoint=self._endpoint_of(role), model=model))
 
     @abstractmethod
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
@@ -185,14 +191,14 @@ class CallTranscript(ABC):
         for message in request.messages:
             for png in message.images:
                 store(png, folder=IMAGES)
-        worst, price = worst_case(request), price_of(self._endpoint_of(role), request.model)
+        worst, price = worst_case(request), self.price(role, request.model)
         wait_s = FIRST_WAIT_S
         while True:
             workers.insist_on_going_on()
-            room, pk = self._reserve_and_store(columns, worst, price)
-            if room == budget.Room.TAKEN:
+            room, row = self._reserve_and_store(columns, worst, price)
+            if row is not None:
                 self._numbers += 1
-                self._in_flight[self._numbers] = _CallInFlight(pk, worst, price)
+                self._in_flight[self._numbers] = _CallInFlight(row, worst, price)
                 return self._numbers
             if room == budget.Room.SPENT:
                 raise errors.BudgetSpent(self.limit())
@@ -207,7 +213,7 @@ class CallTranscript(ABC):
             WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
         workers.insist_on_going_on()
-        call = ModelCall.objects.filter(pk=self._in_flight[number].pk, settled_at=None)
+        call = ModelCall.objects.filter(pk=self._in_flight[number].row.pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
             raise errors.LeaseLost
 
@@ -220,7 +226,7 @@ class CallTranscript(ABC):
         # The fault also where there is none: the worker may have been thought dead meanwhile.
         fault_text = "" if fault is None else make_storable(sentence_of(fault))
         self._settle(
-            call.pk,
+            call.row,
             budget.used_by_reply(reply, worst=call.worst, price=call.price),
             _columns_of(reply) | {"fault": fault_text},
         )
@@ -232,13 +238,11 @@ class CallTranscript(ABC):
         if isinstance(fault, errors.NotSent):
             columns["sent_at"] = None
         used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
-        self._settle(call.pk, used, columns)
+        self._settle(call.row, used, columns)
 
-    def _settle(self, call_pk: int, used: budget.Used, answer: dict[str, Any]) -> None:
+    def _settle(self, call: ModelCall, used: budget.Used, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out."""
-        settle = partial(
-            budget.settle, call_pk=call_pk, used=used, now=timezone.now(), answer=answer
-        )
+        settle = partial(budget.settle, call=call, used=used, now=timezone.now(), answer=answer)
         wait_out(settle, sleep=self._sleep)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
@@ -260,7 +264,7 @@ class CallTranscript(ABC):
     @transaction.atomic
     def _reserve_and_store(
         self, columns: dict[str, Any], worst: WorstCase, price: Price | None
-    ) -> tuple[budget.Room, int]:
+    ) -> tuple[budget.Room, ModelCall | None]:
         """Take room and write the row in one transaction, or nothing of both."""
         self.insist()
         _hold_question(columns["request_hash"])
@@ -268,7 +272,7 @@ class CallTranscript(ABC):
             raise errors.QuestionInFlight
         room = self.reserve(worst, price)
         if room != budget.Room.TAKEN:
-            return room, 0
+            return room, None
         call = ModelCall.objects.create(
             **columns,
             number=self._numbers + 1,
@@ -276,7 +280,7 @@ class CallTranscript(ABC):
             reserved_tokens=worst.tokens,
             reserved_nano_usd=worst.nano_usd(price),
         )
-        return room, call.pk
+        return room, call
 
     def _endpoint_of(self, role: ModelRole) -> Endpoint:
         return self._others.get(role, self._endpoint)
@@ -288,25 +292,29 @@ class RowTranscript(CallTranscript):
     Args:
         held: The lease on the row; once it is lost, nothing more is asked.
         row: The augmentation, with its job.
-        endpoint: As for every transcript, and so are the others.
+        respondents: Who is asked.
     """
 
     def __init__(
         self,
         held: Lease[Augmentation],
         row: Augmentation,
-        endpoint: Endpoint,
+        respondents: Mapping[ModelRole, Respondent],
         *,
-        others: Mapping[ModelRole, Endpoint] | None = None,
         key: Mapping[str, object] | None = None,
-        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._held = held
         self._row = row
         self._jobs = GenerationJob.objects.filter(pk=row.job_id)
-        self._attempt = row.attempts.latest("number")
+        self._attempt = held.attempt
         self._notes = 0
-        super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
+        self._respondents = respondents
+        others = {role: one.endpoint for role, one in respondents.items()}
+        endpoint = others[ModelRole.MODIFIER]
+        super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key)
+
+    def price(self, role: ModelRole, model: str) -> Price | None:
+        return price_of(self._respondents[role].facts)
 
     def insist(self) -> None:
         insist_wanted(self._held, lock=True)

@@ -141,7 +141,7 @@ def _usd(
 ) -> Decimal | None:
     respondents, total = respondents_of(row), 0
     for role, (_, prompt, completion) in used.items():
-        price = price_of(respondents[role].endpoint, respondents[role].model)
+        price = price_of(respondents[role].facts)
         if price is None:
             return None
         total += price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)

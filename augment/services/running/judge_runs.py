@@ -93,12 +93,13 @@ def estimate_judge(request: JudgeRequest, pairs: int, longest: str) -> JudgeEsti
         Conflict: The model can't see pictures.
     """
     endpoint = find_endpoint(request.endpoint)
-    if facts_of(endpoint=endpoint, model=request.model).vision is False:
+    facts = facts_of(endpoint=endpoint, model=request.model)
+    if facts.vision is False:
         raise errors.Conflict(
             f"{request.model} at {endpoint.label} can’t see pictures, so it can’t judge them. "
             "Choose another model; where this is wrong, probe the model again."
         )
-    calls, price = ORDERS * pairs, price_of(endpoint, request.model)
+    calls, price = ORDERS * pairs, price_of(facts)
     usd = most = None
     if price is not None:
         most = usd_of(calls * most_nano_usd(longest, price))
@@ -129,7 +130,7 @@ def plan_judge(
             "No pair was judged by experts yet, so there is nothing to compare with."
         )
     endpoint = find_endpoint(request.endpoint)
-    is_priced = price_of(endpoint, request.model) is not None
+    is_priced = price_of(facts_of(endpoint=endpoint, model=request.model)) is not None
     unpriced = [] if is_priced else [f"{request.model} at {endpoint.label}"]
     run = JudgeRun.objects.create(
         endpoint=endpoint,

@@ -7,12 +7,14 @@ with its state, modification, notes or reason, and picture, and its calls as `Mo
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from django.conf import settings
 from django.db import Error
-from django.db.models import Max, Q, QuerySet
+from django.db.models import Max, Q, QuerySet, Subquery
+from django.db.models.functions import Coalesce
 
 from augment import errors
 from augment.baselines.registry import PLACERS, RULE_PLACER
@@ -89,9 +91,12 @@ class Augmentations(WorkKind[Augmentation]):
 
     def run(self, row: Augmentation, held: Held) -> Settlement:
         """Ask, keep, draw. Every foreseen fault is a failed outcome with a sentence."""
+        outcome = self._make(row, held)
+        return replace(outcome, columns={"options": row.options, **outcome.columns})
+
+    def _make(self, row: Augmentation, held: Held) -> Settlement:
         try:
             scene = scene_of(row.scenario)
-            unchanged = original_picture(row.scenario)
             if row.modification is not None:  # of an earlier attempt that could not draw it
                 outcome = Outcome(
                     status=OutcomeStatus.DONE,
@@ -101,7 +106,7 @@ class Augmentations(WorkKind[Augmentation]):
             else:
                 outcome = _ask(row, scene, held, self._connect)
             if outcome.modification is None:
-                columns: dict[str, Any] = {"image": unchanged}
+                columns: dict[str, Any] = {"image": original_picture(row.scenario)}
                 return Settlement(
                     state=outcome.status.value, reason=outcome.reason, columns=columns
                 )
@@ -110,8 +115,12 @@ class Augmentations(WorkKind[Augmentation]):
             columns = {"modification": make_document_storable(document)}
             if outcome.notes:
                 columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
-            held.note(**columns)  # a second try only has to draw
-            image = picture_of(row.scenario, modification, camera_of(row.scenario))
+            try:
+                camera = camera_of(row.scenario, {row.pk: columns["modification"]})
+                image = picture_of(row.scenario, modification, camera)
+            except Exception:
+                held.note(**columns)  # a second try only has to draw
+                raise
             return Settlement(state=State.DONE, columns=columns | {"image": image})
         except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
@@ -125,15 +134,17 @@ class Augmentations(WorkKind[Augmentation]):
             reason = str(error)
         return Settlement(state=State.FAILED, reason=reason)
 
-    def begun(self, pk: int, worker: str, now: Moment) -> None:
+    def begun(self, pk: int, worker: str, now: Moment) -> Attempt:
         """Open the next attempt."""
         tries = Attempt.objects.filter(augmentation_id=pk)
-        number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
-        tries.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
+        last = tries.order_by().values("augmentation").annotate(last=Max("number")).values("last")
+        number = Coalesce(Subquery(last), 0) + 1
+        return tries.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Close the attempt and settle its calls; one that was lost has no time of its end."""
-        budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
+        if end not in SUBMITTED.values():  # what ends with an answer has seen all of its calls end
+            budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
         Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
             finished_at=None if end == TryEnd.LOST else now, outcome=end, reason=reason
         )
@@ -214,7 +225,7 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         if before is not None and before.state in (State.UNREADABLE, State.REFUSED):
             reason = f"It would go on from an answer that is none: {before.reason}"
             return Outcome(status=OutcomeStatus(before.state), reason=reason)
-        return _ask_model(row, contestant.endpoint, scene, held, connect)
+        return _ask_model(row, scene, held, connect)
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
     if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
         raise errors.Conflict(f"A job can't run contestants of kind {contestant.kind!r}.")
@@ -228,16 +239,14 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
     return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
 
 
-def _ask_model(
-    row: Augmentation, endpoint: Endpoint, scene: Scene, held: Held, connect: Connect | None
-) -> Outcome:
+def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
     begun: Messages = ()
     if row.scenario.follows_id is not None:
         begun = follow_up_messages(conversation_of(row.follows), row.scenario.instruction)
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
     options = treatment.options
-    held.note(options=options.to_document())
+    row.options = options.to_document()
     open_client = connect or partial(open_wire, held=held, treatment=treatment)
     with ExitStack() as opened:
         clients = {
@@ -264,13 +273,7 @@ def _ask_model(
                 begun=begun,
             ),
             modifier=modifier,
-            transcript=RowTranscript(
-                held,
-                row,
-                endpoint,
-                others={role: respondents[role].endpoint for role in playing},
-                key=options.key(row.sample),
-            ),
+            transcript=RowTranscript(held, row, respondents, key=options.key(row.sample)),
             others=playing,
             sampling=options.sampling(row.sample),
         )

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -44,15 +44,19 @@ def window_of(name: str) -> str:
     return parts[1] if len(parts) == 3 and parts[0] == FOLDER else ""
 
 
-def original_picture(scenario: Scenario) -> str:
+def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     """The name of the picture before any change; drawn where there is none in today's window.
 
     Call it from a worker, not in a request.
 
+    Args:
+        scenario: Whose picture.
+        camera: Today's window, where that is known.
+
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    kept, camera = scenario.original_image, camera_of(scenario)
+    kept, camera = scenario.original_image, camera or camera_of(scenario)
     if kept and window_of(kept) == camera.key and default_storage.exists(kept):
         return kept
     scene = scene_of(scenario)
@@ -69,14 +73,23 @@ def original_picture(scenario: Scenario) -> str:
     return name
 
 
-def camera_of(scenario: Scenario) -> Camera:
+def camera_of(scenario: Scenario, unsaved: Mapping[int, dict[str, Any]] | None = None) -> Camera:
     """Return the window that all pictures of a scenario show, as its contestants are today.
+
+    Args:
+        scenario: Whose pictures.
+        unsaved: Modifications that are not stored yet, by the keys of their augmentations.
 
     Raises:
         InvalidDocument: The stored scene or a modification can't be read.
     """
     answered = scenario.augmentations.exclude(modification=None).order_by("pk")
-    documents = answered.values_list("modification", flat=True)
+    stored = dict(answered.values_list("pk", "modification")) | dict(unsaved or {})
+    return _window_around(scenario, [stored[pk] for pk in sorted(stored)])
+
+
+def _window_around(scenario: Scenario, documents: Iterable[dict[str, Any] | None]) -> Camera:
+    """Return the window around the reference and these modifications."""
     changes = tuple(
         codec.modification_from_document(document) for document in documents if document
     )
@@ -162,20 +175,25 @@ def redraw(scenario: Scenario) -> int:
     """
     redrawn = 0
     # Another worker may store a change that widens the window while this one draws.
-    while outdated := _list_outdated(scenario):
-        camera = camera_of(scenario)
+    while True:
+        rows = scenario.augmentations.order_by("pk").only(
+            "scenario", "image", "earlier_images", "state", "modification"
+        )
+        camera = _window_around(scenario, [row.modification for row in rows])
+        outdated = [row for row in rows if row.image and window_of(row.image) != camera.key]
+        if not outdated:
+            original_picture(scenario, camera)
+            return redrawn
         drawn = [(row, picture_of(scenario, _shown(row), camera)) for row in outdated]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
-            original_picture(scenario)
+            original_picture(scenario, camera)
             redrawn += sum(
                 Augmentation.objects.filter(pk=row.pk, image=row.image).update(
                     image=name, earlier_images=[*row.earlier_images, row.image]
                 )
                 for row, name in drawn
             )
-    original_picture(scenario)
-    return redrawn
 
 
 def draw_with_ids(row: Augmentation) -> bytes:
@@ -210,13 +228,6 @@ def _keep(picture: str, png: bytes, film: bytes) -> None:
     if film:
         store_as(film_name(picture), film)
     store_as(picture, png)
-
-
-def _list_outdated(scenario: Scenario) -> list[Augmentation]:
-    key = camera_of(scenario).key
-    rows = scenario.augmentations.exclude(image="")
-    rows = rows.only("image", "earlier_images", "state", "modification")
-    return [row for row in rows if window_of(row.image) != key]
 
 
 def _shown(row: Augmentation) -> Modification:

@@ -405,7 +405,7 @@ def recording_of(scenario: Scenario) -> Recording | None:
     if document is None:
         return None
     recording = codec.recording_from_document(document)
-    return recording if scenario.keep_traffic else replace(recording, tracks=())
+    return recording if scenario.keep_traffic else recording.ego_alone
 
 
 def ground_of(scenario: Scenario) -> Ground:
