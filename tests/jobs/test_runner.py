@@ -133,6 +133,16 @@ def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
     assert row.reason.startswith("The modification does not fit the scene: Agent9")
 
 
+def test_a_row_that_waited_for_a_dropped_baseline_fails_with_its_name() -> None:
+    add_kind("quantised-5m", Contestant.Kind.BASELINE)
+    add_scenario("street")
+    request = JobRequest(name="R", contestants=["quantised-5m"], scenarios=["street"])
+    row = only_row(jobs.launch(request))
+    Contestant.objects.update(slug="quantised-20m")
+    row = ran(Augmentation.objects.get(pk=row.pk))
+    assert (row.state, row.reason) == (State.FAILED, "A job can't run quantised-20m any more.")
+
+
 @pytest.mark.parametrize(
     ("slug", "kind", "rates"),
     [("errors", "simulated", {"position": 0.1}), ("quantised-20m", "baseline", None)],

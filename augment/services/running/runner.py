@@ -228,7 +228,7 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         return _ask_model(row, scene, held, connect)
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
     if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
-        raise errors.Conflict(f"A job can't run contestants of kind {contestant.kind!r}.")
+        raise errors.Conflict(f"A job can't run {contestant.slug} any more.")
     slug = row.scenario.slug
     # Each sample has a seed of its own; the first keeps that of jobs without samples.
     seed = seed_of(slug if row.sample == 1 else f"{slug}#{row.sample}")
