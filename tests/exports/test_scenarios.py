@@ -17,6 +17,7 @@ from django.urls import reverse
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.results.services.written_files import MadeFile, keep_file
+from arena.studies.services.opening import product_version
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
@@ -88,6 +89,7 @@ def test_every_format_comes_as_one_zip_with_its_manifest(
         assert set(archive.namelist()) == {*manifest["files"], "manifest.json"}
         assert b"commercial" in archive.read("WARNING.txt")
     assert manifest["scenarios_in"] == form
+    assert manifest["versions"]["scenario-arena"] == product_version()
     assert {"python", "numpy", "scenariogeneration"} <= manifest["versions"].keys()
     assert manifest["sources"][0]["is_non_commercial"] is True
     assert manifest["missing"][0]["text"] == "there is no modification: refused"

@@ -15,6 +15,7 @@ from arena.exports.formats import Format, formats, json_bytes
 from arena.models import ScenarioFile
 from arena.results.services.vote_files import describe_files
 from arena.results.services.written_files import FileWork, MadeFile
+from arena.studies.services.opening import product_version
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
@@ -49,7 +50,7 @@ def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
         "lost": [asdict(loss) for loss in written.losses],
         "refused": [asdict(loss) for loss in written.refused],
         "missing": [asdict(loss) for loss in exported.missing],
-        "versions": {"python": platform.python_version()}
+        "versions": {"scenario-arena": product_version(), "python": platform.python_version()}
         | {name: metadata.version(name) for name in WRITTEN_WITH},
         "files": describe_files(files),
     }
