@@ -7,7 +7,7 @@ a connection that is tried once: where no broker answers, there is a sentence in
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import timedelta
 from functools import partial
@@ -57,11 +57,14 @@ REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingErr
 
 register(AUGMENTATIONS, DRIVES, JUDGEMENTS, READINGS, PROBES, UPLOADS, MOMENTS, SUBMISSIONS)
 
-DRAWN: Mapping[str, Callable[[int], object]] = {
+DRAWN: dict[str, Callable[[int], object]] = {
     "scene": pictures.draw_scene,
     "scenario": pictures.draw_scenario,
 }
-"""Pictures of the row with that key, as far as they are not there yet."""
+"""Pictures of the row with that key, as far as they are not there yet; arena adds charts."""
+
+AFTERWARDS: dict[str, Callable[[int], object]] = {}
+"""What else is sent once a row of a kind was worked on; nothing may depend on it."""
 
 
 @shared_task(name="augment.work", bind=True, acks_late=True, ignore_result=True)
@@ -78,6 +81,9 @@ def work(self: Any, kind: str, pk: int) -> None:
         finished = GenerationJob.objects.filter(augmentations=pk)
         with suppress(QueueFault):  # who looks at the job asks again
             enqueue_measures(finished.alias(last=Subquery(ended.values("pk")[:1])).filter(last=pk))
+    if kind in AFTERWARDS:
+        with suppress(QueueFault):
+            AFTERWARDS[kind](pk)
 
 
 @shared_task(name="augment.draw", acks_late=True, ignore_result=True)
@@ -92,6 +98,8 @@ def measure(pk: int) -> None:
     job = GenerationJob.objects.filter(pk=pk).first()
     if job is not None:
         measure_job(job)
+        with suppress(QueueFault):  # who looks at a chart that is not there draws it
+            send(draw, "job", pk)
 
 
 # --- Sending messages --------------------------------------------------------------------------

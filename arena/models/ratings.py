@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
+from django.utils.functional import cached_property
 
 from arena.models.people import fresh_token
 from arena.models.studies import Study
@@ -107,15 +108,20 @@ class Snapshot(Work):
         """What was asked in the votes that it rates; older ones know of one question."""
         return str(self.filters.get("question", Question.INSTRUCTION))
 
+    @cached_property
+    def settled_ties(self) -> int | None:
+        """How many ties count that nobody was shown; None where nobody counted them."""
+        return self.results.board.settled_ties
+
     @property
     def votes_cast(self) -> int:
         """How many counted votes people gave; earlier ratings count settled ties with them."""
-        return self.votes_counted - (self.results.board.settled_ties or 0)
+        return self.votes_counted - (self.settled_ties or 0)
 
     @property
     def votes_counted_text(self) -> str:
         """The same, and after a plus the ties that nobody was shown."""
-        return join_counts(self.votes_cast, self.results.board.settled_ties)
+        return join_counts(self.votes_cast, self.settled_ties)
 
 
 class Standing(models.Model):

@@ -131,7 +131,9 @@ class SnapshotsView(ApiView):
         choices = read_request(RatingRequest, given).choices()
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
-            return rate(study=study, **choices)
+            snapshot = rate(study=study, **choices)
+            keep_and_send(lambda: snapshot, tasks.send_charts)
+            return snapshot
         plan = partial(plan_snapshot, study=study, **choices)
         planned, warnings = keep_and_send(plan, tasks.send_snapshot)
         planned.reason = " ".join([planned.reason, *warnings]).strip()

@@ -107,6 +107,7 @@ def test_by_object_there_is_a_row_for_each_object_with_both_places() -> None:
     assert len(found) == 5 + 4
 
 
+@pytest.mark.usefixtures("drawn_anew")
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     job = a_job()

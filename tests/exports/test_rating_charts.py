@@ -3,8 +3,10 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import product
 
 import pytest
+from django.urls import reverse
 
 from arena.models import Snapshot
 from arena.rating.snapshot_document import DisplacementSummary, PairRecord, ScenarioCost
@@ -20,7 +22,9 @@ from arena.results.exports.drawing import SIMULATED
 from arena.results.exports.tables import Row, leaderboard_table
 from arena.results.exports.writers import CHARTS
 from arena.results.services.ratings import rate_now as rate
+from arena.tasks import draw
 from tests.full_study import Size, full_study
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -56,6 +60,7 @@ def snapshot() -> Snapshot:
     return made
 
 
+@pytest.mark.usefixtures("drawn_anew")
 def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) -> None:
     """Those that the zip of everything has are drawn twice for its test (test_bundle.py)."""
     drawn, again = charts(snapshot), charts(Snapshot.objects.get(pk=snapshot.pk))
@@ -90,16 +95,31 @@ def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None
     assert (SIMULATED in drawing, "#2c7a4b" in drawing) == (simulated, not simulated)
 
 
+def test_a_worker_draws_the_charts_and_pages_only_read_them(
+    snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw("rating", snapshot.pk)
+    monkeypatch.setattr("arena.results.exports.charts.write_figure", None)
+    reader = signed_in(people()["researcher"])
+    for name, form in product(("leaderboard", *CHARTS), BEGINS):
+        address = reverse("results-export", args=[snapshot.study.code, name, form])
+        assert reader.get(address).content.startswith(BEGINS[form]), (name, form)
+    Snapshot.objects.filter(pk=snapshot.pk).update(is_early=True)  # which a chart says
+    with pytest.raises(TypeError):
+        reader.get(reverse("results-export", args=[snapshot.study.code, "leaderboard", "svg"]))
+
+
+@pytest.mark.usefixtures("drawn_anew")
 def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone(snapshot: Snapshot) -> None:
     # Whoever reads rows in a thread of its own needs another connection than this test's.
     table = leaderboard_table(snapshot)
     alone = interval_chart(table, file_format="svg")
     together = threading.Barrier(THREADS)
 
-    def draw(_: int) -> list[bytes]:
+    def draw_twice(_: int) -> list[bytes]:
         together.wait()
         return [interval_chart(table, file_format="svg") for _ in range(2)]
 
     with ThreadPoolExecutor(THREADS) as pool:
-        drawn = [one for several in pool.map(draw, range(THREADS)) for one in several]
+        drawn = [one for several in pool.map(draw_twice, range(THREADS)) for one in several]
     assert all(one == alone for one in drawn)

@@ -10,7 +10,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.judging.analyses import count_unmeasured
-from augment.tasks import measure
+from augment.tasks import draw, measure
 from tests.exports.test_displacement import a_job, add_moving
 from tests.jobs import rows
 from tests.scenes import vehicle
@@ -52,7 +52,7 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
 
 
 def test_what_is_not_measured_yet_is_left_to_a_worker_and_then_kept(
-    django_assert_max_num_queries: DjangoAssertNumQueries,
+    django_assert_max_num_queries: DjangoAssertNumQueries, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     job = a_job()
     reader = signed_in(people()["researcher"])
@@ -64,6 +64,14 @@ def test_what_is_not_measured_yet_is_left_to_a_worker_and_then_kept(
     measure(job.pk)
     with django_assert_max_num_queries(40):
         assert "A worker measures" not in reader.get(address).content.decode()
+    draw("job", job.pk)
+    monkeypatch.setattr("augment.metrics.paired.compare_all", None)  # no bootstrap, no drawing
+    monkeypatch.setattr("arena.jobs.exports.displacement.write_figure", None)
+    for path in (
+        *("analyses/", "files/analyses-pairs.csv", "files/displacement-by-contestant.svg"),
+        *("files/displacement-by-type.png", "files/displacement-by-variant.pdf"),
+    ):
+        assert reader.get(f"/jobs/{job.code}/{path}").status_code == 200, path
     scenario = job.augmentations.earliest("pk").scenario
     scenario.reference = modification_to_document(Modification(added=(vehicle("c", 9.0, 0.0),)))
     scenario.save()

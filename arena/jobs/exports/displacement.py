@@ -16,7 +16,7 @@ from arena.exports.formats import (
     sheet_of,
     table_formats,
 )
-from arena.results.exports.drawing import MARK, house_style, name_lines, write_figure
+from arena.results.exports.drawing import MARK, draw_once, house_style, name_lines, write_figure
 from arena.results.exports.tables import shown_name
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
@@ -279,4 +279,14 @@ def _scale(axes: Axes, boxes: Sequence[dict[str, Any]]) -> None:
     axes.set_xlim(left=0.0)
 
 
-FORMATS = table_formats(group_sheet) | drawings(box_plot)
+_BOX_PLOTS = drawings(draw_once(box_plot, group_sheet))
+FORMATS = table_formats(group_sheet) | _BOX_PLOTS
+
+
+def draw_box_plots(pk: int) -> None:
+    """Draw those of the job with that key, by each grouping, as far as no file keeps them."""
+    job = GenerationJob.objects.get(pk=pk)
+    for by in By:
+        table = displacement_table(job, by=by)
+        for form in _BOX_PLOTS.values():
+            form.write(table)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from arena.exports.formats import Columns, Dtype, Sheet, drawings, sheet_of, table_formats
-from arena.results.exports.drawing import MARK, SOFT, house_style, write_figure
+from arena.results.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
 from augment.services.judging.thresholds import SweepResult, driver_of
 
 if TYPE_CHECKING:
@@ -85,4 +85,4 @@ def _draw_curve(axes: Axes, result: SweepResult, driver: str, colour: str, strok
         axes.plot(values[chosen], scores[chosen], marker, color=colour, markersize=5)
 
 
-SWEEP_FORMATS = table_formats(sweep_sheet) | drawings(sweep_chart)
+SWEEP_FORMATS = table_formats(sweep_sheet) | drawings(draw_once(sweep_chart, sweep_sheet))

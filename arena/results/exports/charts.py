@@ -19,6 +19,7 @@ from arena.results.exports.drawing import (
     SIMULATED,
     Interval,
     draw_interval,
+    draw_once,
     house_style,
     name_lines,
     write_figure,
@@ -111,6 +112,7 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
     return rows_chart(table.rows, _interval_label(table), file_format=file_format)
 
 
+@draw_once
 def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
     """Draw ratings as dots with their intervals as bars, best on top; diamonds are simulated."""
     from matplotlib.figure import Figure
@@ -123,6 +125,7 @@ def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
         return write_figure(figure, file_format)
 
 
+@draw_once
 def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format: str) -> bytes:
     """Draw a panel for each scenario type, contestants in the order of the whole table."""
     from matplotlib.figure import Figure
@@ -144,6 +147,7 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
         return write_figure(figure, file_format)
 
 
+@draw_once
 def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format: str) -> bytes:
     """Draw percent and number of votes in every cell, contestants in the given order."""
     from matplotlib.colors import LinearSegmentedColormap
@@ -176,6 +180,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         return write_figure(figure, file_format)
 
 
+@draw_once
 def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
     """Draw numbered points with their intervals, and beside them a key with their names."""
     from matplotlib.figure import Figure

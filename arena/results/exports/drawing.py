@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial, wraps
+from importlib.metadata import version
+from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
+
+from augment.services.judging.measures import compute_once, digest_code
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,6 +45,27 @@ _STYLE: dict[Any, Any] = {
     "ytick.major.size": 0.0,
 }
 _LOCK = Lock()
+_CODE = Path(__file__).parent, Path(__file__).parents[2] / "jobs" / "exports"
+"""What decides how a chart looks."""
+
+
+def draw_once(
+    draw: Callable[..., bytes], content: Callable[..., object] = lambda *parts: parts
+) -> Callable[..., bytes]:
+    """Return the same chart, which a file keeps for as long as content and code are the same.
+
+    Args:
+        draw: Takes `file_format` and what is drawn.
+        content: Returns that as plain values, whose `repr` says all of it.
+    """
+
+    @wraps(draw)
+    def draw_or_read(*parts: Any, file_format: str) -> bytes:
+        code = digest_code(*_CODE)
+        key = draw.__name__, code, version("matplotlib"), content(*parts)
+        return compute_once(file_format, partial(draw, *parts, file_format=file_format), *key)
+
+    return draw_or_read
 
 
 @contextmanager

@@ -49,7 +49,7 @@ def method_text(rating: Snapshot) -> str:
     is_usual = rating.study.questions == [Question.INSTRUCTION]
     asked = "" if is_usual else f", question {rating.question}"
     # Nothing is drawn for a closed form; earlier ratings name the seed all the same.
-    is_drawn = rating.results.board.settled_ties is None or not is_closed_form(rating)
+    is_drawn = rating.settled_ties is None or not is_closed_form(rating)
     seed = f", seed {rating.seed}" if is_drawn else ""
     return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{asked}"
 
@@ -122,7 +122,7 @@ class LeaderboardTable:
     @property
     def votes_text(self) -> str:
         """How many votes count, and apart from them the ties of pairs that nobody was shown."""
-        return votes_text(self.snapshot.votes_cast, self.snapshot.results.board.settled_ties)
+        return votes_text(self.snapshot.votes_cast, self.snapshot.settled_ties)
 
     @property
     def method_text(self) -> str:

@@ -153,6 +153,13 @@ CHART_FORMATS: dict[str, Format[Chart]] = drawings(
 )
 
 
+def draw_charts(pk: int) -> None:
+    """Draw the charts of the rating with that key, in every format that no file keeps yet."""
+    for chart in charts(Snapshot.objects.get(pk=pk)).values():
+        for form in CHART_FORMATS.values():
+            form.write(chart)
+
+
 # --- Everything in one zip ---------------------------------------------------------------------
 
 

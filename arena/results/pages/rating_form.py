@@ -13,6 +13,7 @@ from arena.models import Question, Snapshot, Study
 from arena.rating.rules import METHOD_TEXTS
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
+from arena.site.acts import send_later
 from arena.site.forms import RequestForm, offer
 from augment.services.inputs import inputs_of
 from augment.services.scenarios.scenes import type_choices
@@ -57,7 +58,7 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
         AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
     """
     if not is_big(study):
-        rate_now(study=study, **choices)
+        send_later(request, tasks.send_charts, rate_now(study=study, **choices).pk)
         return
     with transaction.atomic():
         planned = plan_snapshot(study=study, **choices)

@@ -1,9 +1,12 @@
 """The tabs of the results page: each makes what its template needs of a snapshot and its table."""
 
+import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
+
+from django.db.models.fields.json import KT
 
 from arena.jobs.exports.driving import shown_driving
 from arena.jobs.queries import shown_augmentations
@@ -12,7 +15,7 @@ from arena.people.queries import natural_order
 from arena.rating.agreement import agreement_sentence
 from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
-from arena.rating.snapshot_document import PairRecord, PanelRater
+from arena.rating.snapshot_document import BoardRemarks, PairRecord, PanelRater
 from arena.results.exports.agreement import agreement_by_question
 from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import (
@@ -245,11 +248,15 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """What was done to the study, and every rating of it."""
     study = snapshot.study
+    rows = snapshots_of(study).defer("results").annotate(settled=KT("results__board__settled"))
+    ratings = list(rows.select_related("made_by__person"))
+    for row in ratings:  # of their results that alone, not a document for each
+        row.settled_ties = BoardRemarks(settled=json.loads(row.settled or "null")).settled_ties
     return {
         "events": log_of(study, most=LOG_LINES),
         "names": {row.slug: row.model for row in table.rows} | names_in_log(study),
         "most": LOG_LINES,
-        "ratings": list(snapshots_of(study).defer("results").select_related("made_by__person")),
+        "ratings": ratings,
     }
 
 

@@ -11,6 +11,7 @@ from statistics import fmean, median, stdev
 from typing import Any
 
 from django.db.models import Q
+from pydantic import TypeAdapter
 
 from augment.checks import Severity
 from augment.metrics import paired
@@ -19,7 +20,7 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import DISTANCES, KeptSummary, Measured, of_job
 from augment.services.judging.findings import FINDINGS
-from augment.services.judging.measures import Measure
+from augment.services.judging.measures import Measure, compute_once, digest_code, digest_rows
 from augment.services.judging.realism import REALISM, realism_of_job
 
 State = Augmentation.State
@@ -31,6 +32,7 @@ SEED = 2026
 """Of the bootstrap."""
 MISSES = (State.UNREADABLE, State.REFUSED)
 _ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, DISTANCES, FINDINGS)
+_PAIRS = TypeAdapter(tuple[paired.PairedComparison, ...])
 _AT_ONCE = 50
 """So many rows are measured before they are stored."""
 
@@ -83,8 +85,8 @@ def repeatability(job: GenerationJob) -> list[Row]:
 
 def count_unmeasured(job: GenerationJob) -> int:
     """Return how many rows of a job with an outcome lack a measure that still holds."""
-    ids = list(job.augmentations.values_list("pk", flat=True))
-    return max(measure.count_stale(ids) for measure in _ROW_MEASURES)
+    digests = digest_rows(job.augmentations.values_list("pk", flat=True))
+    return max(measure.count_stale(digests) for measure in _ROW_MEASURES)
 
 
 def measure_job(job: GenerationJob) -> None:
@@ -94,6 +96,7 @@ def measure_job(job: GenerationJob) -> None:
     for start in range(0, len(ids), _AT_ONCE):
         for measure in _ROW_MEASURES:
             measure.of(ids[start : start + _AT_ONCE])
+    compare_pairs(answers_of(job))  # whose bootstrap is kept as well
 
 
 # --- Analyses ----------------------------------------------------------------------------------
@@ -116,7 +119,11 @@ def compare_pairs(answers: Answers) -> Sequence[paired.PairedComparison]:
     objects.
     """
     values = {slug: _values_of(measured) for slug, measured in answers.items()}
-    return paired.compare_all(values, seed=SEED)
+
+    def compute() -> bytes:
+        return _PAIRS.dump_json(paired.compare_all(values, seed=SEED))
+
+    return _PAIRS.validate_json(compute_once("json", compute, digest_code(), values))
 
 
 def measure_wordings(answers: Answers) -> list[Row]:

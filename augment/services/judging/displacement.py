@@ -99,12 +99,12 @@ class Group:
 
 def of_job(job: GenerationJob) -> list[Measured]:
     """Measure every row of a job, or take what is stored."""
-    return _measure(_rows().filter(job=job))
+    return _measure(_rows().defer("modification").filter(job=job))
 
 
 def of_rows(ids: Collection[int]) -> list[Measured]:
     """Measure the augmentations with these primary keys, as those of a job."""
-    return _measure(_rows().filter(pk__in=ids))
+    return _measure(_rows().defer("modification").filter(pk__in=ids))
 
 
 def of_augmentation(row: Augmentation) -> Measured:
@@ -159,7 +159,7 @@ def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
     has it; and their `match`, None without one. The matched ones come first, in the order in
     which they were matched. What has no displacement (see `Unmeasured`) has no objects.
     """
-    for one in of_job(job):
+    for one in _measure(_rows().filter(job=job)):
         if one.displacement is None:
             continue
         wanted, placed = (
@@ -219,9 +219,9 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
 
 
 def _rows() -> QuerySet[Augmentation]:
-    rows = Augmentation.objects.select_related("scenario", "contestant", "follows__scenario")
-    rows = rows.defer("notes", "scenario__instruction")
-    return rows.order_by("scenario__slug", "contestant__slug", "sample")
+    # Not joined: what many rows share is made once.
+    rows = Augmentation.objects.prefetch_related("scenario", "contestant", "follows__scenario")
+    return rows.defer("notes").order_by("scenario__slug", "contestant__slug", "sample")
 
 
 def _measure(rows: Iterable[Augmentation]) -> list[Measured]:

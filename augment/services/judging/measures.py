@@ -14,17 +14,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from django.core.files.storage import default_storage
 from django.db.models import QuerySet
 from pydantic import TypeAdapter
 
-import augment
 from augment.models import Augmentation, Scenario, StoredMeasure
+from augment.services.scenarios.pictures import store_as
 
 Value = TypeVar("Value")
 Compute = Callable[[Collection[int]], Mapping[int, Value]]
 
-MEASURING = ("metrics", "checks", "scene", "geometry", "services/judging")
+MEASURING = "metrics", "checks", "scene", "geometry", "services/judging"
 """The packages of augment whose code decides what comes out."""
+
+_ROOT = Path(__file__).parents[2]
 
 _ROW = ("state", "finished_at", "follows__finished_at", "follows__scenario")
 _SCENARIO = (
@@ -59,7 +62,7 @@ class Measure(Generic[Value]):
 
     def of(self, ids: Iterable[int]) -> dict[int, Value]:
         """Return the values of the augmentations with these keys, without those that have none."""
-        keys = self._keys(ids)
+        keys = self._keys(digest_rows(ids))
         stored = StoredMeasure.objects.filter(name=self.name, augmentation__in=keys)
         values = {
             pk: self._adapter.validate_python(document)
@@ -72,24 +75,15 @@ class Measure(Generic[Value]):
             self._store({pk: (keys[pk], values[pk]) for pk in missing})
         return {pk: value for pk, value in values.items() if value is not None}
 
-    def count_stale(self, ids: Iterable[int]) -> int:
-        """Return how many of these would have to be computed."""
-        keys = self._keys(ids)
+    def count_stale(self, digests: Mapping[int, str]) -> int:
+        """Return how many of the rows of `digest_rows` would have to be computed."""
+        keys = self._keys(digests)
         stored = StoredMeasure.objects.filter(name=self.name, augmentation__in=keys)
         return len(keys.items() - set(stored.values_list("augmentation", "key")))
 
-    def _keys(self, ids: Iterable[int]) -> dict[int, str]:
-        """Return the key of each that has an outcome, by its primary key; two queries."""
-        rows = Augmentation.objects.filter(pk__in=list(ids), state__in=Augmentation.SHOWABLE)
-        found = list(rows.order_by("pk").values_list("pk", "scenario", *_ROW))
-        wanted = {scenario for _, scenario, *own in found for scenario in (scenario, own[-1])}
-        scenarios = Scenario.objects.filter(pk__in=wanted).order_by("pk")
-        digests = {pk: _digest(own) for pk, *own in scenarios.values_list("pk", *_SCENARIO)}
-        base = _digest([_code_version(), self._context()])
-        return {
-            pk: _digest([base, pk, digests[scenario], digests.get(own[-1]), *own[:-1]])
-            for pk, scenario, *own in found
-        }
+    def _keys(self, digests: Mapping[int, str]) -> dict[int, str]:
+        base = _digest([digest_code(), self._context()])
+        return {pk: _digest([base, digest]) for pk, digest in digests.items()}
 
     def _store(self, values: Mapping[int, tuple[str, Value | None]]) -> None:
         rows = [
@@ -122,13 +116,42 @@ def rows_by_scenario(
         yield scenario, of[scenario.pk]
 
 
+def digest_rows(ids: Iterable[int]) -> dict[int, str]:
+    """Return a digest of each that has an outcome, by its primary key; two queries."""
+    rows = Augmentation.objects.filter(pk__in=list(ids), state__in=Augmentation.SHOWABLE)
+    found = list(rows.order_by("pk").values_list("pk", "scenario", *_ROW))
+    wanted = {scenario for _, scenario, *own in found for scenario in (scenario, own[-1])}
+    scenarios = Scenario.objects.filter(pk__in=wanted).order_by("pk")
+    digests = {pk: _digest(own) for pk, *own in scenarios.values_list("pk", *_SCENARIO)}
+    return {
+        pk: _digest([pk, digests[scenario], digests.get(own[-1]), *own[:-1]])
+        for pk, scenario, *own in found
+    }
+
+
 def _digest(parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 @cache
-def _code_version() -> str:
-    """Return a digest of the code that measures: a release that changes it measures anew."""
-    root = Path(augment.__file__).parent
-    files = (path for name in MEASURING for path in sorted((root / name).rglob("*.py")))
+def digest_code(*folders: Path) -> str:
+    """Return a digest of the code in folders, or in those that measure: a change computes anew."""
+    rooms = folders or tuple(_ROOT / name for name in MEASURING)
+    files = (path for room in rooms for path in sorted(room.rglob("*.py")))
     return _digest([[path.name, path.read_text(encoding="utf-8")] for path in files])
+
+
+def compute_once(suffix: str, compute: Callable[[], bytes], *parts: object) -> bytes:
+    """Return what is computed of these parts; a file keeps it for the next time.
+
+    Args:
+        suffix: Of the file.
+        compute: Makes the bytes, the same ones of the same parts.
+        parts: All that it depends on; the `repr` of each has to say it all.
+    """
+    name = f"computed/{_digest(list(map(repr, parts)))}.{suffix}"
+    if default_storage.exists(name):
+        with default_storage.open(name) as file:
+            return bytes(file.read())
+    store_as(name, made := compute())
+    return made

@@ -45,7 +45,8 @@ def type_choices() -> list[tuple[str, str]]:
 
 def type_label(name: str) -> str:
     """Return what people read for a type; a type that nobody knows is its own label."""
-    return dict(type_choices()).get(name, name)
+    known = type_of(name)
+    return known.label if known else dict(type_choices()).get(name, name)
 
 
 def type_of(name: str) -> ScenarioType | None:

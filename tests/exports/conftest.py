@@ -1,0 +1,11 @@
+"""What the tests of files share."""
+
+import pytest
+
+
+@pytest.fixture
+def drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw every chart that is asked for; no file keeps one."""
+    monkeypatch.setattr(
+        "arena.results.exports.drawing.compute_once", lambda suffix, compute, *parts: compute()
+    )
