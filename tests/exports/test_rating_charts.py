@@ -8,6 +8,7 @@ from itertools import product
 import pytest
 from django.urls import reverse
 
+from arena import tasks
 from arena.models import Snapshot
 from arena.rating.snapshot_document import DisplacementSummary, PairRecord, ScenarioCost
 from arena.results.exports.charts import (
@@ -22,7 +23,6 @@ from arena.results.exports.drawing import SIMULATED
 from arena.results.exports.tables import Row, leaderboard_table
 from arena.results.exports.writers import CHARTS
 from arena.results.services.ratings import rate_now as rate
-from arena.tasks import draw
 from tests.full_study import Size, full_study
 from tests.web.cast import people, signed_in
 
@@ -98,7 +98,8 @@ def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None
 def test_a_worker_draws_the_charts_and_pages_only_read_them(
     snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    draw("rating", snapshot.pk)
+    draw, what = tasks.send_charts.args  # the message
+    draw(what, snapshot.pk)
     monkeypatch.setattr("arena.results.exports.charts.write_figure", None)
     reader = signed_in(people()["researcher"])
     for name, form in product(("leaderboard", *CHARTS), BEGINS):

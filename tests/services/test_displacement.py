@@ -95,10 +95,11 @@ def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once
     for slug, start in begins.items():
         ended(job, one, rows.add_kind(slug, Contestant.Kind.RULE), change=starts(start))
         ended(job, still, rows.add_kind(f"{slug}-2"))
-    # Rows; keys of rows and of scenarios, what is stored; rows, one scene; what is stored then.
-    with django_assert_num_queries(7):
+    # Rows, their scenarios and contestants; keys of rows and of scenarios, what is stored; rows
+    # with theirs, one scene; what is stored then.
+    with django_assert_num_queries(11):
         of_job(job)
-    with django_assert_num_queries(4):  # read from the store
+    with django_assert_num_queries(6):  # read from the store
         found = of_job(job)
     over_time = [line.displacement.over_time for line in found if line.displacement is not None]
     assert over_time[0] is not None
