@@ -18,7 +18,6 @@ from arena.results.exports.writers import FORMATS, plain_text
 from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
-from arena.tasks import send_charts
 from augment import models
 from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.progress import count_rows
@@ -131,7 +130,6 @@ def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:
         asked = demo.study_asked(OPEN_STUDY, scenarios) | {"experts": ["expert"]}
         open_study(StudyPlan.read(asked | {"votes_per_expert": votes}))
     table = leaderboard_table(study.snapshots.latest("made_at"))
-    send_charts(table.snapshot.pk)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for chosen in FORMATS.values():

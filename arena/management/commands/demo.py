@@ -10,9 +10,11 @@ from django.core.management.base import CommandError
 
 from arena.management import demo
 from arena.management.commands.serve import INTERRUPTED
+from arena.models import Snapshot
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
 from arena.site.demo import JOB, scenarios_of
+from arena.tasks import send_charts
 from augment.services.terminal import TerminalCommand, at_least
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
@@ -60,6 +62,7 @@ class Command(TerminalCommand):
                 demo.generate(scenarios, self.stdout.write, look)
                 folder = settings.VAR_DIR / "demo"
                 text, files = demo.vote_and_rate(scenarios, folder)
+                send_charts(Snapshot.objects.latest("made_at").pk)
                 drives = demo.start_drives()
                 self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
                 if drives:
