@@ -7,6 +7,7 @@ book, as it is or packed by gzip; what it is follows from its content, not from 
 import csv
 import gzip
 import io
+import itertools
 import json
 import re
 import unicodedata
@@ -36,11 +37,19 @@ _MOST_ROWS, _MOST_COLUMNS = 2**20, 2**10
 """Of an Excel sheet; columns beyond are passed over."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UNSEEN = re.compile(
-    "[\u00ad\u034f\u061c\u180b-\u180f\u200b-\u200f\u202a-\u202e\u2060-\u206f\ufe00-\ufe0f\ufeff"
+    "[\u00ad\u034f\u061c\u115f\u1160\u180b-\u180f\u200b-\u200f\u202a-\u202e\u2060-\u206f\u2800"
+    "\u3164\ufe00-\ufe0f\ufeff\uffa0"
     "\U000e0000-\U000e0fff]"
 )
 """Characters without a picture of their own: zero-width, of direction, variants."""
+_ALIKE = str.maketrans(
+    "АВЕКМНОРСТУХасеорхуіѕјΑΒΕΖΗΙΚΜΝΟΡΤΥΧο\u2010\u2011\u2012\u2013\u2212’‘",
+    "ABEKMHOPCTYXaceopxyisjABEZHIKMNOPTYXo-----''",
+)
+"""Cyrillic and Greek letters, hyphens and quotes that look as those of ASCII."""
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
+_NO_VALUES = frozenset({"nan", "<na>", "#n/a", "#ref!", "#value!", "#name?", "#null!", "#num!"})
+"""What pandas and Excel write where there is no value."""
 NO_VOTES = "there are no votes in it"
 LATIN_1_NOTE = (
     "The file is not UTF-8; it was read as Latin-1 (Windows-1252). If names look wrong, save it "
@@ -75,7 +84,7 @@ class VotesTable:
         """Refuse columns in which a cell says nothing: empty, or what other programs write."""
         for name in names:
             for place, cell in enumerate(self.columns[name]):
-                if not cell or cell.lower() == "nan":
+                if not cell or cell[:9].lower() in _NO_VALUES:
                     raise self.refuse(place, f"{name} is {cell or 'empty'}")
 
 
@@ -103,7 +112,7 @@ def read_table(path: Path) -> VotesTable:
             raise table.refuse(place, f"the winner {winner!r} is none of {', '.join(WINNERS)}")
         if model_a == model_b:
             raise table.refuse(place, f"{model_a!r} is compared with itself")
-    return table
+    return replace(table, note=" ".join(filter(None, [table.note, _find_alike(table)])))
 
 
 def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparisons, int | None]:
@@ -155,6 +164,16 @@ _BROKEN_ARCHIVE = (
 """What gzip, zip and Excel's XML raise where they are not what they should be."""
 
 
+def _find_alike(table: VotesTable) -> str:
+    """Return a note on two names that are not the same and look nearly so, empty without any."""
+    seen = dict[str, str]()
+    for name in sorted({*table.columns["model_a"], *table.columns["model_b"]}):
+        other = seen.setdefault(unicodedata.normalize("NFKC", name).translate(_ALIKE), name)
+        if other != name:
+            return f"{other!a} and {name!a} look alike and count as two names."
+    return ""
+
+
 def _load(path: Path) -> VotesTable:
     """Return the known columns of a file with their values as they are."""
     content = path.read_bytes()
@@ -198,15 +217,15 @@ def _read_csv(text: str) -> VotesTable:
     from pyarrow import csv as arrow_csv
     from pyarrow import string
 
-    lines, above, separators = io.StringIO(text, newline=""), 1, SEPARATORS
+    lines, above, separators = io.StringIO(text, newline=""), 0, SEPARATORS
     while not (line := lines.readline()).strip():
         above += 1
     # Excel's word on the separator stands before the head.
     if stated := re.fullmatch(r"\"?sep=([^\"\w])\"?[,;\t|]*\s*", line, re.ASCII | re.IGNORECASE):
-        line, above, separators = lines.readline(), above + 1, stated[1]
-    separator, header = _read_header(line, separators)
+        above, separators = above + 1, stated[1]
+    separator, header, above = _read_header(text, above, separators)
     _find_columns(header)
-    if not lines.read().strip():
+    if not any(line.strip() for line in _lines_below(text, above)):
         raise VotesFileUnreadable(NO_VOTES)
     table = arrow_csv.read_csv(
         io.BytesIO(text.encode()),
@@ -223,15 +242,17 @@ def _read_csv(text: str) -> VotesTable:
     return VotesTable(columns=table.to_pydict(), lines=range(first, first + table.num_rows))
 
 
-def _read_header(line: str, separators: str) -> tuple[str, list[str]]:
-    """Return the separator that finds most of the known columns, and the columns."""
-    headers = [
-        (
-            separator,
-            [_column_name(name) for name in next(csv.reader([line], delimiter=separator), [])],
-        )
-        for separator in separators
-    ]
+def _lines_below(text: str, above: int) -> Iterator[str]:
+    return itertools.islice(io.StringIO(text, newline=""), above, None)
+
+
+def _read_header(text: str, above: int, separators: str) -> tuple[str, list[str], int]:
+    """Return the separator that finds most of the known columns, these, and the lines so far."""
+    headers = []
+    for separator in separators:
+        reader = csv.reader(_lines_below(text, above), delimiter=separator)
+        names = [_column_name(name) for name in next(reader, [])]
+        headers.append((separator, names, above + reader.line_num))
     return max(headers, key=lambda header: len({*header[1]} & {*_KNOWN}))
 
 
@@ -256,11 +277,30 @@ def _read_json(text: str) -> VotesTable:
 def _read_parquet(content: io.BytesIO) -> VotesTable:
     from pyarrow import parquet
 
-    names = parquet.read_schema(content).names
-    places = _find_columns([_column_name(name) for name in names])
-    table = parquet.read_table(content, columns=[names[place] for place in places.values()])
-    columns = {name: table[names[place]].to_pylist() for name, place in places.items()}
+    schema = parquet.read_schema(content)
+    names, places = schema.names, _find_columns([_column_name(name) for name in schema.names])
+    texts = [names[at] for at in places.values() if str(schema.types[at]).endswith("string")]
+    file = parquet.ParquetFile(content, read_dictionary=texts)
+    groups = [file.metadata.row_group(number) for number in range(file.num_row_groups)]
+    parts = [group.column(at) for group in groups for at in range(group.num_columns)]
+    wanted = [names[at] for at in places.values()]
+    sizes = [one.total_uncompressed_size for one in parts if one.path_in_schema in wanted]
+    _check_size(sum(sizes))
+    # A dictionary counts once there however often it is named: a cell of CSV has two bytes.
+    _check_size(2 * file.metadata.num_rows * len(places))
+    table = file.read(columns=wanted)
+    columns = {name: _list_cells(table[names[place]]) for name, place in places.items()}
     return VotesTable(columns=columns, lines=range(2, table.num_rows + 2))
+
+
+def _list_cells(column: Any) -> list[Any]:
+    """Return the values of a column of Arrow, one object for those of a dictionary."""
+    cells = list[Any]()
+    for chunk in column.chunks:
+        values = getattr(chunk, "dictionary", chunk).to_pylist()
+        named = chunk.indices.to_pylist() if hasattr(chunk, "indices") else range(len(values))
+        cells += [None if at is None else values[at] for at in named]
+    return cells
 
 
 def _read_book(content: io.BytesIO) -> VotesTable:
@@ -288,7 +328,7 @@ def _read_book(content: io.BytesIO) -> VotesTable:
 def _sheet_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Yield the numbers and the values of rows that are not blank, all of one length."""
     rows = sheet.iter_rows(max_row=_MOST_ROWS, max_col=_MOST_COLUMNS, values_only=True)
-    return ((number, row) for number, row in enumerate(rows, start=1) if any(row))
+    return ((number, row) for number, row in enumerate(rows, start=1) if {*row} - {None, ""})
 
 
 def _refuse_old_book(content: io.BytesIO) -> VotesTable:
@@ -323,9 +363,11 @@ def _clean_cells(table: VotesTable) -> VotesTable:
     columns: dict[str, list[str]] = {}
     for name, cells in table.columns.items():
         texts = [cell if type(cell) is str else _as_text(cell) for cell in cells]
-        for place, text in enumerate(texts):
-            if text is None or _NO_TEXT.search(text):
-                raise table.refuse(place, f"{name} is no text: {cells[place]!r:.40}")
+        # Each text once: a column may name a long one a million times.
+        broken = {text for text in set(texts) if text is None or _NO_TEXT.search(text)}
+        if broken:
+            place = next(at for at, text in enumerate(texts) if text in broken)
+            raise table.refuse(place, f"{name} is no text: {cells[place]!r:.40}")
         clean = {text: _clean(text or "") for text in set(texts)}
         columns[name] = [clean[text] for text in texts]
     filled = [place for place, row in enumerate(zip(*columns.values(), strict=True)) if any(row)]

@@ -164,12 +164,12 @@ class Log:
             InvalidDocument: No such frame, no ego in it, a number that is none, or a part of the
                 map without a shape.
         """
-        origin = self._ego_pose(frame)
+        log, doubts = _bound(self)
+        origin = log._ego_pose(frame)
         city, map_notes = complete_map(self.map_at(frame))
         road = road_around(city, origin, reach_m)
         if city.doubts.notes and not (road.lanes or road.connectors or road.far):
-            raise fault_at(city.place, "; ".join(city.doubts.notes))
-        log = replace(self, tracks=[_bound(track, city.doubts) for track in self.tracks])
+            raise fault_at(city.place, "; ".join(["there is no lane", *city.doubts.notes]))
         tracks, names = _tracks(log, frame, origin)
         scene = Scene(
             name=name,
@@ -184,7 +184,7 @@ class Log:
             connectors=road.connectors,
             areas=road.areas,
         )
-        notes = [*map_notes, *self.notes, *city.doubts.notes]
+        notes = [*map_notes, *self.notes, *city.doubts.notes, *doubts.notes]
         sizeless = sum(not track.has_size for track in self.tracks)
         if sizeless:
             sizes = f"{sizeless} of {len(self.tracks)} objects"
@@ -242,7 +242,9 @@ class Log:
             raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
         if not np.isfinite(self.ego[frame]).all():
-            raise fault_at("frame", f"{frame} has no ego in it")
+            raise fault_at(
+                "frame", f"{frame} has no ego in it, or one beyond the earth or 100 m/s"
+            )
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
@@ -404,11 +406,17 @@ def place_on_lanes(scene: Scene) -> Scene:
 # Private
 
 
-def _bound(track: LoggedTrack, doubts: Doubts) -> LoggedTrack:
-    """The track without the states in which nothing on earth is."""
-    odd = np.any(np.abs(track.states) > [FURTHEST, FURTHEST, FURTHEST, FASTEST_MPS], axis=1)
-    doubts.assume("A state beyond the earth, or faster than 100 m/s, was left out", odd.sum())
-    return replace(track, states=np.where(odd[:, None], np.nan, track.states))
+def _bound(log: Log) -> tuple[Log, Doubts]:
+    """The log without states in which nothing on earth is, and what to note of that."""
+    doubts, most = Doubts(), [FURTHEST, FURTHEST, FURTHEST, FASTEST_MPS]
+
+    def bound(states: FloatArray) -> FloatArray:
+        odd = np.any(np.abs(states) > most, axis=1)
+        doubts.assume("A state beyond the earth, or faster than 100 m/s, was left out", odd.sum())
+        return np.where(odd[:, None], np.nan, states)
+
+    tracks = [replace(track, states=bound(track.states)) for track in log.tracks]
+    return replace(log, ego=bound(log.ego), tracks=tracks), doubts
 
 
 def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict[str, str]]:
@@ -416,8 +424,6 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict
 
     Who is there at t0 comes first, then by time; within one step the nearest.
     """
-    if (np.abs(log.ego) > FURTHEST).any():
-        raise fault_at("ego", f"has a number over {FURTHEST:.0e}")
     met = []
     ego = log.ego[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.

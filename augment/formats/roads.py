@@ -26,6 +26,10 @@ RADIUS_M = 150.0
 """Map and agents further from the ego than this are left out, but for a reader's own reach."""
 LARGEST_M = 100_000.0
 """No scene is larger."""
+WIDEST_M = 100.0
+"""No lane is wider."""
+JITTER_M = 0.2
+"""A shorter step back is an inaccuracy of the map."""
 SPACING_M = 2.0
 SAME_POINT_M = 0.05
 
@@ -157,6 +161,13 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
         width_m = width_between(line, left, right)
     if line is None or width_m is None:
         raise ValueError("has neither boundaries nor a width")
+    if not 0.001 <= width_m <= WIDEST_M:
+        raise ValueError(f"is {width_m:g} m wide")
+    ahead = np.diff(line.points_m, axis=0)
+    ahead = ahead[np.hypot(*ahead.T) > JITTER_M]
+    steps_m = np.hypot(*ahead.T)
+    if (np.sum(ahead[:-1] * ahead[1:], axis=1) < -0.9 * steps_m[:-1] * steps_m[1:]).any():
+        raise ValueError("folds back on itself")
     distance_m = line.project(0.0, 0.0).distance_m
     if distance_m > reach_m:
         return None
@@ -165,7 +176,7 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
         line=line,
         left=left,
         right=right,
-        width_m=min(max(round(width_m, 3), 0.001), 100.0),
+        width_m=round(width_m, 3),
         distance_m=distance_m,
     )
 

@@ -8,7 +8,7 @@ What is too long is cut here, at the border: a run and its replay from the store
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
@@ -41,12 +41,15 @@ _KINDS = {"refusal": "refusal"} | dict.fromkeys(
 )
 _WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal", "parts")
 """Names under which a part of a message holds its text."""
-_CACHED = (
-    *("cached_tokens", "num_cached_tokens", "prompt_cache_hit_tokens", "cached_content_tokens"),
-    *("cache_read_input_tokens", "cache_read_tokens"),
+_DETAILS = ("prompt_tokens_details", "input_tokens_details")
+_PLACES = ("", *(f"{name}." for name in _DETAILS))
+_CACHED_NAMES = (
+    "cached_tokens num_cached_tokens prompt_cache_hit_tokens cached_content_tokens "
+    "cached_content_token_count cache_read_input_tokens cache_read_tokens"
 )
-_DETAILS = ("", "prompt_tokens_details.", "input_tokens_details.")
-_CREATED = ("cache_creation_input_tokens", "cache_creation_tokens", "cache_write_tokens")
+_CACHED = [place + name for place in _PLACES for name in _CACHED_NAMES.split()]
+_CREATED_NAMES = "cache_creation_input_tokens cache_creation_tokens cache_write_tokens"
+_CREATED = [place + name for place in _PLACES for name in _CREATED_NAMES.split()]
 
 _PASSING = frozenset({408, 409, 425, 429})
 _SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
@@ -327,22 +330,19 @@ def _read_usage(
     Zeros are unknown. Gateways to Anthropic leave what came from the cache out of the prompt: it
     is then more than the prompt, or what lacks to the total or to what was sent.
     """
+    counts = dict(usage)
+    for name in _DETAILS:
+        details = _read(doubts, usage, name, dict, "usage.") or {}
+        counts |= {f"{name}.{inner}": value for inner, value in details.items()}
 
-    def count(*names: str, parts: Iterable[str] = ("",)) -> int | None:
-        values = [
-            (f"{part}{name}", counts.get(f"{part}{name}")) for part in parts for name in names
-        ]
-        rows = ((value, f"usage.{path}", 0, MOST_TOKENS) for path, value in values)
+    def count(*names: str) -> int | None:
+        rows = ((counts.get(name), f"usage.{name}", 0, MOST_TOKENS) for name in names)
         return max(doubts.read_all(_ANSWER, read_whole, rows), default=None)
 
-    counts = _name_counts(usage)
-    for name in _DETAILS[1:]:
-        details = _read(doubts, counts, name.removesuffix("."), dict, "usage.") or {}
-        counts |= {f"{name}{key}": value for key, value in _name_counts(details).items()}
     prompt = count("prompt_tokens", "input_tokens")
-    completion = count("completion_tokens", "output_tokens", "candidates_tokens")
-    cached = count(*_CACHED, parts=_DETAILS)
-    beside = (cached or 0) + (count(*_CREATED, parts=_DETAILS) or 0)
+    completion = count("completion_tokens", "output_tokens")
+    cached = count(*_CACHED)
+    beside = (cached or 0) + (count(*_CREATED) or 0)
     total, least = count("total_tokens"), FAR_BELOW * least_prompt
     if usage and not any("tokens" in name for name in counts):
         doubts.faults[_ANSWER].append(f"usage has no count of tokens: {shorten(str(usage), 100)}")
@@ -360,12 +360,6 @@ def _read_usage(
             f"the endpoint counted {prompt} tokens of a prompt that has at least {least_prompt}"
         )
     return prompt or None, completion, cached
-
-
-def _name_counts(usage: Mapping[str, object]) -> dict[str, object]:
-    """Return counts by OpenAI's kind of names: promptTokenCount as prompt_tokens."""
-    names = {name: re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in usage}
-    return {names[name].replace("token_count", "tokens"): usage[name] for name in usage}
 
 
 def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:

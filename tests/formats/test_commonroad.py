@@ -164,10 +164,14 @@ OUTSIDE = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><commonRoad>&a;
         (OUTSIDE, "declares a document type"),
         ("<osm/>", "is 'osm' of version '', not commonRoad"),
         (newer().replace('timeStepSize="0.1"', 'timeStepSize="-1"'), "number from 0.001 to 10"),
+        (newer().replace("<exact>3.0<", "<exact>300<"), "beyond the earth or 100 m/s"),
     ],
 )
 def test_hostile_and_broken_files_are_refused(tmp_path: Path, text: str, said: str) -> None:
     assert said in fault_of(tmp_path, text)
+
+
+BACK = "<point><x>0</x><y>60</y></point>"
 
 
 # A good file with one part changed, the note on it, and what is left: lanes, connectors, agents.
@@ -183,6 +187,38 @@ def test_hostile_and_broken_files_are_refused(tmp_path: Path, text: str, said: s
         (">11.5<", ">fast<", "speed limits (1); first trafficSign 40", (2, 1, 2)),
         ("<length>4.4</length>", "", "shapes (2); first obstacle 70.length", (2, 1, 2)),
         ("sidewalk", "moon", "types of lanelets (1); first lanelet 4: unknown", (3, 1, 2)),
+        ("<y>90.0</y></point>", f"<y>90.0</y></point>{BACK}", "lanelet.3: folds back", (1, 1, 2)),
+        ('id="3"', 'id="2"', "Of two lanelets with one id the last counts", (1, 1, 2)),
+        (
+            'trafficSignRef ref="40"',
+            'trafficSignRef ref="41"',
+            "A sign that is named is n",
+            (2, 1, 2),
+        ),
+        (
+            "<laneletType>sidewalk<",
+            "<userOneWay>bicycle</userOneWay><laneletType>urban<",
+            "left out: bicycle lanes",
+            (2, 1, 2),
+        ),
+        (
+            "<laneletType>sidewalk<",
+            "<userBidirectional>car</userBidirectional><laneletType>urban<",
+            "that cars use both ways",
+            (3, 1, 2),
+        ),
+        (
+            "<laneletType>sidewalk<",
+            "<userOneWay>yeti</userOneWay><laneletType>urban<",
+            "users of lanelets (1); first lanelet 4: unknown 'yeti'",
+            (3, 1, 2),
+        ),
+        (
+            "</staticObstacle>",
+            f"<trajectory>{state(2, 31, 0)}</trajectory></staticObstacle>",
+            "The motion of what is static was left out",
+            (2, 1, 2),
+        ),
     ],
 )
 def test_one_bad_part_is_left_out_with_a_note(
@@ -226,6 +262,7 @@ def test_a_limit_is_what_its_sign_and_unit_say(
         ('trafficLight id="50"', 'trafficLight id="51"', TrafficLight.UNKNOWN),
         ("<direction>all<", "<direction>left<", TrafficLight.NONE),
         ('<trafficLightRef ref="50"/>', "", TrafficLight.NONE),
+        ('<trafficLightRef ref="50"/>', '<trafficLightRef ref="L"/>', TrafficLight.UNKNOWN),
     ],
 )
 def test_every_way_to_name_a_light_gives_it_to_what_it_governs(
@@ -236,7 +273,8 @@ def test_every_way_to_name_a_light_gives_it_to_what_it_governs(
     assert connector.traffic_light == light
     notes = " ".join(reading.notes)
     assert ("of unknown state" in notes) == (light == TrafficLight.UNKNOWN)
-    assert ("governs no lane" in notes) == (light == TrafficLight.NONE or 'id="51"' in odd)
+    idle = light == TrafficLight.NONE or 'id="51"' in odd or 'ref="L"' in odd
+    assert ("governs no lane" in notes) == idle
 
 
 POINT = "<point><x>0</x><y>11</y></point>"
@@ -245,6 +283,9 @@ DISC = "<circle><radius>2</radius><center><x>0</x><y>12</y></center></circle>"
 CORNERS = ((-3, 10), (3, 10), (0, 16))
 TRIANGLE = "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in CORNERS)
 SPEED, UP = "<velocity>5</velocity>", "<orientation>1.5708</orientation>"
+OVER_THE_END = (
+    "<orientation><intervalStart>3</intervalStart><intervalEnd>-3</intervalEnd></orientation>"
+)
 SPEEDS = "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd></velocity>"
 
 
@@ -263,6 +304,7 @@ SPEEDS = "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd>
         (DISC, SPEEDS + UP, (12, 0, 1.5708, 5)),
         (f"<polygon>{TRIANGLE}</polygon>", SPEED + UP, (12, 0, 1.5708, 5)),
         ("<lanelet ref='2'/>", SPEED + UP, (30, 0, 1.5708, 5)),
+        (POINT, SPEED + OVER_THE_END, (11, 0, math.pi, 5)),
     ],
 )
 def test_a_state_may_be_given_in_every_way_of_the_format(
@@ -279,6 +321,14 @@ def test_a_state_may_be_given_in_every_way_of_the_format(
     )
 
 
+def test_a_position_that_names_no_lanelet_costs_its_owner_alone(tmp_path: Path) -> None:
+    place = "<position><lanelet ref='x&apos;]'/></position>"
+    made = re.sub("<position>.*?</position>", place, newer(), count=1)
+    reading = read(tmp_path, made)
+    assert "objects (1); first obstacle 70.position" in " ".join(reading.notes)
+    assert len(reading.scene.agents) == 1
+
+
 def test_shapes_of_an_obstacle_become_the_box_around_them(tmp_path: Path) -> None:
     part = (
         "<rectangle><length>{}</length><width>2</width><originXShift>{}</originXShift></rectangle>"
@@ -289,7 +339,7 @@ def test_shapes_of_an_obstacle_become_the_box_around_them(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("country", "side"), [("GBR", "left"), ("C-JPN", "left"), ("ZAM", "right")]
+    ("country", "side"), [("GBR", "left"), ("C-JPN", "left"), ("ZAM", "right"), ("bmu", "left")]
 )
 def test_the_country_tells_the_side_where_the_lanes_do_not(
     tmp_path: Path, country: str, side: str

@@ -151,6 +151,12 @@ def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) ->
             "lanes (1); first map_features.q: a line needs",
         ),
         ({"dynamic_map_states": {"q": {"state": {"object_state": ["BLUE"]}}}}, "'BLUE'"),
+        ({"dynamic_map_states": {"q": {"state": {"object_state": []}}}}, "governs no lane"),
+        (
+            {"metadata": {"current_time_index": 9, "x": {(1, 2): 3}}},
+            "current times (1); first cur",
+        ),
+        ({"metadata": {"ts": None}}, "taken as 0.1 s apart"),
     ],
 )
 def test_odd_parts_are_left_out_with_a_note(
@@ -162,5 +168,7 @@ def test_odd_parts_are_left_out_with_a_note(
     reading = read(store(tmp_path, made))
     assert said in " ".join(reading.notes)
     assert (len(reading.scene.lanes), len(reading.scene.agents)) == (2, 2)
+    made["tracks"]["ego"]["state"]["heading"] = None
+    assert "ego is no ego. Not understood" in fault_of(store(tmp_path, made))
     del made["tracks"]["ego"]
     assert "unknown 'ego'; known" in fault_of(store(tmp_path, made))

@@ -80,6 +80,7 @@ def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
         (["a,b,"], "line 2: winner is empty"),
         (["a,b,tie", "a,,tie"], "line 3: model_b is empty"),
         (["a,b,tie", "a, NaN ,tie"], "line 3: model_b is NaN"),
+        (["a,b,tie", "a,#REF!,tie"], "line 3: model_b is #REF!"),
         (["a,b,tie", " a ,a,tie"], "line 3: 'a' is compared with itself"),
         (["a,b,tie", "a,b,tie,,x"], "Row #3: Expected 3 columns, got 5"),
         (["a,b,tie", "a,b"], "Row #3: Expected 3 columns, got 2"),
@@ -103,6 +104,34 @@ def test_a_wrong_line_is_named_with_what_is_allowed(
 def test_a_missing_or_double_column_is_named(votes: Any, head: str, sentence: str) -> None:
     with pytest.raises(CsvNotRated, match=sentence):
         run(file=votes("a,b,tie", head=head))
+
+
+def test_a_head_may_run_over_two_lines(votes: Any) -> None:
+    rows = [f"{line},x" for line in PLAIN]
+    plain = document(votes(*rows, head=f"{HEAD},more"), rounds=100)
+    assert document(votes(*rows, head=f'{HEAD},"a long\nnote"'), rounds=100) == plain
+
+
+def _write_repeated(path: Path, rows: int, name: str) -> None:
+    """Write votes in which each column has one value, which Parquet stores once."""
+    places = pyarrow.array([0] * rows, pyarrow.int8())
+    cells = [name, "b", "tie"]
+    columns = [pyarrow.DictionaryArray.from_arrays(places, [cell]) for cell in cells]
+    parquet.write_table(pyarrow.table(columns, names=HEAD.split(",")), path)
+
+
+def test_a_parquet_file_unpacks_within_bounds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(votes_file, "MOST_UNPACKED", 2**20)
+    path = tmp_path / "votes.parquet"
+    for rows, name in ((2**20, "a"), (1, "a" * 2**21)):
+        _write_repeated(path, rows, name)
+        with pytest.raises(CsvNotRated, match="unpacks to more than 1 MB"):
+            run(file=str(path))
+    _write_repeated(path, 100_000, "a" * 2**19)
+    # 52 GB as texts of their own; a dictionary stays one.
+    assert {*map(len, votes_file.read_table(path).columns["model_a"])} == {2**19}
 
 
 def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
@@ -167,6 +196,11 @@ def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(
     names = ["R\u00f6ver 1", "Ro\u0308ver 1", " R\u00f6ver\u00a0 1", "R\u00f6\u200bver 1"]
     same = document(votes(*(f"{name},b,tie" for name in names)), rounds=100)
     assert [line["model"] for line in same["standings"]] == ["Röver 1", "b"]
+    for alike in ("\u0410", "\uff21"):
+        (note,) = [
+            one for one in document(votes(f"A,{alike},tie"))["notes"] if "look alike" in one
+        ]
+        assert "count as two names" in note
     path = tmp_path / "latin1.csv"
     path.write_bytes(f"{HEAD}\nRöver,b,tie\n".encode("latin-1"))
     latin = document(str(path), rounds=100)

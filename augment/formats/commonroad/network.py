@@ -22,12 +22,14 @@ from augment.formats.roads import middle_of, refuse_shape
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import turn_type_of
 
-SPEED_SIGNS = "274 274.1 R2-1 r301 3.24 R15 C43 B14 Ρ-32 P-32 B31 R4-1"
+SPEED_SIGNS = "274 274.1 R2-1 R301 3.24 R15 C43 B14 Ρ-32 P-32 R-32 B31 R4-1"
 """Highest speeds, values in m/s: of Germany and the countries without signs of their own (a zone
 too), the United States, Spain, Russia, Argentina, Belgium, France, Greece, Croatia, Australia."""
 LEFT_HAND = (
-    "AUS BGD BHS BRB BRN BTN BWA CYP FJI GBR GGY GUY HKG IDN IMN IND IRL JAM JEY JPN KEN LKA LSO "
-    "MAC MDV MLT MOZ MUS MWI MYS NAM NPL NZL PAK PNG SGP SUR SWZ SYC THA TTO TZA UGA ZAF ZMB ZWE"
+    "AIA ATG AUS BGD BHS BMU BRB BRN BTN BWA CCK COK CXR CYM CYP DMA FJI FLK GBR GGY GRD GUY HKG "
+    "IDN IMN IND IRL JAM JEY JPN KEN KIR KNA LCA LKA LSO MAC MDV MLT MOZ MSR MUS MWI MYS NAM NFK "
+    "NIU NPL NRU NZL PAK PNG SGP SHN SLB SUR SWZ SYC TCA THA TKL TLS TON TTO TUV TZA UGA VCT VGB "
+    "VIR WSM ZAF ZMB ZWE"
 )
 """Countries of benchmark ids (ISO 3166-1 alpha-3) in which people drive on the left."""
 AREA_OF = {
@@ -46,6 +48,10 @@ _DRIVEN = (
 )
 _TYPES = dict.fromkeys((*_DRIVEN.split(), *AREA_OF, *LEFT_OUT))
 _WAYS = dict.fromkeys(("same", "opposite"))
+_USERS = {"bicycle": "bicycleLane", "pedestrian": "sidewalk"} | dict.fromkeys(
+    ("vehicle", "car", "truck", "bus", "priorityVehicle", "motorcycle", "taxi", "train"), ""
+)
+"""Who may use a lanelet, and what it is for the type of one that is theirs alone."""
 COLOURS = {
     "green": TrafficLight.GREEN,
     "yellow": TrafficLight.YELLOW,
@@ -94,7 +100,10 @@ def network_of(root: Element, step: int) -> RoadMap:
 
     def read_by_id(tag: str, read: Callable[..., Value], *more: Any) -> dict[int, Value]:
         rows = ((one, f"{tag} {one.get('id')}", doubts, *more) for one in root.findall(tag))
-        return dict(doubts.read_all(f"{tag}s", _with_id, ((row[0], read, row) for row in rows)))
+        parts = doubts.read_all(f"{tag}s", _with_id, ((row[0], read, row) for row in rows))
+        twice = len(parts) - len(dict(parts))
+        doubts.assume(f"Of two {tag}s with one id the last counts", twice)
+        return dict(parts)
 
     limits = read_by_id("trafficSign", _limit, left_out)
     lights = read_by_id("trafficLight", _light, step)
@@ -113,7 +122,7 @@ def network_of(root: Element, step: int) -> RoadMap:
     for key, segment in segments.items():
         light, turn = shown.get(key, TrafficLight.NONE), inside.get(key)
         segments[key] = replace(segment, crosses=key in inside, turn=turn, light=light)
-    country = root.get("benchmarkID", "").removeprefix("C-")[:3]
+    country = root.get("benchmarkID", "").upper().removeprefix("C-")[:3]
     is_left = country in LEFT_HAND.split()
     return RoadMap(
         place="lanelet",
@@ -139,7 +148,7 @@ def _limit(sign: Element, place: str, doubts: Doubts, left_out: Counter[str]) ->
     """The limit of a sign that is one; other signs are left out."""
     limits = []
     for element in sign.findall("trafficSignElement"):
-        name = element.findtext("trafficSignID", "").strip()
+        name = element.findtext("trafficSignID", "").strip().upper()
         value = element.find("additionalValue")
         if name in SPEED_SIGNS.split() and value is not None:
             limits.append((value.text or "", place))
@@ -229,10 +238,17 @@ def _lanelet(
     edges = read_points(left, place), read_points(right, place)
     own = ((one.text or "", place) for one in element.findall("speedLimit"))
     known = doubts.read_all("speed limits", foreign.read_speed, own)
-    signed = [limits.get(sign) for sign in _references(element, "trafficSignRef", doubts)]
-    known += [limit for limit in signed if limit is not None]
+    signs = _references(element, "trafficSignRef", doubts)
+    doubts.assume("A sign that is named is not there", len({*signs} - limits.keys()))
+    known += [limit for sign in signs if (limit := limits.get(sign)) is not None]
     kinds = {(kind.text or "").strip() for kind in element.findall("laneletType")}
     doubts.doubt_unknown("types of lanelets", _TYPES, sorted(kinds), place)
+    users = [(one.tag, (one.text or "").strip()) for one in element if one.tag[:4] == "user"]
+    doubts.doubt_unknown("users of lanelets", _USERS, [user for _, user in users], place)
+    if all(_USERS.get(user) for _, user in users):
+        kinds |= {_USERS[user] for _, user in users}
+    is_both = any(_USERS.get(user) == "" and tag != "userOneWay" for tag, user in users)
+    doubts.assume("A lanelet that cars use both ways is one of its own direction", is_both)
     beside = (*element.findall("adjacentLeft"), *element.findall("adjacentRight"))
     ways = [one.get("drivingDir") for one in beside]
     doubts.doubt_unknown("neighbours of lanelets", _WAYS, ways, place)
@@ -251,11 +267,12 @@ def _lanelet(
     )
     with refuse_shape(place):
         turn = turn_type_of(middle_of(segment))
-    lights = [_references(element, f"{at}trafficLightRef", doubts) for at in ("", "stopLine/")]
+    paths = "trafficLightRef", "stopLine/trafficLightRef"
+    lights = [number for path in paths for number in _references(element, path, doubts)]
+    # One whose number can't be read is dark, and not none.
+    lights += [-1] * (len([one for path in paths for one in element.findall(path)]) > len(lights))
     outline = np.vstack([edges[0], edges[1][::-1]])
-    return Lanelet(
-        segment=segment, turn=turn, kinds=kinds, lights={*lights[0], *lights[1]}, outline=outline
-    )
+    return Lanelet(segment=segment, turn=turn, kinds=kinds, lights={*lights}, outline=outline)
 
 
 def _find_inside(

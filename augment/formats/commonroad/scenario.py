@@ -40,6 +40,7 @@ SCENERY = (
 ASSUMED = (
     f"The ego is assumed to be {EGO_LENGTH_M:g} m long.",
     "The ego's motion was not recorded: drives are measured by an IDM drive.",
+    "The goal of the planning problem has no place in a scene and was left out.",
 )
 PROBLEM = "planning problem"
 _VEHICLES = ("car", "truck", "bus", "taxi", "priorityVehicle", "parkedVehicle", "motorcycle")

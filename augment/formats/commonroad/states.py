@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 from shapely.affinity import rotate, translate
 
-from augment.foreign import Doubts, FloatArray, fault_at, read_number
+from augment.foreign import Doubts, FloatArray, fault_at, read_number, read_whole
 from augment.formats.commonroad.network import read_points
 from augment.formats.reading import speeds
 
@@ -55,7 +55,9 @@ class StateReader:
         first = owner.find("initialState")
         if first is None:
             raise fault_at(place, "needs an initialState")
-        later = [] if stands else owner.findall("trajectory/*")
+        later = owner.findall("trajectory/*")
+        self.doubts.assume("The motion of what is static was left out", stands and bool(later))
+        later = [] if stands else later
         by_step = dict([self._state(first, place)])
         rows = ((element, place) for element in later)
         by_step |= dict(self.doubts.read_all("states", self._state, rows))
@@ -98,6 +100,8 @@ class StateReader:
             self.doubts.assume("An interval counts as its middle, of times as its start")
         elif tags not in ([], ["exact"]):
             raise fault_at(place, "needs an exact value, or an interval's start and end")
+        if name == "orientation" and numbers[-1] < numbers[0]:
+            numbers[-1] += 2.0 * np.pi  # over the end of the circle
         return numbers[0] if name == "time" else sum(numbers) / len(numbers)
 
     def _center(self, position: Element | None, place: str) -> tuple[float, float]:
@@ -115,10 +119,11 @@ class StateReader:
         """What a shape or lanelet covers in the file's frame."""
         if shape.tag != "lanelet":
             return cover(shape, place)
+        number = read_whole(shape.get("ref"), place)
         bounds = [
             read_points(bound, place).tolist()
             for side in ("leftBound", "rightBound")
-            for bound in self.root.iterfind(f"lanelet[@id='{shape.get('ref', '')[:20]}']/{side}")
+            for bound in self.root.iterfind(f"lanelet[@id='{number}']/{side}")
         ]
         if len(bounds) != 2 or not all(len(points) > 1 for points in bounds):
             raise fault_at(place, "names a lanelet that is not there, or has no inside")

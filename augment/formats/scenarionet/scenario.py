@@ -99,6 +99,7 @@ def _log(path: Path, item: str | None) -> Log:
     given = metadata.get("ts", metadata.get("timestep"))
     if given is None:
         length = description.get("length")
+        doubts.assume("Steps without times are taken as 0.1 s apart")
         given = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
     times_s = foreign.read_times(given, "metadata.ts")
     tracks, left_out = dict[str, LoggedTrack](), Counter[str]()
@@ -110,12 +111,16 @@ def _log(path: Path, item: str | None) -> Log:
                 left_out[kind] += 1
                 continue
             tracks[str(key)] = _track(str(key), track, len(times_s), doubts)
-    ego = foreign.look_up(tracks, str(metadata.get("sdc_id")), "metadata.sdc_id")
+    ego_id = str(metadata.get("sdc_id"))
+    if ego_id in map(str, description["tracks"].keys() - tracks.keys()):
+        raise fault_at("metadata.sdc_id", " ".join([f"{ego_id} is no ego.", *doubts.notes]))
+    ego = foreign.look_up(tracks, ego_id, "metadata.sdc_id")
     del tracks[ego.name]
     if ego.width_m > ego.length_m:
         doubts.assume("The ego's length and width were swapped and put right")
     current = metadata.get("current_time_index")
-    frame = doubts.read("current times", foreign.read_whole, current, "current_time_index")
+    bounds = "current_time_index", 0, len(times_s) - 1
+    frame = doubts.read("current times", foreign.read_whole, current, *bounds)
     texts = {
         name: doubts.read("names", foreign.read_as, values.get(name), str, name) or ""
         for values, name in (
@@ -203,6 +208,8 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
                 areas.append((AREA_OF[kind], foreign.read_finite(feature["polygon"], place, 2)))
             elif not kind.startswith(PASSED_OVER):
                 left_out["bicycle lanes" if kind == BICYCLE_LANE else kind] += 1
+    idle = len(lights.keys() - lanes.keys())
+    doubts.assume("A traffic light governs no lane that is there", idle)
     connectors = {key for key, lane in lanes.items() if lane["type"] == CONNECTOR}
     is_limit_meant = any(lanes[key].get("speed_limit_kmh") for key in lanes.keys() - connectors)
     for key in connectors:

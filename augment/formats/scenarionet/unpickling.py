@@ -142,7 +142,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, _Array):
         return _plain(value.value)
     if isinstance(value, dict):
-        return {_plain(key): _plain(one) for key, one in value.items()}
+        texts = ((str(key) if isinstance(key, tuple) else key, one) for key, one in value.items())
+        return {_plain(key): _plain(one) for key, one in texts}
     if isinstance(value, list | tuple | set):
         return [_plain(one) for one in value]
     if value is None or isinstance(value, str | bytes | int | float | np.ndarray):

@@ -78,10 +78,14 @@ class WaymoMotion(LogReader):
                 with doubts.about("objects"):
                     tracks[index] = _track(index, track, len(times_s), doubts)
             sdc = scenario.sdc_track_index if scenario.HasField("sdc_track_index") else None
+            if sdc is not None and sdc not in tracks and 0 <= sdc < len(scenario.tracks):
+                raise fault_at("sdc_track_index", " ".join([f"{sdc} is no ego.", *doubts.notes]))
             ego = foreign.look_up(tracks, sdc, "sdc_track_index")
             unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
             if not scenario.HasField("current_time_index"):
                 doubts.assume("A current step that is not given is the first")
+            bounds = "current_time_index", 0, len(times_s) - 1
+            current = scenario.current_time_index, *bounds
             name = scenario.scenario_id[:100].decode("ascii", errors="replace")
             yield Log(
                 times_s=times_s,
@@ -97,7 +101,7 @@ class WaymoMotion(LogReader):
                 title=f"Waymo Open Motion data set, {path.name}, scenario {name}",
                 licence=LICENCE,
                 item=str(number),
-                frame=scenario.current_time_index,
+                frame=doubts.read("current times", foreign.read_whole, *current) or 0,
                 notes=[*left_out_notes("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
             )
 
