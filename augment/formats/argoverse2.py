@@ -166,6 +166,7 @@ class ArgoverseMotion(LogReader):
         steps = table["timestep"]
         if not len(steps):
             raise fault_at(f"{file.name}: timestep", f"needs steps from 0 to {MOST_STEPS - 1}")
+        doubts.assume("No step is observed: the first is t0", not table["observed"].any())
         names = {"track_id": "track", "object_type": "kind", "timestep": "step"}
         names |= {"position_x": "x_m", "position_y": "y_m", "heading": "heading_rad"}
         speeds_mps = np.hypot(table["velocity_x"], table["velocity_y"])

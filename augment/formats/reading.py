@@ -7,7 +7,7 @@ millimetres, so that documents can be read by people. T steps.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from augment import foreign
+from augment.errors import InvalidDocument
 from augment.foreign import FASTEST_MPS, FURTHEST, Doubts, FloatArray, fault_at
 from augment.formats.road_map import RoadMap, complete_map
 from augment.formats.roads import RADIUS_M, middle_of, refuse_shape, road_around
@@ -161,8 +162,7 @@ class Log:
             reach_m: How far from the ego the map goes.
 
         Raises:
-            InvalidDocument: No such frame, no ego in it, a number that is none, or a part of the
-                map without a shape.
+            InvalidDocument: There is no such frame, no ego in it, or no lane.
         """
         log, doubts = _bound(self)
         origin = log._ego_pose(frame)
@@ -189,11 +189,10 @@ class Log:
         if sizeless:
             sizes = f"{sizeless} of {len(self.tracks)} objects"
             notes.append(f"{sizes} got the usual size of their class.")
-        here = self.ego[frame, :2]
         if not _is_size(*self.ego_size_m):
             notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
-        away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in log.tracks]
-        far = road.far + sum(bool(distance_m > reach_m) for distance_m in away_m)
+        places = np.array([track.states[frame, :2] for track in log.tracks]).reshape(-1, 2)
+        far = road.far + int((np.hypot(*(places - log.ego[frame, :2]).T) > reach_m).sum())
         if far:
             notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
         if road.side_is_assumed:
@@ -291,6 +290,21 @@ class Reader(ABC):
         Raises:
             InvalidDocument: The input breaks its format, or has no such moment.
         """
+
+
+def read_each(parts: Iterable[Callable[[], Log]]) -> Iterator[Log]:
+    """Yield the logs that can be read, with a note on what could not; raises if none can."""
+    faults, log = list[InvalidDocument](), None
+    for part in parts:
+        try:
+            log = part()
+        except InvalidDocument as fault:
+            faults.append(fault)
+            continue
+        lost = [f"Passed over as unreadable: {len(faults)}; {fault}." for fault in faults[:1]]
+        yield replace(log, notes=[*log.notes, *lost])
+    if faults and log is None:
+        raise faults[0]
 
 
 class LogReader(Reader):
@@ -449,8 +463,7 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict
                 states=_local(track.states[frame:], origin),
             )
         )
-    names = {track.agent_id: one[2] for track, one in zip(tracks, met, strict=True)}
-    return tuple(tracks), names
+    return tuple(tracks), {track.agent_id: one[2] for track, one in zip(tracks, met, strict=True)}
 
 
 def _local(states: FloatArray, origin: Pose) -> FloatArray:

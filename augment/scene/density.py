@@ -140,6 +140,14 @@ def fit_boxes(scene: Scene, modification: Modification) -> Modification:
     return replace(modification, added=tuple(fitted))
 
 
+def usual_size_m(scene: Scene, kind: AgentType) -> tuple[float, float]:
+    """Return the length and width of what is added; a vehicle of interPlan's has its next box."""
+    rules = scene.options.interplan
+    if rules is None or rules.boxes_m is None or kind is not AgentType.VEHICLE:
+        return LENGTH_WIDTH_M[kind]
+    return next(iter(rules.boxes_m), scene.ego.size_m)
+
+
 # Private
 
 

@@ -28,7 +28,8 @@ from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts import vectors
 from augment.prompts.calls import TOOL
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
+from augment.scene.density import usual_size_m
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.motion import LENGTH_S, Motion, Movement
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
@@ -265,7 +266,7 @@ class PoseTool:
         Raises:
             ToolError: Its motion can't be carried out.
         """
-        length_m, width_m = LENGTH_WIDTH_M[object_type]
+        length_m, width_m = usual_size_m(self._shown, object_type)
         agent = TrafficAgent(
             id=vectors.short_names(self._shown).next_agent,
             type=object_type,
@@ -406,7 +407,7 @@ class PoseTool:
 
     def _taken_by(self, pose: Pose, object_type: AgentType, gap_m: float = 0.0) -> list[str]:
         """Return the ids of those whose boxes an object would overlap, with a gap at its ends."""
-        length_m, width_m = LENGTH_WIDTH_M[object_type]
+        length_m, width_m = usual_size_m(self._shown, object_type)
         box = Box(pose=pose, length_m=length_m + 2.0 * gap_m, width_m=width_m)
         reach_m = math.hypot(box.length_m, box.width_m) / 2.0
         return [

@@ -60,6 +60,20 @@ def test_each_record_is_an_item_and_each_step_a_moment(file: Path) -> None:
     assert "frame: 3 is not there" in fault_of(file, frame=3)
 
 
+def test_a_record_that_breaks_the_format_costs_no_other(tmp_path: Path) -> None:
+    bad, good = message((5, b"bad")), scenario()
+    path = write(tmp_path / "x.tfrecord", bad, good, bad, good)
+    assert {one.item for one in WaymoMotion().moments(path, every_s=1.0)} == {"1", "3"}
+    reading = read(path)
+    assert reading.moment.item == "1"
+    assert "Passed over as unreadable: 1; This recording" in " ".join(reading.notes)
+    assert "timestamps_seconds" in fault_of(path, "2")
+    idle = (7, message((1, message((1, 77), (2, 4)))))
+    notes = read(write(path, scenario(idle, (10, 9)))).notes
+    assert "A traffic light governs no lane that is there." in notes
+    assert "current times (1)" in " ".join(notes)
+
+
 def test_wrong_checksums_and_cut_off_files_are_refused(file: Path) -> None:
     whole = file.read_bytes()
     for place, part in ((3, "length"), (40, "payload")):

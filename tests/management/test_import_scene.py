@@ -9,6 +9,7 @@ from django.core.management.base import CommandError
 from augment.models import BaseScene, Event
 from augment.scene.codec import scene_to_document
 from tests.formats.av2_logs import write_log
+from tests.formats.test_commonroad import newer
 from tests.scenes import junction
 
 pytestmark = pytest.mark.django_db
@@ -49,6 +50,15 @@ def test_a_scene_of_the_own_format_is_imported(tmp_path: Path) -> None:
     )
     said = refused("json", file, "--slug", "x", "--frame", 3)
     assert "a JSON scene has no parts and frame 0 alone" in said
+
+
+def test_an_ego_is_put_on_a_lane_of_a_map_without_one(tmp_path: Path) -> None:
+    file = tmp_path / "made.xml"
+    file.write_text(newer(more="").replace("<type>car<", "<type>bus<"))
+    assert "Or put an ego on a lane: --ego-at LANE,S" in refused("commonroad", file, "--slug", "x")
+    out = run("commonroad", file, "--slug", "put", "--ego-at", "1,12.5")
+    assert "The ego was put on lane 1, 12.5 m along it; nobody recorded it." in out
+    assert BaseScene.objects.get(slug="put").document["ego"]["speed_mps"] == 0.0
 
 
 def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:

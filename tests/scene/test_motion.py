@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.density import fit_boxes, keep_clear, spawn_traffic
+from augment.scene.density import fit_boxes, keep_clear, spawn_traffic, usual_size_m
 from augment.scene.entities import (
     InterplanRules,
     Lane,
@@ -187,6 +187,8 @@ def test_boxes_are_taken_one_after_the_other_and_a_change_gets_what_is_left() ->
     assert [one.size_m for one in fitted.added] == wanted
     assert fit_boxes(before, fitted) == fitted
     assert fit_boxes(two_way(), Modification(added=added)).added == added
+    sizes_m = [usual_size_m(one, added[0].type) for one in (before, two_way())]
+    assert sizes_m == [(9.0, 2.5), (4.8, 2.0)]
 
 
 def test_nobody_is_spawned_who_would_run_into_the_change_within_two_seconds() -> None:

@@ -11,7 +11,7 @@ from augment.errors import ToolError
 from augment.geometry.polyline import Polyline
 from augment.prompts.vectors import control_points, short_names, with_short_ids
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AreaKind, Scene, SceneOptions, TurnType
+from augment.scene.entities import AreaKind, InterplanRules, Scene, SceneOptions, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import LanePath
 from augment.scene.planned_mover import check_lane_path
@@ -49,6 +49,14 @@ def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
         "route": ["Lane1"],
         "start_lateral_m": 0.0,
     }
+
+
+def test_a_place_is_taken_by_the_box_that_interplan_will_use() -> None:
+    rules = InterplanRules(boxes_m=((9.0, 2.5),))
+    street = scene(agents=(vehicle("Agent2", 12.0, 0.0),))
+    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 18.5}
+    asked = [replace(street, options=SceneOptions(interplan=one)) for one in (None, rules)]
+    assert [PoseTool(one).answer(call)["taken_by"] for one in asked] == [None, ["Agent2"]]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ description calls its current one, else 0.
 
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import shapely
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.reading import Log, LoggedTrack, LogReader
+from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
@@ -85,7 +86,7 @@ class ScenarioNet(LogReader):
             return
         files = {file.name: file for file in sorted(path.rglob(_SCENARIOS))}
         chosen = files.values() if item is None else [foreign.look_up(files, item, "item")]
-        yield from (_log(file, file.name) for file in chosen)
+        yield from read_each(partial(_log, file, file.name) for file in chosen)
 
 
 # Tracks

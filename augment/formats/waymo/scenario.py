@@ -9,6 +9,7 @@ that are read, `scenario.desc` the same as protoc writes it.
 
 import struct
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.reading import Log, LoggedTrack, LogReader
+from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 
@@ -68,42 +69,46 @@ class WaymoMotion(LogReader):
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One of each record."""
-        for number, payload in read_records(path, only=item):
-            scenario, doubts = read_scenario(payload), Doubts()
-            with doubts.about("fields of messages"):
-                _check_fields(scenario)
-            times_s = foreign.read_times(scenario.timestamps_seconds, "timestamps_seconds")
-            tracks = dict[int, LoggedTrack]()
-            for index, track in enumerate(scenario.tracks):
-                with doubts.about("objects"):
-                    tracks[index] = _track(index, track, len(times_s), doubts)
-            sdc = scenario.sdc_track_index if scenario.HasField("sdc_track_index") else None
-            if sdc is not None and sdc not in tracks and 0 <= sdc < len(scenario.tracks):
-                raise fault_at("sdc_track_index", " ".join([f"{sdc} is no ego.", *doubts.notes]))
-            ego = foreign.look_up(tracks, sdc, "sdc_track_index")
-            unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
-            if not scenario.HasField("current_time_index"):
-                doubts.assume("A current step that is not given is the first")
-            bounds = "current_time_index", 0, len(times_s) - 1
-            current = scenario.current_time_index, *bounds
-            name = scenario.scenario_id[:100].decode("ascii", errors="replace")
-            yield Log(
-                times_s=times_s,
-                ego=ego.states,
-                ego_size_m=(ego.length_m, ego.width_m),
-                tracks=[
-                    one
-                    for index, one in tracks.items()
-                    if one is not ego and index not in unset and np.isfinite(one.states).any()
-                ],
-                map_at=lambda frame, scenario=scenario: city_of(scenario, frame),  # type: ignore[misc]
-                world="Waymo Open Motion scenario frame",
-                title=f"Waymo Open Motion data set, {path.name}, scenario {name}",
-                licence=LICENCE,
-                item=str(number),
-                frame=doubts.read("current times", foreign.read_whole, *current) or 0,
-                notes=[*left_out_notes("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
-            )
+        records = read_records(path, only=item)
+        yield from read_each(partial(_log, path.name, *record) for record in records)
+
+
+def _log(file: str, number: int, payload: bytes) -> Log:
+    scenario, doubts = read_scenario(payload), Doubts()
+    with doubts.about("fields of messages"):
+        _check_fields(scenario)
+    times_s = foreign.read_times(scenario.timestamps_seconds, "timestamps_seconds")
+    tracks = dict[int, LoggedTrack]()
+    for index, track in enumerate(scenario.tracks):
+        with doubts.about("objects"):
+            tracks[index] = _track(index, track, len(times_s), doubts)
+    sdc = scenario.sdc_track_index if scenario.HasField("sdc_track_index") else None
+    if sdc is not None and sdc not in tracks and 0 <= sdc < len(scenario.tracks):
+        raise fault_at("sdc_track_index", " ".join([f"{sdc} is no ego.", *doubts.notes]))
+    ego = foreign.look_up(tracks, sdc, "sdc_track_index")
+    unset = {i for i, track in enumerate(scenario.tracks) if track.object_type == UNSET}
+    if not scenario.HasField("current_time_index"):
+        doubts.assume("A current step that is not given is the first")
+    bounds = "current_time_index", 0, len(times_s) - 1
+    current = scenario.current_time_index, *bounds
+    name = scenario.scenario_id[:100].decode("ascii", errors="replace")
+    return Log(
+        times_s=times_s,
+        ego=ego.states,
+        ego_size_m=(ego.length_m, ego.width_m),
+        tracks=[
+            one
+            for index, one in tracks.items()
+            if one is not ego and index not in unset and np.isfinite(one.states).any()
+        ],
+        map_at=lambda frame: city_of(scenario, frame),
+        world="Waymo Open Motion scenario frame",
+        title=f"Waymo Open Motion data set, {file}, scenario {name}",
+        licence=LICENCE,
+        item=str(number),
+        frame=doubts.read("current times", foreign.read_whole, *current) or 0,
+        notes=[*left_out_notes("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
+    )
 
 
 # Records and messages
@@ -225,6 +230,8 @@ def city_of(scenario: Any, frame: int) -> RoadMap:
         for one in (states[frame] if frame < len(states) else ())
     }
     controlled = {one.lane for step in states for one in step}
+    idle = len(controlled - {feature.id for feature in scenario.map_features})
+    doubts.assume("A traffic light governs no lane that is there", idle)
     rows = ((*lane, edges, lights, controlled, doubts) for lane in lanes.items())
     return RoadMap(
         place="map_features",

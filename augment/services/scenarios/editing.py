@@ -21,8 +21,8 @@ from augment.geometry.frames import difference, wrap
 from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene import codec
-from augment.scene.density import fit_boxes
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent, apply
+from augment.scene.density import fit_boxes, usual_size_m
+from augment.scene.entities import AgentType, Modification, TrafficAgent, apply
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_parts import Amount
 from augment.scene.intent_statements import list_statements
@@ -82,14 +82,14 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    camera = AROUND_THE_EGO
+    camera, scene = AROUND_THE_EGO, editable_ground(draft).scene
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
         "recorded": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=True)),
         "cleared": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {
-            one.value: dict(zip(("length_m", "width_m"), LENGTH_WIDTH_M[one], strict=True))
+            one.value: dict(zip(("length_m", "width_m"), usual_size_m(scene, one), strict=True))
             for one in PLACED
         },
         "presets": {
