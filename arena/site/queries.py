@@ -10,16 +10,7 @@ from django.db.models import Count, QuerySet, Sum
 from prometheus_client.core import GaugeMetricFamily
 
 from arena.models import Matchup, Study, Vote
-from augment.models import (
-    Augmentation,
-    Contestant,
-    Endpoint,
-    Event,
-    GenerationJob,
-    ModelCall,
-    Scenario,
-    Work,
-)
+from augment import models
 from augment.services.running.workers import workforce
 
 CHECK_PERCENT = 2
@@ -31,13 +22,13 @@ NANO = 1e9
 
 def actors() -> list[User]:
     """Return everybody who ever did something, by pseudonym."""
-    who = User.objects.filter(pk__in=Event.objects.exclude(actor=None).values("actor"))
+    who = User.objects.filter(pk__in=models.Event.objects.exclude(actor=None).values("actor"))
     return list(who.select_related("person").order_by("person__pseudonym"))
 
 
 def distinct(column: str) -> list[str]:
     """Return every value of a column of the log."""
-    return sorted(Event.objects.order_by().values_list(column, flat=True).distinct())
+    return sorted(models.Event.objects.order_by().values_list(column, flat=True).distinct())
 
 
 # --- Monitoring --------------------------------------------------------------------------------
@@ -52,7 +43,7 @@ def read_gauges() -> Iterator[GaugeMetricFamily]:
     yield GaugeMetricFamily("arena_workers", "Workers heard a moment ago", state.living)
     yield GaugeMetricFamily("arena_recovery", "1 where lost work is brought back", state.works)
     counted: list[tuple[str, str, QuerySet[Any], str]] = [
-        ("jobs", "Generation jobs", GenerationJob.objects.all(), "state"),
+        ("jobs", "Generation jobs", models.GenerationJob.objects.all(), "state"),
         ("studies", "Studies", Study.objects.all(), "state"),
         ("matchups", "Planned pairs", Matchup.objects.all(), "study__state"),
         (
@@ -61,7 +52,7 @@ def read_gauges() -> Iterator[GaugeMetricFamily]:
         ),
     ]
     for model in apps.get_models():
-        if issubclass(model, Work):
+        if issubclass(model, models.Work):
             plural = str(model._meta.verbose_name_plural)
             rows = model._default_manager.all()
             counted.append((plural.replace(" ", "_"), plural.capitalize(), rows, "state"))
@@ -69,7 +60,7 @@ def read_gauges() -> Iterator[GaugeMetricFamily]:
         numbers = rows.order_by().values_list(field).annotate(Count("pk")).order_by(field)
         yield _by_state(f"arena_{name}", text, dict(numbers))
     # Copies from the store are no calls.
-    own = ModelCall.objects.filter(served_from__isnull=True).order_by()
+    own = models.ModelCall.objects.filter(served_from__isnull=True).order_by()
     settled = own.filter(settled_at__isnull=False)
     faulty = settled.exclude(fault="").count()
     sums = settled.aggregate(
@@ -117,10 +108,10 @@ class Step:
 def first_steps() -> list[Step]:
     """Return the steps from an empty installation to a rated table."""
     is_there = [
-        Endpoint.objects.count(),
-        Scenario.objects.count(),
-        Contestant.objects.exclude(endpoint=None).count(),
-        Augmentation.objects.filter(state=Augmentation.State.DONE).count(),
+        models.Endpoint.objects.count(),
+        models.Scenario.objects.count(),
+        models.Contestant.objects.exclude(endpoint=None).count(),
+        models.Augmentation.objects.filter(state=models.Augmentation.State.DONE).count(),
         User.objects.filter(groups__name="expert").count(),
         Study.objects.filter(state=Study.State.CLOSED).count(),
     ]
@@ -143,11 +134,13 @@ _STEPS = (
 
 def count_failed() -> int:
     """Count augmentations that failed and can be tried again; nobody waits for a cancelled job."""
-    failed = Augmentation.objects.filter(state=Augmentation.State.FAILED)
-    return failed.exclude(job__state=GenerationJob.State.CANCELLED).count()
+    failed = models.Augmentation.objects.filter(state=models.Augmentation.State.FAILED)
+    return failed.exclude(job__state=models.GenerationJob.State.CANCELLED).count()
 
 
 def usual_checks() -> int:
     """Return the usual share of attention checks in percent: none before any are drawn."""
-    is_drawn = Augmentation.objects.filter(contestant__kind=Contestant.Kind.CHECK).exists()
+    is_drawn = models.Augmentation.objects.filter(
+        contestant__kind=models.Contestant.Kind.CHECK
+    ).exists()
     return CHECK_PERCENT if is_drawn else 0

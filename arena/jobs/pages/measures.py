@@ -31,15 +31,9 @@ from arena.site.access import ADMIN, STAFF, allow_only, page_for, user_of
 from arena.site.acts import looks_again, refusals_told, send_later
 from arena.site.listing import choice_asked, read_page
 from augment.models import GenerationJob, Simulation
-from augment.services.judging import simulations
+from augment.services.judging import driving_scores, simulations
 from augment.services.judging.analyses import ANALYSES, SEED, answers_of, count_unmeasured
 from augment.services.judging.displacement import By
-from augment.services.judging.driving_scores import (
-    drives_of_job,
-    least_clearance_m,
-    options_driven,
-    scores_of_job,
-)
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_measure, enqueue_simulations
@@ -76,14 +70,14 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
     known, way = _ways(request, job)
-    drives = Simulation.objects.filter(drives_of_job(job)).defer("trace")
+    drives = Simulation.objects.filter(driving_scores.drives_of_job(job)).defer("trace")
     rows = known[way].of(drives)
     related = rows.select_related("scenario", "augmentation__contestant")
     ordered = related.order_by(
         "scenario__type", "scenario__slug", "augmentation__contestant__name"
     )
     page = read_page(request, ordered, size=DRIVES_AT_ONCE)
-    lines = [(row, least_clearance_m(row)) for row in page.object_list]
+    lines = [(row, driving_scores.least_clearance_m(row)) for row in page.object_list]
     return render(request, "drives/list.html", {"job": job, "page": page, "lines": lines})
 
 
@@ -116,7 +110,7 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
     """Return the context of the driving part of a job's page."""
     known, chosen = _ways(request, job)
     score = choice_asked(request, "score", list(SCORES)) or NUPLAN
-    table = scores_of_job(job, options=known[chosen], score=score)
+    table = driving_scores.scores_of_job(job, options=known[chosen], score=score)
     ways = []
     for way in known:
         planner = PLANNERS.get(way.planner, way.planner)
@@ -135,7 +129,7 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
 
 def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]:
     """Return how the job was driven, the last way first, and which the address asks for."""
-    known = options_driven(job) or [Options()]
+    known = driving_scores.options_driven(job) or [Options()]
     numbers = [str(number) for number in range(len(known))]
     return known, int(choice_asked(request, "driven", numbers) or 0)
 

@@ -20,13 +20,7 @@ from arena.models import Snapshot, Study
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
 from arena.results.exports.writers import bundle_files
-from arena.results.services.stored_rows import (
-    applied_migrations,
-    as_line,
-    columns_of,
-    frozen_rows,
-    label_of,
-)
+from arena.results.services import stored_rows
 from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
@@ -139,7 +133,7 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
         raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
     for job in GenerationJob.objects.filter(pk__in=close_over(study).jobs):
         measure_job(job)  # measures are stored, which frozen rows don't allow
-    with new_folder(out) as folder, frozen_rows():
+    with new_folder(out) as folder, stored_rows.frozen_rows():
         _fill(study, folder, say)
 
 
@@ -168,20 +162,20 @@ class _Folder:
 
     def write_rows(self, closure: Closure, rows: Any) -> int:
         """Write the rows of a table and note the pictures that they name; how many there are."""
-        columns = enumerate(columns_of(rows.model))
+        columns = enumerate(stored_rows.columns_of(rows.model))
         places = [place for place, column in columns if column.attname in PICTURE_COLUMNS]
         written = []
 
         def lines() -> Iterator[bytes]:
             for row in travelling_rows(closure, rows):
-                line = as_line(row)
+                line = stored_rows.as_line(row)
                 self.named |= {row[place] for place in places if row[place]}
                 self.media |= {name.decode() for name in _NAMES.findall(line)}
                 self.media |= {f"{ASKED}/{found.decode()}.png" for found in _DIGESTS.findall(line)}
                 written.append(len(line))
                 yield line
 
-        self.write(f"{ROWS}{label_of(rows.model)}.jsonl", lines())
+        self.write(f"{ROWS}{stored_rows.label_of(rows.model)}.jsonl", lines())
         return len(written)
 
 
@@ -192,7 +186,10 @@ def _fill(study: Study, root: Path, say: Callable[[str], None]) -> None:
     closure = close_over(study)
     _refuse_unfinished(closure)
     folder = _Folder(root)
-    counts = {label_of(rows.model): folder.write_rows(closure, rows) for rows in closure.tables()}
+    counts = {
+        stored_rows.label_of(rows.model): folder.write_rows(closure, rows)
+        for rows in closure.tables()
+    }
     say(f"rows: {sum(counts.values())} of {len(counts)} tables")
     for name in folder.media | folder.named:
         if (film := film_document(name)) is not None:
@@ -238,7 +235,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
         },
         "product": product_version(),
         "packages": {name: version(name) for name in PACKAGES},
-        "migrations": applied_migrations(),
+        "migrations": stored_rows.applied_migrations(),
         "rows": counts,
         "members": digests,
     }

@@ -8,20 +8,12 @@ from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
 from arena.results.queries.votes import RATED, Filters, Judged, current_votes, last_vote_of
+from arena.results.services import vote_files
 from arena.results.services.ratings import votes_of, votes_version_of
-from arena.results.services.vote_files import (
-    BOTH_BAD,
-    COLUMNS,
-    VERSION,
-    WINNERS,
-    Row,
-    vote_columns,
-    vote_rows,
-)
 
 _KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
-LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
+LIST_COLUMNS = (*vote_files.COLUMNS, "mark", "reason", "vote")
 """Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
 was skipped, and the code in its address."""
 
@@ -34,7 +26,7 @@ def vote_table(snapshot: Snapshot) -> Sheet:
     Raises:
         Conflict: They are not what they were.
     """
-    rows = vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
+    rows = vote_files.vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
     return _sheet(rows, votes_version_of(snapshot))
 
 
@@ -45,11 +37,11 @@ def unrated_votes(study: Study) -> Sheet:
     current = [vote for filters in asked for vote in current_votes(study, filters, last)]
     decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
-    return _sheet(vote_rows(decided, names), VERSION)
+    return _sheet(vote_files.vote_rows(decided, names), vote_files.VERSION)
 
 
-def _sheet(rows: Iterator[Row], version: int) -> Sheet:
-    names = vote_columns(version)
+def _sheet(rows: Iterator[vote_files.Row], version: int) -> Sheet:
+    names = vote_files.vote_columns(version)
     return Sheet(
         name="votes",
         columns={name: _KINDS.get(name, Dtype.TEXT) for name in names},
@@ -65,11 +57,11 @@ def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
 def _list_row(line: ListedVote) -> tuple[object, ...]:
     vote = line.given
     if isinstance(vote, Judged):  # whoever the tie counts for has not judged it
-        return (*next(vote_rows([vote], {vote.judge: ""})), line.mark, None, None)
+        return (*next(vote_files.vote_rows([vote], {vote.judge: ""})), line.mark, None, None)
     left, right, matchup = vote.shown_left, vote.shown_right, vote.matchup
     return (
         *(left.contestant.slug, right.contestant.slug),
-        BOTH_BAD if vote.both_miss else WINNERS.get(vote.outcome),
+        vote_files.BOTH_BAD if vote.both_miss else vote_files.WINNERS.get(vote.outcome),
         *(line.judge, matchup.scenario.slug, matchup.scenario.type, matchup.kind),
         vote.outcome if vote.outcome in ("left", "right") else None,
         *(vote.ms_visible, vote.is_simulated, vote.at.isoformat(timespec="milliseconds")),

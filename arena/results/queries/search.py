@@ -9,17 +9,7 @@ from django.db.models import Exists, OuterRef, Q, QuerySet
 from arena.models import Snapshot, Vote
 from arena.pairing.order import CHECK, REPEAT
 from arena.rating.reliability import FAST_MS
-from arena.results.queries.votes import (
-    AUTOMATIC,
-    AUTOMATIC_TIE,
-    COUNTED,
-    RATED,
-    REASONS,
-    Judged,
-    LeftOut,
-    marked_votes,
-    users_of,
-)
+from arena.results.queries import votes
 
 EVERY, LEFT_OUT = "all", "left_out"
 """Marks of several: everything, and all that does not count."""
@@ -43,11 +33,11 @@ PARTS = {
 }
 ORDERS = {"disputed": "Most disputed"}
 MARKS = {
-    COUNTED: "Counted",
+    votes.COUNTED: "Counted",
     EVERY: "All",
     LEFT_OUT: "Left out",
-    **{mark: f"Left out: {reason}" for mark, reason in REASONS.items()},
-    AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
+    **{mark: f"Left out: {reason}" for mark, reason in votes.REASONS.items()},
+    votes.AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
 }
 
 
@@ -72,7 +62,7 @@ class VoteSearch:
     expert: str = ""
     outcome: str = ""
     part: str = ""
-    mark: str = COUNTED
+    mark: str = votes.COUNTED
     order: str = ""
 
     def as_query(self) -> dict[str, str]:
@@ -88,11 +78,11 @@ class VoteSearch:
 
 def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     """The rows of a study of matchups, each with its `mark`; no order."""
-    rows: QuerySet[Vote] = _by_mark(marked_votes(snapshot), search.mark)
-    if search.expert == AUTOMATIC:
+    rows: QuerySet[Vote] = _by_mark(votes.marked_votes(snapshot), search.mark)
+    if search.expert == votes.AUTOMATIC:
         return rows.none()
     if search.expert:
-        rows = rows.filter(expert__in=users_of([search.expert]).values())
+        rows = rows.filter(expert__in=votes.users_of([search.expert]).values())
     words = {"matchup__scenario__slug": search.scenario, "matchup__scenario__type": search.type}
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
@@ -101,13 +91,13 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     return _PARTS[search.part](rows, snapshot) if search.part else rows
 
 
-def is_found(tie: Judged, search: VoteSearch) -> bool:
+def is_found(tie: votes.Judged, search: VoteSearch) -> bool:
     """Whether a tie on a pair that nobody can tell apart is looked for."""
     if search.part:
         return False
-    marks = {EVERY: True, LEFT_OUT: tie.mark not in (COUNTED, AUTOMATIC_TIE)}
+    marks = {EVERY: True, LEFT_OUT: tie.mark not in (votes.COUNTED, votes.AUTOMATIC_TIE)}
     return (
-        search.expert in ("", AUTOMATIC)
+        search.expert in ("", votes.AUTOMATIC)
         and search.outcome in ("", "tied", "equal")
         and {search.contestant, search.opponent} <= {"", tie.left, tie.right}
         and search.scenario in ("", tie.item)
@@ -132,7 +122,7 @@ _OUTCOMES: dict[str, list[str]] = {
 
 def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
     if mark == LEFT_OUT:
-        return rows.exclude(Q(mark=COUNTED))
+        return rows.exclude(Q(mark=votes.COUNTED))
     return rows if mark == EVERY else rows.filter(Q(mark=mark))
 
 
@@ -155,9 +145,9 @@ def _shows(search: VoteSearch) -> Q:
 
 
 def _repeats(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
-    decided = rows.filter(matchup__kind=REPEAT, outcome__in=RATED)
-    current = decided.exclude(Q(mark=LeftOut.SUPERSEDED.value))
-    counted = marked_votes(snapshot).filter(Q(mark=COUNTED))
+    decided = rows.filter(matchup__kind=REPEAT, outcome__in=votes.RATED)
+    current = decided.exclude(Q(mark=votes.LeftOut.SUPERSEDED.value))
+    counted = votes.marked_votes(snapshot).filter(Q(mark=votes.COUNTED))
     return current.filter(Exists(counted.filter(matchup=OuterRef("matchup__repeat_of"))))
 
 
@@ -165,5 +155,5 @@ _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "commented": lambda rows, _: rows.exclude(comment=""),
     "fast": lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
     "repeats": _repeats,
-    "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
+    "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=votes.RATED),
 }

@@ -5,21 +5,14 @@ from dataclasses import replace
 
 from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot, Study
-from arena.rating.agreement import (
-    AgreementLine,
-    NamedRater,
-    PairVote,
-    measure_agreement,
-    rater_by_pairs,
-    rater_by_scores,
-)
+from arena.rating import agreement
 from arena.results.queries.judges import judge_preferences
 from arena.results.queries.votes import COUNTED, Filters, Judged, current_votes, is_imported
 from arena.results.services.analysis import SCORES
 from augment.services.judging.metric_scores import metric_scores
 
 
-def rater_agreement(snapshot: Snapshot) -> tuple[AgreementLine, ...]:
+def rater_agreement(snapshot: Snapshot) -> tuple[agreement.AgreementLine, ...]:
     """Measure how metrics and judge models agree with the votes of a rating, by question.
 
     Args:
@@ -34,14 +27,16 @@ def rater_agreement(snapshot: Snapshot) -> tuple[AgreementLine, ...]:
         asked = replace(filters, question=question)
         votes = pair_votes(current_votes(study, asked, snapshot.last_vote))
         raters = [*metrics, *judge_raters(study, question)]
-        lines += [replace(line, question=question) for line in measure_agreement(votes, raters)]
+        lines += [
+            replace(line, question=question) for line in agreement.measure_agreement(votes, raters)
+        ]
     return tuple(lines)
 
 
-def pair_votes(votes: Iterable[Judged]) -> list[PairVote]:
+def pair_votes(votes: Iterable[Judged]) -> list[agreement.PairVote]:
     """Return the votes that count."""
     return [
-        PairVote(
+        agreement.PairVote(
             judge=vote.judge,
             item=vote.item,
             type=vote.type,
@@ -54,15 +49,15 @@ def pair_votes(votes: Iterable[Judged]) -> list[PairVote]:
     ]
 
 
-def study_raters(study: Study) -> list[NamedRater]:
+def study_raters(study: Study) -> list[agreement.NamedRater]:
     """Return the metrics by which one augmentation of a study is better than another."""
     return [
-        rater_by_scores(scores.name, scores.by_code, tolerance=scores.tolerance)
+        agreement.rater_by_scores(scores.name, scores.by_code, tolerance=scores.tolerance)
         for scores in metric_scores(shown_augmentations(study))
     ]
 
 
-def judge_raters(study: Study, question: str) -> list[NamedRater]:
+def judge_raters(study: Study, question: str) -> list[agreement.NamedRater]:
     """Return the models that compared the pairs of a study by a question."""
     judges = judge_preferences(study, question)
-    return [rater_by_pairs(name, preferences) for name, preferences in judges.items()]
+    return [agreement.rater_by_pairs(name, preferences) for name, preferences in judges.items()]

@@ -29,17 +29,8 @@ from arena.rating.rules import (
 )
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Results
+from arena.results.queries import votes as vote_queries
 from arena.results.queries.access import votes_in
-from arena.results.queries.votes import (
-    AUTOMATIC,
-    Competitor,
-    Filters,
-    VoteSet,
-    is_imported,
-    last_vote_of,
-    question_of,
-    vote_set,
-)
 from arena.results.services import analysis
 from arena.results.services.agreement import rater_agreement
 from arena.results.services.analysis import VoteArrays, vote_arrays
@@ -70,7 +61,7 @@ class Choices(TypedDict, total=False):
     seed: int
     unit: str | None
     intervals: str | None
-    filters: Filters | None
+    filters: vote_queries.Filters | None
     early: bool
     actor: User | None
 
@@ -80,7 +71,7 @@ class Computed:
     """What came out beside that which the snapshot itself has: its lines."""
 
     board: Leaderboard
-    competitors: tuple[Competitor, ...]
+    competitors: tuple[vote_queries.Competitor, ...]
 
 
 # --- Doors -------------------------------------------------------------------------------------
@@ -93,7 +84,7 @@ def rate_now(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     errors are those of `plan_snapshot`; after an error nothing is kept. Nothing is written before
     all is computed, so that votes come in meanwhile.
     """
-    snapshot = _planned(study=study, **choices)
+    snapshot = _planned(study, choices)
     computed = compute(snapshot, lambda percent: None)
     with in_turn(), transaction.atomic():
         snapshot.save()
@@ -125,7 +116,7 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
             does not occur.
         Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
-    snapshot = _planned(study=study, **choices)
+    snapshot = _planned(study, choices)
     snapshot.save()
     _log(snapshot)
     return snapshot
@@ -161,7 +152,7 @@ RATINGS = PlannedRatings()
 
 def is_big(study: Study) -> bool:
     """Whether rating takes longer than a person should wait for a page."""
-    if is_imported(study):
+    if vote_queries.is_imported(study):
         return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
     return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
 
@@ -241,7 +232,7 @@ def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
     return snapshot
 
 
-def votes_of(snapshot: Snapshot) -> VoteSet:
+def votes_of(snapshot: Snapshot) -> vote_queries.VoteSet:
     """The votes that a snapshot is made of, read again.
 
     Raises:
@@ -277,29 +268,20 @@ def software_versions() -> dict[str, str | int]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _planned(
-    *,
-    study: Study,
-    method: str = "bt",
-    rounds: int = DEFAULT_ROUNDS,
-    seed: int = 0,
-    unit: str | None = None,
-    intervals: str | None = None,
-    filters: Filters | None = None,
-    early: bool = False,
-    actor: User | None = None,
-) -> Snapshot:
+def _planned(study: Study, choices: Choices) -> Snapshot:
+    rounds, seed = choices.get("rounds", DEFAULT_ROUNDS), choices.get("seed", 0)
+    unit, intervals = choices.get("unit"), choices.get("intervals")
     if study.state == Study.State.CANCELLED:
         raise Conflict(f"The study '{study.name}' was cancelled: it is not rated.")
     is_early = study.state == Study.State.OPEN
-    if is_early and not early:
+    if is_early and not choices.get("early"):
         raise StudyStillOpen(study.name)
     if not 1 <= rounds <= MOST_DRAWS:
         raise Conflict(f"Bootstrap rounds go from 1 to {MOST_DRAWS}, not {rounds}.")
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
-    filters = filters or Filters()
-    chosen = _read_word(Method, method, "method")
+    filters = choices.get("filters") or vote_queries.Filters()
+    chosen = _read_word(Method, choices.get("method", "bt"), "method")
     wanted = _read_word(Intervals, intervals, "kind of intervals") if intervals else None
     try:
         rules = choose_rules(
@@ -321,12 +303,12 @@ def _planned(
         intervals=rules.intervals,
         seed=seed,
         filters=replace(
-            filters, authors=authors_of(study), question=question_of(study, filters)
+            filters, authors=authors_of(study), question=vote_queries.question_of(study, filters)
         ).as_document(),
-        last_vote=last_vote_of(study),
+        last_vote=vote_queries.last_vote_of(study),
         votes_counted=0,
         is_early=is_early,
-        made_by=actor,
+        made_by=choices.get("actor"),
     )
 
 
@@ -339,7 +321,7 @@ def _read_word(words: type[Word], name: str, what: str) -> Word:
 def _default_unit(study: Study, method: Method) -> Unit:
     if method is Method.ELO:
         return Unit.VOTE
-    if not is_imported(study):
+    if not vote_queries.is_imported(study):
         return Unit.TWO_WAY
     votes = ImportedVote.objects.filter(file__study=study)
     judges, items = (not votes.filter(**{name: ""}).exists() for name in ("judge", "item"))
@@ -360,9 +342,9 @@ def _log_act(study: Study, actor: User | None, verb: str, after: Mapping[str, ob
     )
 
 
-def _vote_set(snapshot: Snapshot) -> VoteSet:
-    filters = Filters.of_document(snapshot.filters)
-    return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
+def _vote_set(snapshot: Snapshot) -> vote_queries.VoteSet:
+    filters = vote_queries.Filters.of_document(snapshot.filters)
+    return vote_queries.vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
 
 
 def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
@@ -380,12 +362,14 @@ def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
 
 
 def _results(
-    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard
+    snapshot: Snapshot, votes: vote_queries.VoteSet, arrays: VoteArrays, board: Leaderboard
 ) -> Results:
     study = snapshot.study
-    from_file = is_imported(study)
-    filters = Filters.of_document(snapshot.filters)
-    ties = [(vote.left, vote.right) for vote in votes.counted if vote.kind == AUTOMATIC]
+    from_file = vote_queries.is_imported(study)
+    filters = vote_queries.Filters.of_document(snapshot.filters)
+    ties = [
+        (vote.left, vote.right) for vote in votes.counted if vote.kind == vote_queries.AUTOMATIC
+    ]
     planned = analysis.planned_pairs(study, filters)
     planned.update(map(frozenset, ties))
     settled = dict(sorted(Counter(chain.from_iterable(ties)).items()))

@@ -16,14 +16,7 @@ from django.utils import timezone
 from arena.errors import VotesUnreadable
 from arena.exports.cells import csv_text
 from arena.models import ImportedVote, Study, Vote, VoteFile
-from arena.rating.votes_file import (
-    NEEDED,
-    OPTIONAL,
-    SIMULATED,
-    VotesFileUnreadable,
-    VotesTable,
-    read_table,
-)
+from arena.rating import votes_file
 from arena.results.queries.votes import Judged
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
@@ -159,7 +152,7 @@ def import_votes(
     name = one_line("name", name, what="study")
     table, digest = _read(path)
     contestants = {*table.columns["model_a"], *table.columns["model_b"]}
-    made_up = not {"yes", "true"}.isdisjoint(table.columns.get(SIMULATED, ()))
+    made_up = not {"yes", "true"}.isdisjoint(table.columns.get(votes_file.SIMULATED, ()))
     now = timezone.now()
     with in_turn(), transaction.atomic():
         try:
@@ -190,11 +183,11 @@ def import_votes(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _read(path: Path) -> tuple[VotesTable, str]:
+def _read(path: Path) -> tuple[votes_file.VotesTable, str]:
     """Read a sound file and its SHA-256."""
     try:
-        table = read_table(path)
-        table.check_filled([name for name in OPTIONAL if name in table.columns])
+        table = votes_file.read_table(path)
+        table.check_filled([name for name in votes_file.OPTIONAL if name in table.columns])
         for column, cells in table.columns.items():
             for place, cell in enumerate(cells):
                 if len(cell) > LONGEST_CELL:
@@ -202,16 +195,18 @@ def _read(path: Path) -> tuple[VotesTable, str]:
                     raise table.refuse(place, reason)
         with path.open("rb") as file:
             return table, hashlib.file_digest(file, "sha256").hexdigest()
-    except VotesFileUnreadable as error:
+    except votes_file.VotesFileUnreadable as error:
         raise VotesUnreadable(str(error)) from error
     except OSError as error:
         raise VotesUnreadable(f"{path.name} can't be read: {error.strerror}.") from error
 
 
-def _rows(table: VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
+def _rows(table: votes_file.VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
     """One row a vote; a column that the file does not have is empty."""
     nothing = [""] * len(table.columns["winner"])
-    cells = (table.columns.get(name, nothing) for name in (*NEEDED, *OPTIONAL))
+    cells = (
+        table.columns.get(name, nothing) for name in (*votes_file.NEEDED, *votes_file.OPTIONAL)
+    )
     for line, first, second, winner, judge, item in zip(table.lines, *cells, strict=True):
         yield ImportedVote(
             file=file,

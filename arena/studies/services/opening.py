@@ -28,12 +28,7 @@ from arena.studies.services.experts import require_practice_pictures
 from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
-from arena.voting.services.shown_pictures import (
-    SampleRule,
-    StudyPictures,
-    choose_pictures,
-    replays_of,
-)
+from arena.voting.services import shown_pictures
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
@@ -85,7 +80,7 @@ def open_study(
     accounts = {user.username: user for user in expert_accounts()}
     experts = find_named("expert", study_plan.experts, accounts)
     has_simulated = _check_simulated(study_plan, contestants, experts)
-    shown = choose_pictures(
+    shown = shown_pictures.choose_pictures(
         contestants,
         scenarios,
         seed=study_plan.seed,
@@ -101,7 +96,7 @@ def open_study(
     cells = broken | shown.cells
     frozen = _frozen(study_plan, rules, planned, shown, alike_shown)
     if study_plan.allow_replay:
-        frozen["replays"] = replays_of(cells)
+        frozen["replays"] = shown_pictures.replays_of(cells)
     study = _insert(name, frozen, study_plan, rules, has_simulated)
     study.contestants.set(contestants)
     study.scenarios.set(scenarios)
@@ -196,7 +191,7 @@ def _rules(
     checks: tuple[Check, ...] = ()
     broken: Cells = {}
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
-        shows_all = study_plan.samples is SampleRule.ALL
+        shows_all = study_plan.samples is shown_pictures.SampleRule.ALL
         checks, broken = check_pictures(scenarios, windows_of(entries), shows_all=shows_all)
         require_checks(checks, wanted=wanted)
     alike = [
@@ -222,7 +217,7 @@ def _frozen(
     study_plan: StudyPlan,
     rules: PlanRules,
     planned: MatchupPlan,
-    shown: StudyPictures,
+    shown: shown_pictures.StudyPictures,
     alike_shown: list[Triple],
 ) -> dict[str, Any]:
     """Return everything that the plan came from, and what it had to give up."""
