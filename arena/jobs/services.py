@@ -14,7 +14,7 @@ from arena.people.queries import experts as expert_accounts
 from arena.results.services.written_files import ask_for
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.judging.findings import FaultClass, guess_faults
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.texts import make_storable, one_line
@@ -56,19 +56,14 @@ def open_labelling(
     if not tasks:
         raise NothingToPlan("These experts have nothing left to label in this job.")
     LabelTask.objects.bulk_create(tasks)
-    log_event(
-        actor=actor,
-        verb="open",
-        object_kind="labelling",
-        object_code=labelling.code,
-        after={
-            "name": name,
-            "job": str(job.code),
-            "experts": [expert.username for expert in people],
-            "seed": seed,
-            "tasks": len(tasks),
-        },
-    )
+    after = {
+        "name": name,
+        "job": str(job.code),
+        "experts": [expert.username for expert in people],
+        "seed": seed,
+        "tasks": len(tasks),
+    }
+    log_change(labelling, "open", actor, after=after)
     return labelling
 
 
@@ -83,13 +78,8 @@ def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> 
     if not LabellingRound.objects.filter(pk=labelling.pk, closed_at=None).update(closed_at=now):
         raise LabellingClosed(f"The labelling '{labelling.name}' is closed already.")
     labelling.closed_at = now
-    log_event(
-        actor=actor,
-        verb="close",
-        object_kind="labelling",
-        object_code=labelling.code,
-        after={"labels": FaultLabel.objects.filter(task__labelling=labelling).count()},
-    )
+    labels = FaultLabel.objects.filter(task__labelling=labelling).count()
+    log_change(labelling, "close", actor, after={"labels": labels})
     return labelling
 
 

@@ -6,49 +6,12 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.utils import timezone
 
-from augment.models import (
-    BaseScene,
-    Benchmark,
-    Contestant,
-    EndpointModel,
-    Event,
-    GenerationJob,
-    Scenario,
-    SceneUpload,
-)
+from augment.models import BaseScene, Benchmark, Contestant, Event, Scenario
 
-
-@transaction.atomic
-def log_event(
-    *,
-    actor: User | None,
-    verb: str,
-    object_kind: str,
-    object_code: object,
-    before: dict[str, Any] | None = None,
-    after: dict[str, Any] | None = None,
-) -> Event:
-    """Append one line.
-
-    Args:
-        actor: Who did it; None for the machine itself.
-        verb: What was done: "import", "launch", "vote".
-        object_kind: What it was done to: "scene", "scenario", "study".
-        object_code: The object's public code, or another lasting name of it.
-        before: What changed, as it was; None where there was nothing.
-        after: What changed, as it is now.
-    """
-    return Event.objects.create(
-        actor=actor,
-        verb=verb,
-        object_kind=object_kind,
-        object_code=str(object_code),
-        before=before,
-        after=after,
-    )
-
-
-_KINDS = {BaseScene: "scene", EndpointModel: "model", GenerationJob: "job", SceneUpload: "upload"}
+_KINDS = {
+    **{"base scene": "scene", "endpoint model": "model", "generation job": "job"},
+    **{"labelling round": "labelling", "scene upload": "upload"},
+}
 """What the log calls rows whose own name is longer."""
 
 Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene, Benchmark)
@@ -62,12 +25,21 @@ def log_change(
     before: dict[str, Any] | None = None,
     after: dict[str, Any] | None = None,
 ) -> Event:
-    """Append one line about a row with a public code; as `log_event`."""
-    return log_event(
+    """Append one line about a row with a public code.
+
+    Args:
+        row: What something was done to.
+        verb: What was done: "import", "launch", "vote".
+        actor: Who did it; None for the machine itself.
+        before: What changed, as it was; None where there was nothing.
+        after: What changed, as it is now.
+    """
+    name = row._meta.verbose_name
+    return Event.objects.create(
         actor=actor,
         verb=verb,
-        object_kind=_KINDS.get(type(row)) or row._meta.verbose_name,
-        object_code=row.code,
+        object_kind=_KINDS.get(name, name),
+        object_code=str(row.code),
         before=before,
         after=after,
     )

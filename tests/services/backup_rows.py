@@ -11,7 +11,7 @@ from django.core.management import call_command
 
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
-from augment.services.events import log_event
+from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote, write_changes
 
 NOW = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
@@ -25,7 +25,8 @@ def quiet(_: str) -> None:
 
 
 def note(code: uuid.UUID) -> None:
-    log_event(actor=None, verb="note", object_kind="study", object_code=code, after={"ü": 1.5})
+    kind = {"verb": "note", "object_kind": "study"}
+    Event.objects.create(**kind, object_code=str(code), after={"ü": 1.5})
 
 
 def a_full_house() -> None:

@@ -8,8 +8,7 @@ from django.core.management import call_command
 from django.db import IntegrityError, connection, transaction
 from django.db.models import Model
 
-from augment.models import AppendOnly, before_migrations
-from augment.services.events import log_event
+from augment.models import AppendOnly, Event, before_migrations
 from tests.study_rows import a_study, matchups_of, vote
 
 TABLES = {model for model in apps.get_models() if issubclass(model, AppendOnly)}
@@ -42,7 +41,7 @@ def a_vote() -> Model:
 
 
 def a_line() -> Model:
-    return log_event(actor=None, verb="close", object_kind="study", object_code=7)
+    return Event.objects.create(actor=None, verb="close", object_kind="study", object_code=7)
 
 
 @pytest.mark.django_db

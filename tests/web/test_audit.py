@@ -12,7 +12,6 @@ from arena.models import EarlyLook, Snapshot, Study
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Event
-from augment.services.events import log_event
 from tests import study_rows
 from tests.web.cast import people, signed_in
 
@@ -27,7 +26,7 @@ def _acts() -> tuple[Client, Study]:
     """An opening by the machine, a closing by an admin, and something done to a scene."""
     accounts = people()
     study = close_study(study=study_rows.a_study(), actor=accounts["admin"])
-    log_event(
+    Event.objects.create(
         actor=accounts["researcher"],
         verb="import",
         object_kind="scene",

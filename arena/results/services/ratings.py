@@ -2,7 +2,7 @@
 
 import platform
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import chain
@@ -43,7 +43,7 @@ from arena.studies.services.opening import product_version
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, UnknownName
 from augment.services.clock import Moment
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.work import Lease, WorkKind
 
 DEFAULT_ROUNDS = 10_000
@@ -144,7 +144,7 @@ class PlannedRatings(WorkKind[Snapshot]):
         row = self.rows.select_related(*self.related).get(pk=pk)
         if row.state == Snapshot.State.FAILED:
             after = {"snapshot": str(row.code), "why": row.reason}
-            _log_act(row.study, row.made_by, "rating failed", after)
+            log_change(row.study, "rating failed", row.made_by, after=after)
 
 
 RATINGS = PlannedRatings()
@@ -169,12 +169,12 @@ def open_early(*, study: Study, actor: User) -> None:
     _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
     if is_new:
         after = {"what": "results", "ends_voting": votes_in(actor, study)}
-        _log_act(study, actor, "look early", after)
+        log_change(study, "look early", actor, after=after)
 
 
 def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
     """Write to the log that somebody looked at results of an open study on purpose."""
-    _log_act(study, actor, "look early", {"what": what})
+    log_change(study, "look early", actor, after={"what": what})
 
 
 # --- Computing and keeping ---------------------------------------------------------------------
@@ -333,13 +333,7 @@ def _log(snapshot: Snapshot) -> None:
     filters = {name: value for name, value in snapshot.filters.items() if name != "authors"}
     after = {"snapshot": str(snapshot.code), "method": snapshot.method, "filters": filters}
     verb = "rate early" if snapshot.is_early else "rate"
-    _log_act(snapshot.study, snapshot.made_by, verb, after)
-
-
-def _log_act(study: Study, actor: User | None, verb: str, after: Mapping[str, object]) -> None:
-    log_event(
-        actor=actor, verb=verb, object_kind="study", object_code=study.code, after=dict(after)
-    )
+    log_change(snapshot.study, verb, snapshot.made_by, after=after)
 
 
 def _vote_set(snapshot: Snapshot) -> vote_queries.VoteSet:

@@ -5,7 +5,7 @@ from django.db import transaction
 
 from arena.errors import StudyStillOpen
 from arena.models import SharedRating, Snapshot, Study
-from augment.services.events import log_event
+from augment.services.events import log_change
 
 
 @transaction.atomic
@@ -19,7 +19,7 @@ def share_rating(snapshot: Snapshot, *, actor: User) -> SharedRating:
         raise StudyStillOpen(snapshot.study.name)
     link, is_new = SharedRating.objects.get_or_create(snapshot=snapshot)
     if is_new:
-        _log(snapshot, "share results", actor)
+        log_change(snapshot.study, "share results", actor, after={"snapshot": str(snapshot.code)})
     return link
 
 
@@ -28,14 +28,6 @@ def stop_sharing(snapshot: Snapshot, *, actor: User) -> None:
     """Take the link back for good; a later one is another."""
     removed, _ = SharedRating.objects.filter(snapshot=snapshot).delete()
     if removed:
-        _log(snapshot, "stop sharing results", actor)
-
-
-def _log(snapshot: Snapshot, verb: str, actor: User) -> None:
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="study",
-        object_code=snapshot.study.code,
-        after={"snapshot": str(snapshot.code)},
-    )
+        log_change(
+            snapshot.study, "stop sharing results", actor, after={"snapshot": str(snapshot.code)}
+        )

@@ -20,7 +20,7 @@ from arena.rating import votes_file
 from arena.results.queries.votes import Judged
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import one_line
 
 COLUMNS = (
@@ -170,13 +170,8 @@ def import_votes(
             raise Conflict(f"There is a study named {name!r} already.") from error
         file = VoteFile.objects.create(study=study, name=path.name[:200], sha256=digest)
         votes = len(ImportedVote.objects.bulk_create(_rows(table, file), batch_size=AT_ONCE))
-        log_event(
-            actor=actor,
-            verb="import votes",
-            object_kind="study",
-            object_code=study.code,
-            after={"file": file.name, "sha256": file.sha256, "votes": votes},
-        )
+        after = {"file": file.name, "sha256": file.sha256, "votes": votes}
+        log_change(study, "import votes", actor, after=after)
     return ImportedVotes(study=study, votes=votes, contestants=len(contestants), note=table.note)
 
 

@@ -14,7 +14,7 @@ from arena.models import Study, Vote
 from arena.voting.services.casting import Decision, cast_vote
 from augment.errors import Conflict
 from augment.models import Augmentation
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.judging.displacement import of_augmentation
 
 NOISE_M = 1.5
@@ -57,13 +57,7 @@ def simulate_votes(*, study: Study, seed: int) -> int:
             cast_vote(expert=matchup.expert, decision=decision)
             cast += 1
     if cast:
-        log_event(
-            actor=None,
-            verb="simulate votes",
-            object_kind="study",
-            object_code=study.code,
-            after={"votes": cast, "seed": seed},
-        )
+        log_change(study, "simulate votes", after={"votes": cast, "seed": seed})
     return cast
 
 
