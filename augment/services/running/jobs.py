@@ -197,8 +197,12 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
         Conflict: The job was cancelled, or nothing in it failed.
     """
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
-    if not _let_wait(job, failed, actor, {}):
+    waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
+    queued = change_all(failed, **waiting)
+    open_again(job)
+    if not queued:
         raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
+    _log(job, "retry", actor, after={"queued": queued})
     return job
 
 
@@ -265,21 +269,6 @@ def _let_follow(rows: Sequence[Augmentation]) -> None:
     Augmentation.objects.bulk_update(later, ["follows"])
 
 
-def _let_wait(
-    job: GenerationJob,
-    rows: QuerySet[Augmentation],
-    actor: User | None,
-    logged: dict[str, str],
-    **columns: object,
-) -> int:
-    """Let rows wait again and their job go on; returns how many there are."""
-    waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
-    queued = change_all(rows, **waiting, **columns)
-    open_again(job)
-    _log(job, "retry", actor, after={"queued": queued, **logged})
-    return queued
-
-
 def _move(
     job: GenerationJob, origins: Sequence[JobState], state: JobState, verb: str, **columns: object
 ) -> None:
@@ -295,16 +284,9 @@ def _move(
         raise Conflict(f"Job '{job.name}' is {is_now}, so it can't be {verb}.")
 
 
-def _log(
-    job: GenerationJob,
-    verb: str,
-    actor: User | None,
-    *,
-    after: dict[str, Any],
-    before: dict[str, Any] | None = None,
-) -> None:
+def _log(job: GenerationJob, verb: str, actor: User | None, **states: dict[str, Any]) -> None:
     """Log a change that is written, and read the job anew."""
-    log_change(job, verb, actor, before=before, after=after)
+    log_change(job, verb, actor, **states)
     job.refresh_from_db()
 
 

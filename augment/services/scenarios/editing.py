@@ -251,10 +251,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
         InvalidDocument: The document breaks the format, or leaves open what jobs need.
         Conflict: The scenario is the catalogue's, whose intents are authored.
     """
-    row = _locked(scenario, "intent")
-    entered = IntentOrigin.ENTERED
-    intent = scenes.placeable_intent(document)
-    return _set(row, "set intent", actor, intent=intent, intent_origin=entered)
+    return _set_intent(_locked(scenario), document, IntentOrigin.ENTERED, actor)
 
 
 @transaction.atomic
@@ -266,13 +263,12 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
         InvalidDocument: What was read leaves open what jobs need.
         Conflict: Nothing that was read waits to be accepted, or the scenario is the catalogue's.
     """
-    row = _locked(scenario, "intent")
+    row = _locked(scenario)
     reading = waiting_reading(row)
     if reading is None:
         raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
-    intent = scenes.placeable_intent(reading.document)
     IntentReading.objects.filter(pk=reading.pk).update(state=IntentReading.State.ACCEPTED)
-    return _set(row, "set intent", actor, intent=intent, intent_origin=IntentOrigin.READ)
+    return _set_intent(row, reading.document, IntentOrigin.READ, actor)
 
 
 def waiting_reading(scenario: Scenario) -> IntentReading | None:
@@ -305,20 +301,21 @@ def refuse_catalogue(row: Scenario, part: str = "reference") -> None:
 # Private
 
 
-def _locked(slug: str, part: str) -> Scenario:
-    """The row to change a part of, which the catalogue's files alone do for its scenarios."""
+def _locked(slug: str) -> Scenario:
+    """The row whose intent is to change, which of the catalogue's its files alone do."""
     row = Scenario.objects.select_for_update(of=("self",)).filter(slug=slug).first()
     if row is None:
         raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
-    refuse_catalogue(row, part)
+    refuse_catalogue(row, "intent")
     return row
 
 
-def _set(row: Scenario, verb: str, actor: User | None, **columns: Any) -> Scenario:
-    before = {name.removeprefix("intent_"): getattr(row, name) or None for name in columns}
-    for name, value in columns.items():
-        setattr(row, name, value)
-    row.save(update_fields=list(columns))
-    after = {name.removeprefix("intent_"): value for name, value in columns.items()}
-    log_change(row, verb, actor, before=before, after=after)
+def _set_intent(
+    row: Scenario, document: object, origin: IntentOrigin, actor: User | None
+) -> Scenario:
+    before = {"intent": row.intent or None, "origin": row.intent_origin or None}
+    row.intent, row.intent_origin = scenes.placeable_intent(document), origin
+    row.save(update_fields=["intent", "intent_origin"])
+    after = {"intent": row.intent, "origin": origin}
+    log_change(row, "set intent", actor, before=before, after=after)
     return row
