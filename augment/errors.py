@@ -1,5 +1,7 @@
 """Every error of augment says what its reader should do; it carries data and knows no HTTP."""
 
+from collections.abc import Iterable
+
 
 class AugmentError(Exception):
     """The root of augment's own errors: its text is a sentence for the person who caused it."""
@@ -43,6 +45,18 @@ class UnknownName(AugmentError):
         self.name = name
         self.allowed = allowed
         super().__init__(f"Unknown {kind} '{name}'. Known: {', '.join(allowed) or 'none yet'}.")
+
+
+def check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Do nothing where all names are known.
+
+    Raises:
+        UnknownName: For the first that is not.
+    """
+    allowed = list(known)
+    for name in names:
+        if name not in allowed:
+            raise UnknownName(kind, name, allowed)
 
 
 class Conflict(AugmentError):

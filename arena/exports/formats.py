@@ -18,7 +18,7 @@ from arena.exports.cells import Columns as Columns
 from arena.exports.cells import Dtype as Dtype
 from arena.exports.cells import Value as Value
 from arena.exports.cells import csv_text
-from augment.errors import UnknownName
+from augment.errors import check_names
 
 Table = TypeVar("Table")
 Named = TypeVar("Named")
@@ -81,8 +81,7 @@ def format_named(known: Mapping[str, Named], name: str) -> Named:
     Raises:
         UnknownName: It is none of the known ones.
     """
-    if name not in known:
-        raise UnknownName("format", name, list(known))
+    check_names("format", [name], known)
     return known[name]
 
 

@@ -12,7 +12,7 @@ from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYou
 from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
 from arena.results.services.written_files import ask_for
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_change
 from augment.services.judging.findings import FaultClass, guess_faults
@@ -124,9 +124,7 @@ def save_label(
 
 def _experts(usernames: Sequence[str]) -> list[User]:
     known = {user.username: user for user in expert_accounts()}
-    for username in usernames:
-        if username not in known:
-            raise UnknownName("expert", username, sorted(known))
+    check_names("expert", usernames, sorted(known))
     experts = [known[username] for username in sorted(set(usernames))]
     simulated = [user.username for user in experts if user.person.is_simulated]
     if simulated:
@@ -153,7 +151,6 @@ def ask_for_file(
     Raises:
         UnknownName: No such format.
     """
-    if file_format not in FORMATS:
-        raise UnknownName("format", file_format, list(FORMATS))
+    check_names("format", [file_format], FORMATS)
     row = ScenarioFile(job=job, format=file_format, asked_by=actor)
     return ask_for(row, job, format=file_format)

@@ -19,7 +19,7 @@ from arena.results.exports.writers import CHARTS, RATING_FILES
 from arena.results.queries.access import snapshot_to_export
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.services.judging import scenario_export, simulations
 from augment.services.judging.analyses import ANALYSES
 from augment.services.judging.displacement import By
@@ -144,8 +144,7 @@ def _write_driving(options: Chosen, say: Say) -> ExportedFile:
 def _write_samples(options: Chosen, say: Say) -> ExportedFile:
     """Write the sheet in the format that is given or that the file's ending says."""
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
-    if form not in SHEET_FORMATS:
-        raise UnknownName("format", form, list(SHEET_FORMATS))
+    check_names("format", [form], SHEET_FORMATS)
     shown = {"scenarios": options["scenarios"], "contestants": options["contestants"]}
     cells = find_cells(find_job(options["job"]), sample=options["sample"], **shown)
     return ExportedFile(sample_sheet(cells, file_format=form, **shown), form, False)

@@ -7,7 +7,7 @@ left open. A new format is a class that fits `Reader`, and its entry in READERS.
 
 from pathlib import Path
 
-from augment.errors import InvalidDocument, UnknownName
+from augment.errors import InvalidDocument, check_names
 from augment.formats.argoverse2 import ArgoverseMotion, ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan_log import NuPlan
@@ -37,10 +37,8 @@ def reader_of(name: str) -> Reader:
     Raises:
         UnknownName: Nobody reads that.
     """
-    try:
-        return READERS[name]
-    except KeyError:
-        raise UnknownName("source", name, list(READERS)) from None
+    check_names("source", [name], READERS)
+    return READERS[name]
 
 
 def recognise(path: Path) -> Reader:

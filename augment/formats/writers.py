@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from augment.errors import UnknownName
+from augment.errors import check_names
 from augment.formats import own_json
 from augment.formats.commonroad import writer as commonroad_writer
 from augment.formats.interplan import writer as interplan_writer
@@ -28,8 +28,7 @@ def writer_named(name: str) -> Writer:
     Raises:
         UnknownName: There is no writer of that name.
     """
-    if name not in WRITERS:
-        raise UnknownName("format", name, list(WRITERS))
+    check_names("format", [name], WRITERS)
     return partial(_write_finite, WRITERS[name])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.errors import InvalidDocument, UnknownName
+from augment.errors import InvalidDocument, check_names
 from augment.scene.schema import path
 
 MOST_VALUES = 100
@@ -37,8 +37,7 @@ def set_number(document: Mapping[str, Any], name: str, value: float) -> dict[str
         UnknownName: There is no number at that path.
     """
     known = list_numbers(document)
-    if name not in known:
-        raise UnknownName("number", name, list(known))
+    check_names("number", [name], known)
     changed: dict[str, Any] = _map_numbers(
         document, lambda steps, part: _exact(part, value) if path(*steps) == name else part
     )

@@ -4,7 +4,7 @@ import importlib
 from collections.abc import Callable, Collection
 from functools import partial
 
-from augment.errors import CannotDrive, UnknownName
+from augment.errors import CannotDrive, UnknownName, check_names
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
 from augment.simulation.planning import IdmPlanner, Planner
 
@@ -30,8 +30,7 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
         UnknownName: The name is not allowed, or there are no such offsets.
         CannotDrive: The path leads to nothing, or to something that is no planner.
     """
-    if offsets not in OFFSETS_M:
-        raise UnknownName("offsets", offsets, list(OFFSETS_M))
+    check_names("offsets", [offsets], OFFSETS_M)
     known: dict[str, Callable[[], Planner]] = {
         PDM_CLOSED: partial(PdmClosed, OFFSETS_M[offsets]),
         IDM: IdmPlanner,

@@ -13,7 +13,7 @@ from django.core.files.storage import default_storage
 
 from arena.results.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from arena.results.exports.tables import shown_name
-from augment.errors import UnknownName
+from augment.errors import check_names
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running.progress import cells_of
 
@@ -60,9 +60,7 @@ def find_cells(
         ("contestant of this job", contestants, {cell.contestant.slug for cell in cells}),
         ("scenario of this job", scenarios, {cell.scenario.slug for cell in cells}),
     ):
-        for name in names:
-            if name not in known:
-                raise UnknownName(kind, name, sorted(known))
+        check_names(kind, names, sorted(known))
     return {(cell.scenario.slug, cell.contestant.slug): cell for cell in cells}
 
 

@@ -39,7 +39,7 @@ from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import Answered
-from augment.errors import UnknownName
+from augment.errors import UnknownName, check_names
 
 MANIFEST = "manifest.json"
 
@@ -203,8 +203,7 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
         UnknownName: The rating has no such chart.
     """
     known = charts(snapshot)
-    if name not in known:
-        raise UnknownName("chart of this rating", name, list(known))
+    check_names("chart of this rating", [name], known)
     return known[name]
 
 

@@ -16,7 +16,7 @@ from django.db.models.fields import CharField
 from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
-from augment.errors import UnknownName
+from augment.errors import check_names
 from augment.models import Contestant
 from augment.services.scenarios.scenes import ScenarioType
 
@@ -428,9 +428,7 @@ def _check_names(study: Study, filters: Filters, votes: Sequence[Judged]) -> Non
         ("scenario type", filters.types, sorted(types)),
         ("expert", filters.experts, sorted(judges)),
     ):
-        for name in names:
-            if name not in known:
-                raise UnknownName(what, name, known)
+        check_names(what, names, known)
 
 
 def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:

@@ -10,7 +10,7 @@ from arena.rating.agreement import AgreementLine, measure_agreement
 from arena.results.queries.judges import judged_pairs
 from arena.results.queries.votes import Filters, current_votes, last_vote_of
 from arena.results.services.agreement import judge_raters, pair_votes
-from augment.errors import UnknownName
+from augment.errors import check_names
 from augment.models import JudgeRun
 from augment.services.running.judge_runs import (
     JudgeEstimate,
@@ -61,6 +61,5 @@ def judge_agreement(study: Study, question: str) -> Mapping[str, AgreementLine]:
 
 
 def _pairs(study: Study, question: str) -> list[ShownPair]:
-    if question not in study.questions:
-        raise UnknownName("question of this study", question, study.questions)
+    check_names("question of this study", [question], study.questions)
     return judged_pairs(study, question)

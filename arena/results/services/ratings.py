@@ -41,7 +41,7 @@ from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.studies.queries import authors_of
 from arena.studies.services.opening import product_version
 from arena.voting.services.turns import in_turn
-from augment.errors import Conflict, LeaseLost, UnknownName
+from augment.errors import Conflict, LeaseLost, check_names
 from augment.services.clock import Moment
 from augment.services.events import log_change
 from augment.services.work import Lease, WorkKind
@@ -313,8 +313,7 @@ def _planned(study: Study, choices: Choices) -> Snapshot:
 
 
 def _read_word(words: type[Word], name: str, what: str) -> Word:
-    if name not in list(words):
-        raise UnknownName(what, name, [word.value for word in words])
+    check_names(what, [name], [word.value for word in words])
     return words(name)
 
 

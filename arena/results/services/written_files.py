@@ -18,7 +18,7 @@ from django.db import transaction
 from arena.models import BenchmarkFile, ScenarioFile, Snapshot, Study, StudyFile
 from arena.models.files import WrittenFile
 from arena.results.queries.votes import is_imported
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.models import Benchmark, GenerationJob
 from augment.services.events import log_change
 from augment.services.work import Lease, Settlement, WorkKind
@@ -127,8 +127,7 @@ def why_not(study: Study, kind: str) -> str:
     Raises:
         UnknownName: There is no such kind.
     """
-    if kind not in Kind.values:
-        raise UnknownName("file of a study", kind, list(Kind.values))
+    check_names("file of a study", [kind], Kind.values)
     is_cancelled = study.state == Study.State.CANCELLED
     if kind == Kind.STUDY:
         if study.state == Study.State.OPEN:

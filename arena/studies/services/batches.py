@@ -17,7 +17,7 @@ from arena.results.services.boards import require_poolable
 from arena.studies.services.opening import open_study
 from arena.studies.services.pictures import find_showable
 from arena.studies.services.plan import plan_of
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.models import Contestant
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
@@ -67,9 +67,7 @@ def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) 
     if table is None:
         raise Conflict("Publish the first table before new contestants are compared with it.")
     possible = list(possible_newcomers(board).values_list("slug", flat=True))
-    for slug in asked.newcomers:
-        if slug not in possible:
-            raise UnknownName("new contestant", slug, possible)
+    check_names("new contestant", asked.newcomers, possible)
     rated = [line.slug for line in table.document.lines if line.votes]
     plans = [plan_of(study) for study in studies]
     study_plan = replace(

@@ -29,7 +29,7 @@ from arena.studies.services.pictures import Cells, check_pictures, require_check
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
 from augment.services.events import log_change
@@ -154,9 +154,7 @@ def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
 
 def find_named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
     """Return what has these names, sorted by them; raise UnknownName for one that is not known."""
-    for name in names:
-        if name not in known:
-            raise UnknownName(kind, name, sorted(known))
+    check_names(kind, names, sorted(known))
     return [known[name] for name in sorted(set(names))]
 
 

@@ -9,7 +9,7 @@ from django.db import transaction
 
 from augment.baselines.family import FamilyMember, sample_family
 from augment.baselines.rule_placer import place
-from augment.errors import AugmentError, Conflict, UnknownName
+from augment.errors import AugmentError, Conflict, check_names
 from augment.formats import own_json
 from augment.formats.writing import Cell
 from augment.models import Scenario, Simulation, Sweep, SweepValue
@@ -122,8 +122,7 @@ def changes_of(
         Conflict: No value fits.
     """
     known, scene, number = numbers_of(scenario), scene_of(scenario), request.number
-    if number not in known:
-        raise UnknownName("number", number, list(known))
+    check_names("number", [number], known)
     document, changes = _document(scenario, number), dict[float, Modification | AugmentError]()
     for value in request.values:
         try:

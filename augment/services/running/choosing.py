@@ -7,7 +7,7 @@ from uuid import UUID
 from django.db.models import Q
 
 from augment.baselines.registry import PLACERS
-from augment.errors import AugmentError, Conflict, UnknownName
+from augment.errors import AugmentError, Conflict, UnknownName, check_names
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
@@ -109,10 +109,7 @@ def resolve_contestants(given: Sequence[str]) -> list[str]:
     if list(given) == [ALL]:
         rows = Contestant.objects.filter(EVERYWHERE, retired_at=None)
         return list(rows.values_list("slug", flat=True))
-    known = set(Contestant.objects.values_list("slug", flat=True))
-    for slug in given:
-        if slug not in known:
-            raise UnknownName("contestant", slug, sorted(known))
+    check_names("contestant", given, sorted(Contestant.objects.values_list("slug", flat=True)))
     return list(given)
 
 

@@ -6,7 +6,7 @@ from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.errors import BudgetSpent, LeaseLost, ModelFault, ReplyUnreadable, UnknownName
+from augment.errors import BudgetSpent, LeaseLost, ModelFault, ReplyUnreadable
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, Scenario
@@ -17,6 +17,7 @@ from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.events import log_change
 from augment.services.running.budget import Room
 from augment.services.running.calls import CallTranscript, sentence_of
+from augment.services.scenarios.scenes import scenario_named
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
 from augment.variants.respondents import NoteKind
@@ -53,10 +54,7 @@ def read_intent(
     Raises:
         UnknownName: No such scenario or endpoint.
     """
-    row = Scenario.objects.filter(slug=scenario).first()
-    if row is None:
-        slugs = Scenario.objects.values_list("slug", flat=True)
-        raise UnknownName("scenario", scenario, list(slugs))
+    row = scenario_named(scenario)
     kind = Readings(client)
     with transaction.atomic():  # taken before any worker sees it
         reading = plan_reading(scenario=row, endpoint=find_endpoint(endpoint), model=model)

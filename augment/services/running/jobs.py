@@ -9,7 +9,7 @@ from django.db import transaction
 from django.db.models import Case, Exists, F, OuterRef, QuerySet, Value, When
 from django.utils import timezone
 
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
@@ -293,7 +293,6 @@ def _log(job: GenerationJob, verb: str, actor: User | None, **states: dict[str, 
 def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
     """Return the rows of those slugs in the given order, each once."""
     by_slug = {row.slug: row for row in rows.filter(slug__in=slugs)}
-    for slug in slugs:
-        if slug not in by_slug:
-            raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
+    if not by_slug.keys() >= set(slugs):
+        check_names(what, slugs, rows.values_list("slug", flat=True))
     return [by_slug[slug] for slug in dict.fromkeys(slugs)]

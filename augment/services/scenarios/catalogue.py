@@ -14,7 +14,7 @@ from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
+from augment.errors import Conflict, InvalidDocument, InvalidModification, check_names
 from augment.formats.documents import read_json
 from augment.models import Augmentation, BaseScene, Scenario
 from augment.scene import codec
@@ -152,9 +152,7 @@ def load_catalogue(
             fit together; every problem names its file and the path inside it.
         Conflict: A slug belongs to a row from elsewhere.
     """
-    for name in sets:
-        if name not in list(CatalogueSet):
-            raise UnknownName("set", name, list(CatalogueSet))
+    check_names("set", sets, CatalogueSet)
     scene_steps: dict[str, CatalogueStep] = {}
     steps: dict[str, CatalogueStep] = {}
     for which in map(CatalogueSet, sets):

@@ -16,7 +16,7 @@ from pydantic import Field, TypeAdapter
 
 from augment.checks import Ground
 from augment.checks.derived_motions import find_wish
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.geometry.frames import difference, wrap
 from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
@@ -163,8 +163,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
     edit = _PRESET.from_parts(given)
     after = apply(editable_ground(scenario).scene, change)
     agents = {agent.id: agent for agent in after.agents}
-    if edit.agent_id not in agents:
-        raise UnknownName("agent", edit.agent_id, list(agents))
+    check_names("agent", [edit.agent_id], agents)
     mover = replace(agents[edit.agent_id], motion=None)
     if edit.preset is not None:
         start = None if edit.within_m is None else NearEgo(within_m=edit.within_m)
@@ -303,9 +302,8 @@ def refuse_catalogue(row: Scenario, part: str = "reference") -> None:
 
 def _locked(slug: str) -> Scenario:
     """The row whose intent is to change, which of the catalogue's its files alone do."""
-    row = Scenario.objects.select_for_update(of=("self",)).filter(slug=slug).first()
-    if row is None:
-        raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
+    rows = Scenario.objects.select_for_update(of=("self",))
+    row = rows.get(pk=scenes.scenario_named(slug).pk)
     refuse_catalogue(row, "intent")
     return row
 

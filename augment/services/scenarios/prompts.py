@@ -2,7 +2,7 @@
 
 from django.db import connection
 
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict, check_names
 from augment.fake_llm.sight import same_text
 from augment.models import Scenario
 from augment.prompts.fill import prompt_version as prompt_version
@@ -43,8 +43,7 @@ def preview_prompt(
         UnknownName: No such variant or role.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
-    if role not in list(ModelRole):
-        raise UnknownName("role", role, [one.value for one in ModelRole])
+    check_names("role", [role], [one.value for one in ModelRole])
     recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
     if role not in recipe.roles:
         played = ", ".join(recipe.roles)
