@@ -21,11 +21,10 @@ from arena.api.fields import (
     WholeNumberField,
 )
 from arena.api.views import ApiView, FileView, Given, file_operation, operation
-from arena.errors import StudyNotOpen
-from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Study, Vote
+from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Vote
 from arena.people.services import keep_voting
 from arena.studies.services.experts import SIDES, Complaint, report
-from arena.voting.queries.ballots import upcoming
+from arena.voting.queries.ballots import require_open, upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, Decision, receive_vote
@@ -157,8 +156,7 @@ class MatchupsView(ApiView):
         An empty list when all is done.
         """
         study = get_object_or_404(self.user.studies, code=given["study"])
-        if study.state != Study.State.OPEN:
-            raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+        require_open(study)
         matchups = upcoming(study=study, expert=self.user, n=given["n"])
         return Response([as_shown(matchup) for matchup in matchups])
 

@@ -15,7 +15,7 @@ from django.db.models import QuerySet
 from arena.errors import InvalidVote, NothingToPlan, NotYours, StudyNotOpen
 from arena.models import Matchup, PracticePair, Report, Study, Vote
 from arena.studies.services.pictures import latest_pairs
-from arena.voting.queries.ballots import matchup_of
+from arena.voting.queries.ballots import matchup_of, require_open
 from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
 from augment.models import Scenario
@@ -98,8 +98,7 @@ def require_practice_pictures() -> None:
 
 
 def _unanswered(study: Study, expert: User) -> QuerySet[PracticePair]:
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+    require_open(study)
     return PracticePair.objects.filter(study=study, expert=expert, answer="")
 
 

@@ -12,7 +12,7 @@ from django.db.models.expressions import RawSQL
 from django.db.models.fields import BooleanField, IntegerField
 from django.utils import timezone
 
-from arena.errors import NotYours
+from arena.errors import NotYours, StudyNotOpen
 from arena.models import Matchup, Study, Vote
 from arena.people.queries import by_pseudonym
 
@@ -39,6 +39,12 @@ class ExpertTally(VotingProgress):
     left_wins: int
     ties: int
     right_wins: int
+
+
+def require_open(study: Study) -> None:
+    """Raise StudyNotOpen for a study that takes no votes."""
+    if study.state != Study.State.OPEN:
+        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
 
 
 def matchup_of(*, expert: User, code: UUID | str) -> Matchup:

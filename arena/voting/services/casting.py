@@ -16,9 +16,9 @@ from django.db import IntegrityError, transaction
 from django.db.models import Q
 from django.utils import timezone
 
-from arena.errors import AlreadyDecided, InvalidVote, StudyNotOpen, TooFast
+from arena.errors import AlreadyDecided, InvalidVote, TooFast
 from arena.models import AIDS, Matchup, Question, Study, Vote
-from arena.voting.queries.ballots import VotingProgress, hold_matchup, voting_state
+from arena.voting.queries.ballots import VotingProgress, hold_matchup, require_open, voting_state
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.texts import make_storable
@@ -155,7 +155,7 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
     if vote is not None:
         _check_replay(vote, matchup, decision)
     else:
-        _check_open(matchup.study)
+        require_open(matchup.study)
         _check_turn(decision, asked, {vote.question for vote in known})
         own = [vote for vote in known if vote.question == decision.question]
         vote = _insert(matchup, expert, decision, _superseded(own, decision.supersedes))
@@ -214,11 +214,6 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
         raise AlreadyDecided(vote.outcome)
 
 
-def _check_open(study: Study) -> None:
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
-
-
 def _check_turn(decision: Decision, asked: Sequence[str], answered: Collection[str]) -> None:
     """Raise InvalidVote for a question that the study does not ask, or not yet."""
     question = decision.question
@@ -233,7 +228,7 @@ def _check_turn(decision: Decision, asked: Sequence[str], answered: Collection[s
 
 def _check_allowed(decision: Decision, study: Study) -> None:
     """Raise where the study does not take the vote that was just written, which takes it back."""
-    _check_open(study)
+    require_open(study)
     is_of_instruction = decision.question == Question.INSTRUCTION
     if decision.both_miss and not (study.allow_both_miss and is_of_instruction):
         raise InvalidVote({"both_miss": "Nobody is asked here whether both miss."})
