@@ -11,6 +11,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from augment.checks.finding import FaultClass
+from augment.fake_llm.careless import put
 from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
@@ -118,11 +119,7 @@ def straight_line(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents
 
     def laid_out(agent: TrafficAgent) -> TrafficAgent:
         place = route.locate_agent(agent)
-        s_m, d_m = place.ahead_m, place.left_m
-        walk = agent.walk_to_m
-        if walk is not None:
-            walk = (walk[0] + s_m - agent.x_m, walk[1] + d_m - agent.y_m)
-        return name_lane(route, replace(agent, x_m=s_m, y_m=d_m, walk_to_m=walk))
+        return name_lane(route, put(agent, place.ahead_m, place.left_m))
 
     made = change_each(agents, laid_out)
     off_m = [_seen_m(route, was, one) for one, was in zip(made, agents, strict=True)]

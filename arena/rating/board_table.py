@@ -5,13 +5,10 @@ In: the lines of a rating. Out: the same lines on the scale of the board's first
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any, Literal, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
-
 from arena.rating.lines import Line
-from augment.errors import InvalidDocument
+from arena.rating.snapshot_document import read_document
 
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
@@ -106,16 +103,7 @@ def table_from_document(document: Mapping[str, Any]) -> BoardTableDocument:
     Raises:
         InvalidDocument: It is none that this version knows.
     """
-    try:
-        return _adapter().validate_python(document)
-    except ValidationError as error:
-        faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
-        raise InvalidDocument("board table", faults) from error
-
-
-@cache
-def _adapter() -> TypeAdapter[BoardTableDocument]:
-    return TypeAdapter(BoardTableDocument)
+    return read_document(BoardTableDocument, document, what="board table")
 
 
 def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[AnyLine]:

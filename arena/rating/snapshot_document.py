@@ -9,7 +9,7 @@ are no longer computed are passed over.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
@@ -46,6 +46,8 @@ def _joined(value: Any) -> Any:
 
 Kept = Annotated[str, PlainValidator(read_text)]
 
+
+Value = TypeVar("Value")
 
 VERSION = 5
 """4 drew other resamples of single votes from a seed; 3 had not yet what ratings once were
@@ -280,11 +282,20 @@ def read_results(document: Mapping[str, Any]) -> Results:
     if version not in range(VERSION + 1):
         allowed = f"a version from 0 to {VERSION}, not {version!r}"
         raise InvalidDocument("rating", [("version", allowed)])
+    return read_document(Results, document, what="rating")
+
+
+def read_document(shape: type[Value], document: Mapping[str, Any], *, what: str) -> Value:
+    """Return the dataclass whose fields a JSON object has, by their names.
+
+    Raises:
+        InvalidDocument: It is none that this version knows.
+    """
     try:
-        return _adapter().validate_python(document)
+        return cast(Value, _make_adapter(cast(Any, shape)).validate_python(document))
     except ValidationError as error:
         faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
-        raise InvalidDocument("rating", faults) from error
+        raise InvalidDocument(what, faults) from error
 
 
 def results_document(results: Results) -> dict[str, Any]:
@@ -296,8 +307,8 @@ def results_document(results: Results) -> dict[str, Any]:
 
 
 @cache
-def _adapter() -> TypeAdapter[Results]:
-    return TypeAdapter(Results)
+def _make_adapter(shape: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(shape)
 
 
 def _document(value: Any, version: int) -> Any:

@@ -75,7 +75,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EditTask:
-    """What a modifier is to do.
+    """The task of a modifier.
 
     Attributes:
         scene: The scene before the change.

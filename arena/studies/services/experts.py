@@ -135,7 +135,7 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Complaint:
-    """What an expert reports.
+    """A report of an expert on a matchup.
 
     Attributes:
         key: Made by the browser, one per report.

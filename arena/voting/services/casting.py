@@ -30,7 +30,7 @@ PREFERENCES = (Vote.Outcome.LEFT, Vote.Outcome.RIGHT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What an expert decided about a matchup; its parts are known and go together.
+    """A decision of an expert on a matchup; its parts are known and go together.
 
     Attributes:
         key: Made by the browser, one per decision.
@@ -113,7 +113,7 @@ def receive_vote(*, expert: User, decision: Decision) -> Received:
 
 
 def _find_faults(decision: Decision) -> dict[str, str]:
-    """Return what is unknown or does not go with the outcome, by the name of the part."""
+    """Return faults of a decision: parts that are unknown or contradict its outcome."""
     outcome, faults = decision.outcome, {}
     if outcome not in Vote.Outcome:
         faults["outcome"] = f"One of these is needed: {', '.join(Vote.Outcome.values)}."

@@ -97,7 +97,7 @@ def placeable_intent(document: object) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioContent:
-    """What a scenario says and draws, as it is entered.
+    """The words and the drawing of a scenario, as they are entered.
 
     Attributes:
         type: The value of a `ScenarioType`, or a slug of one's own.
