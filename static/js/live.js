@@ -58,6 +58,10 @@ async function showAnew() {
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("live");
   const isOver = !fresh || !("live" in fresh.dataset);
+  if (isOver) {
+    // "It is launched" is no news beside what came of it.
+    for (const line of document.querySelectorAll(".messages > :not(.is-bad)")) line.remove();
+  }
   if (isOver && "reload" in live().dataset && !isTouched) location.reload();
   else if (fresh && !document.activeElement.matches("#live :is(input, select, textarea)")) {
     replace(live(), fresh);

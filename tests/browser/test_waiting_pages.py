@@ -7,14 +7,18 @@ from pathlib import Path
 import pytest
 from django.urls import reverse
 from playwright.sync_api import Browser, Page, Route, expect
+from pytest_django import Settings
 from pytest_django.live_server_helper import LiveServer
 
-from arena.models import Study
+from arena.models import BenchmarkFile, Study
+from arena.scenarios.exports import BENCHMARK_FILES
 from augment.models import BaseScene, SceneUpload
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.scenarios.pictures import draw_scene
 from tests.browser.booth import Booth
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene
+from tests.services.test_benchmarks import add_street
 from tests.web.cast import people
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
@@ -60,3 +64,17 @@ def test_a_picture_appears_on_the_page_that_waits_for_it(scenes_page: Page) -> N
     expect(scenes_page.locator("#live img")).to_have_count(1)
     expect(scenes_page.locator("#live[data-live]")).to_have_count(0)
     assert scenes_page.evaluate("isTheSamePage")
+
+
+def test_what_was_said_of_a_start_makes_room_for_what_came_of_it(
+    scenes_page: Page, settings: Settings, tmp_path: Path
+) -> None:
+    settings.MEDIA_ROOT = tmp_path
+    add_street(1)
+    row = make_benchmark(BenchmarkRequest(slug="s", title="Streets", scenarios=["street-*"]))
+    scenes_page.goto(reverse("benchmark", args=[row.code]))
+    scenes_page.get_by_role("button", name="Write it").click()
+    expect(scenes_page.locator(".messages li").first).to_be_visible()
+    BENCHMARK_FILES.perform(BenchmarkFile.objects.get().pk)
+    expect(scenes_page.get_by_role("link", name="s-1.zip")).to_be_visible()
+    expect(scenes_page.locator(".messages li")).to_have_count(0)

@@ -122,17 +122,20 @@ def page_of(client: Client, job: GenerationJob) -> str:
 def test_a_worker_writes_the_zip_that_the_jobs_page_offers(
     job: GenerationJob, admin_client: Client
 ) -> None:
+    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     for form in WRITERS:
         assert reverse("scenarios-write", args=[job.code, form]) in page_of(admin_client, job)
     admin_client.post(reverse("scenarios-write", args=[job.code, "commonroad"]))
     row = ScenarioFile.objects.get()
-    assert "waits for a worker" in page_of(admin_client, job)
+    waiting = page_of(admin_client, job)
+    assert all(word in waiting for word in ("waits for a worker", "data-live"))
     assert admin_client.get(reverse("scenarios-export", args=[row.code])).status_code == 404
     admin_client.post(reverse("scenarios-write", args=[job.code, "commonroad"]))
     assert ScenarioFile.objects.count() == 1, "one that waits is asked for once more"
     SCENARIO_FILES.perform(row.pk)
     page = page_of(admin_client, job)
     assert "Not for commercial use." in page
+    assert "data-live" not in page
     assert "must not be used commercially: junction" in page
     answer = admin_client.get(reverse("scenarios-export", args=[row.code]))
     assert "round-1-commonroad-non-commercial.zip" in answer["Content-Disposition"]

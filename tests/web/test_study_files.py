@@ -68,11 +68,12 @@ def test_a_worker_writes_the_folder_of_the_command_as_one_zip(
     address = reverse("study-file", args=[closed.code, "study"])
     assert reverse("study-write", args=[closed.code, "study"]) in shown(admin, closed)
     admin.post(reverse("study-write", args=[closed.code, "study"]))
-    assert "waits for a worker" in shown(admin, closed)
+    assert all(word in shown(admin, closed) for word in ("waits for a worker", "data-live"))
     assert admin.get(address).status_code == 404, "it is not there yet"
     row = write(admin, closed, "study")
     assert StudyFile.objects.count() == 1, "one that waits is asked for once more"
     assert address in shown(admin, closed)
+    assert "data-live" not in shown(admin, closed)
     packed = content_of(admin, closed, "study")
     assert len(packed) == row.size_bytes
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:

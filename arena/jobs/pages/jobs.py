@@ -123,6 +123,7 @@ def _show_displacement(request: HttpRequest, counts: JobCounts) -> Context:
 def _show_files(_request: HttpRequest, counts: JobCounts) -> Context:
     files = {row.format: row for row in ScenarioFile.objects.filter(job=counts.job).order_by("pk")}
     return {
+        "is_live": not counts.is_over or any(row.is_waiting for row in files.values()),
         "scenario_files": [(form, files.get(form)) for form in FORMATS],
         "has_tool_calls": bool(progress.tool_calls(counts.job)),
     }

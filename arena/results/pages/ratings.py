@@ -30,7 +30,7 @@ from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
 from arena.results.services.sharing import share_rating, stop_sharing
 from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, page_for, user_of
-from arena.site.acts import refusals_told, tell_errors
+from arena.site.acts import refusals_told, tell_errors, wait_for_workers
 from arena.studies.pages.studies import export_place
 from augment.services.inputs import read_request
 
@@ -73,7 +73,8 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
     if is_staff:
         context["form"] = RatingForm(snapshot=snapshot, study=study)
         # Votes from a file have no page of a study, where the files are otherwise.
-        context["export"] = export_place(study, user) if is_imported(study) else None
+        export = context["export"] = export_place(study, user) if is_imported(study) else None
+        context |= wait_for_workers(waits=export is not None and export["is_waiting"])
     if is_staff and (link := getattr(snapshot, "shared", None)):
         address = reverse("shared-results", args=[link.token])
         context["shared_address"] = request.build_absolute_uri(address)

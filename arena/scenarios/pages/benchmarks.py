@@ -17,7 +17,7 @@ from arena.people.queries import role_of
 from arena.results.services.written_files import ask_for
 from arena.scenarios.queries import count_tasks, list_benchmarks
 from arena.site.access import ADMIN, BENCHMARK_READERS, STAFF, act_for, form_for, page_for, user_of
-from arena.site.acts import refusals_in, send_later
+from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm
 from augment.errors import Conflict
 from augment.models import Benchmark
@@ -77,14 +77,16 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show how many tasks there are of which kind, and where to get them."""
     row = get_object_or_404(Benchmark.objects.select_related("made_by"), code=code)
     items = row.items.select_related("scenario").defer("scenario__reference")
+    file = _file_of(row)
     context = {
         "benchmark": row,
         "items": items,
         "counts": count_tasks((one.split, one.stratum) for one in items),
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
-        "file": _file_of(row),
+        "file": file,
         "remarks": benchmarks.list_remarks(row),
         "is_staff": role_of(request.user) in STAFF,
+        **wait_for_workers(waits=file is not None and file.is_waiting),
     }
     return render(request, "benchmarks/benchmark.html", context)
 

@@ -32,7 +32,7 @@ from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_reading, enqueue_scenario
 
-SCENARIOS_AT_ONCE = 60
+SCENARIOS_AT_ONCE = 16
 LONGEST_FILE = 200_000
 JSON_STYLE = {"indent": 2, "ensure_ascii": False}
 
@@ -84,19 +84,21 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if is_waiting and not acts.looks_again(request):
         acts.send_later(request, enqueue_scenario, scenario.pk)
     readers = EndpointModel.objects.select_related("endpoint")
+    last = last_reading(scenario)
+    is_reading = last is not None and last.state in last.UNDER_WAY
     context = {
         "scenario": scenario,
         "paraphrases": scenario.paraphrases.all(),
         "follow_ups": scenario.follow_ups.filter(retired_at=None),
         "has_picture": has_picture,
         "reference_name": reference,
-        **acts.wait_for_workers(waits=is_waiting),
+        **acts.wait_for_workers(waits=is_waiting or is_reading),
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),
         "statements": statements_of(scenario.intent),
         "reading": reading,
         "reading_statements": statements_of(None if reading is None else reading.document),
-        "last_reading": last_reading(scenario),
+        "last_reading": last,
         "readers": readers.order_by("endpoint__label", "model"),
         "notes": notes_of(scenario.base_scene.notes),
         "augmentations": queries.augmentations_of(scenario),

@@ -37,6 +37,7 @@ from arena.site.acts import (
     refusals_told,
     send_later,
     tell_errors,
+    wait_for_workers,
     wants_to_change,
 )
 from arena.site.listing import read_listing, read_page
@@ -77,11 +78,12 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if is_imported(study):
         return redirect("results", code=code)
     study_plan, (line,) = plan_of(study), queries.progress_of([study])
-    lines = queries.expert_lines(study)
+    lines, export = queries.expert_lines(study), export_place(study, user_of(request))
     long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {
         "line": line,
-        "export": export_place(study, user_of(request)),
+        "export": export,
+        **wait_for_workers(waits=export["is_waiting"]),
         "lines": lines,
         "done": sum(not one.tally.left for one in lines),
         "without_link": sum(one.waits_for_link for one in lines),
