@@ -68,8 +68,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
 
 def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Generator) -> Extras:
     """One expert's repeats and checks, by lot."""
-    repeats = round(rules.repeat_share * rules.votes_per_expert)
-    checks = min(round(rules.check_share * rules.votes_per_expert), len(rules.checks))
+    repeats, checks = rules.count_extras(rules.votes_per_expert)
     if not repeats and not checks:
         return Extras()
     units = np.argwhere(mine)

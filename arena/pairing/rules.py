@@ -92,6 +92,11 @@ class PlanRules:
         """What can be shown of the entries."""
         return grid_of(self.entries, self.alike, self.challengers)
 
+    def count_extras(self, votes: int) -> tuple[int, int]:
+        """Return how many repeats and checks come on top of that many votes of one expert."""
+        checks = min(round(self.check_share * votes), len(self.checks))
+        return round(self.repeat_share * votes), checks
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannedMatchup:

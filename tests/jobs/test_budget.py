@@ -317,6 +317,7 @@ def test_without_earlier_runs_only_the_calls_are_known() -> None:
     assert (found.rows, found.asking_rows, line.seen) == (8, 4, 0)
     assert line.calls == (4, 4, 8)
     assert (line.tokens_in, line.usd, found.unpriced) == (None, None, (line,))
+    assert (found.tokens_in, found.tokens_out, found.usd) == (None, None, None), "not 0"
 
 
 def test_after_a_run_it_is_what_was_used() -> None:

@@ -47,8 +47,19 @@ def test_the_page_says_what_one_agrees_to_and_takes_the_id_from_the_address(
     page = Client().get(reverse("enrol", args=[enrolment.token]) + "?PROLIFIC_PID=abc")
     text = page.content.decode()
     assert "I agree &lt;fully&gt;." in text
-    assert "in 6 pairs" in text
     assert 'value="abc"' in text
+
+
+@pytest.mark.parametrize(("votes", "pairs"), [(6, 8), (100, 24)])
+def test_the_page_promises_as_many_pairs_as_the_ballot_has(
+    enrolment: Enrolment, votes: int, pairs: int
+) -> None:
+    Study.objects.update(rules={**enrolment.study.rules, "repeat_share": 0.34})
+    Enrolment.objects.update(votes_each=votes)
+    page = Client().get(reverse("enrol", args=[enrolment.token])).content.decode()
+    join(Client(), enrolment)
+    shown = matchups_of(enrolment.study, enrolment.voters.get().expert.username)
+    assert (f"in {pairs} pairs" in page, len(shown)) == (True, pairs)
 
 
 def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enrolment) -> None:

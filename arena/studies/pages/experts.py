@@ -24,6 +24,7 @@ from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_to
 from arena.site.listing import read_page
 from arena.studies.forms import AuthorForm
 from arena.studies.queries import enrolled_voters, expert_lines, state_of
+from arena.studies.services.planning import Planning
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
     LONGEST_ID,
@@ -241,7 +242,8 @@ def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) ->
         enrolment.refresh_from_db()
     if is_over:
         return render(request, "enrol_over.html", {"study": enrolment.study}, status=GONE)
-    context = {"enrolment": enrolment, "form": form}
+    pairs = Planning.begin(enrolment.study).count_pairs(enrolment.votes_each)
+    context = {"enrolment": enrolment, "form": form, "pairs": pairs}
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
 
 

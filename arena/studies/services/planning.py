@@ -203,6 +203,11 @@ class Planning:
         rng = np.random.default_rng([rules.seed, number])
         return cls(study=study, number=number, cells=cells, rules=rules, grid=rules.grid, rng=rng)
 
+    def count_pairs(self, votes: int) -> int:
+        """Return how many pairs somebody new is shown for a quota, repeats and checks included."""
+        quota = min(votes, int(self.grid.showable.sum()))
+        return quota + sum(self.rules.count_extras(quota))
+
     def follow(
         self, username: str, known: Sequence[PlannedMatchup], units: Sequence[GridUnit]
     ) -> list[PlannedMatchup]:

@@ -61,19 +61,22 @@ class JobEstimate:
         return tuple(sum(line.calls[place] for line in self.lines) for place in range(3))
 
     @property
-    def tokens_in(self) -> int:
-        """Of the prompts, as far as it is known."""
-        return sum(line.tokens_in or 0 for line in self.lines)
+    def tokens_in(self) -> int | None:
+        """Of the prompts, as far as it is known; None where it is of nobody."""
+        known = [line.tokens_in for line in self.lines if line.tokens_in is not None]
+        return sum(known) if known or not self.lines else None
 
     @property
-    def tokens_out(self) -> int:
-        """Of the answers, as far as it is known."""
-        return sum(line.tokens_out or 0 for line in self.lines)
+    def tokens_out(self) -> int | None:
+        """Of the answers, likewise."""
+        known = [line.tokens_out for line in self.lines if line.tokens_out is not None]
+        return sum(known) if known or not self.lines else None
 
     @property
-    def usd(self) -> Decimal:
-        """The cost as far as it is known."""
-        return sum((line.usd or Decimal(0) for line in self.lines), Decimal(0))
+    def usd(self) -> Decimal | None:
+        """The cost, likewise."""
+        known = [line.usd for line in self.lines if line.usd is not None]
+        return sum(known, Decimal(0)) if known or not self.lines else None
 
     @property
     def unpriced(self) -> tuple[ContestantEstimate, ...]:
