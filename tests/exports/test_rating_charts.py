@@ -1,23 +1,34 @@
 """Every chart of a rating as a file: the same twice, complete, and for staff alone."""
 
+import re
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import pytest
 from django.urls import reverse
 
 from arena import tasks
 from arena.models import Snapshot
-from arena.rating.snapshot_document import DisplacementSummary, PairRecord, ScenarioCost
+from arena.rating.snapshot_document import (
+    DisplacementSummary,
+    PairRecord,
+    ScenarioCost,
+    TypeRating,
+    TypeStanding,
+)
 from arena.results.exports.charts import (
+    Chart,
     Point,
     Scatter,
     charts,
     heat_chart,
     interval_chart,
+    rows_chart,
     scatter_chart,
+    type_charts,
 )
 from arena.results.exports.drawing import SIMULATED
 from arena.results.exports.tables import Row, leaderboard_table
@@ -88,8 +99,7 @@ def test_the_heat_map_mirrors_scores_and_says_nothing_without_votes() -> None:
 def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None:
     row = a_row("x", simulated=simulated)
     points = [
-        Point(number=n, row=row, x=x, model_class="utility")
-        for n, x in enumerate((1.0, 2.0), start=1)
+        Point(key=key, row=row, x=x, model_class="utility") for key, x in (("A", 1.0), ("B", 2.0))
     ]
     drawing = scatter_chart(Scatter(across="Votes", points=points), file_format="svg").decode()
     assert (SIMULATED in drawing, "#2c7a4b" in drawing) == (simulated, not simulated)
@@ -108,6 +118,27 @@ def test_a_worker_draws_the_charts_and_pages_only_read_them(
     Snapshot.objects.filter(pk=snapshot.pk).update(is_early=True)  # which a chart says
     with pytest.raises(TypeError):
         reader.get(reverse("results-export", args=[snapshot.study.code, "leaderboard", "svg"]))
+
+
+def test_charts_have_the_ranks_of_the_table_and_the_star_of_the_page() -> None:
+    """Two of three share the first rank; of one there are few votes, in one type."""
+    rows = [replace(a_row(slug), rank=rank) for slug, rank in (("a", 1), ("b", 1), ("c", 3))]
+    pair = PairRecord(a="a", b="b", wins=30, ties=10, losses=0, both_miss=0, planned=50)
+    no_interval: dict[str, Any] = {"rating": 1000.0, "lower": None, "upper": None}
+    lines = tuple(
+        TypeStanding(slug=row.slug, rank=row.rank, votes=votes, few=votes < 30, **no_interval)
+        for row, votes in zip(rows, (30, 29, 0), strict=True)
+    )
+    part = TypeRating(type="t", label="T", votes=59, scenarios=1, status="", lines=lines)
+
+    def texts(chart: Chart, *given: Any) -> list[str]:
+        return re.findall(r">([^<]+)</text>", chart(*given, file_format="svg").decode())
+
+    for drawn in (texts(rows_chart, rows, "Elo"), texts(heat_chart, rows, [pair])):
+        assert {"a  1", "b  1", "c  3"} < set(drawn)
+    assert texts(heat_chart, rows, [pair])[:3] == ["1", "1", "3"], "columns"
+    assert {"1", "1*"} < set(texts(type_charts, [part], rows))
+    assert "3" not in texts(type_charts, [part], rows), "nobody voted"
 
 
 @pytest.mark.usefixtures("drawn_anew")

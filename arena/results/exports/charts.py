@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import string
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,11 +13,12 @@ import numpy as np
 
 from arena.models import Snapshot
 from arena.rating.lines import whole_percent
-from arena.rating.snapshot_document import PairRecord, TypeRating
+from arena.rating.snapshot_document import PairRecord, TypeRating, TypeStanding
 from arena.results.exports.drawing import (
     INK,
     MARK,
     SIMULATED,
+    SOFT,
     Interval,
     draw_interval,
     draw_once,
@@ -25,6 +27,7 @@ from arena.results.exports.drawing import (
     write_figure,
 )
 from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
+from arena.results.services.analysis import FEW_VOTES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,11 +52,11 @@ class Point:
     """A contestant in a scatter chart.
 
     Attributes:
-        number: Its place in the table.
+        key: What it is called in the drawing, as in the table beside it.
         model_class: Whose colour it has, empty without.
     """
 
-    number: int
+    key: str
     row: Row
     x: float
     model_class: str = ""
@@ -89,15 +92,15 @@ def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatte
     """Return the scatter charts that have points, by name."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}
-    rated = [(n, row) for n, row in enumerate(table.rows, start=1) if row.rating is not None]
+    rated = [(key, row) for key, row in key_rows(table) if row.rating is not None]
     far = [
-        Point(number=n, row=row, x=x)
-        for n, row in rated
+        Point(key=key, row=row, x=x)
+        for key, row in rated
         if (x := metres.get(row.slug)) is not None
     ]
     spent = [
-        Point(number=n, row=row, x=cost.usd, model_class=cost.model_class)
-        for n, row in rated
+        Point(key=key, row=row, x=cost.usd, model_class=cost.model_class)
+        for key, row in rated
         if (cost := costs.get(row.slug)) and cost.usd
     ]
     by_name = {
@@ -105,6 +108,12 @@ def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatte
         "elo-usd": Scatter(across="USD per scenario", points=spent, is_log=True),
     }
     return {name: plot for name, plot in by_name.items() if plot.points}
+
+
+def key_rows(table: LeaderboardTable) -> list[tuple[str, Row]]:
+    """Return rows with letters of their own, which nobody takes for ranks: A to Z, A1 to Z1."""
+    letters, many = string.ascii_uppercase, len(string.ascii_uppercase)
+    return [(f"{letters[n % many]}{n // many or ''}", row) for n, row in enumerate(table.rows)]
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
@@ -121,6 +130,7 @@ def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
         figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(rows)), layout="constrained")
         axes = figure.add_subplot()
         _draw_intervals(axes, rows, {row.slug: row.interval for row in rows})
+        _name_ranked(axes, rows)
         axes.set_xlabel(label)
         return write_figure(figure, file_format)
 
@@ -139,11 +149,15 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
         for panel, part in zip(grid.flat, parts, strict=False):
             intervals = {line.slug: (line.lower, line.rating, line.upper) for line in part.lines}
             _draw_intervals(panel, rows, intervals)
+            name_lines(panel, [row.model for row in rows], [row.is_simulated for row in rows])
+            _note_ranks(panel, rows, part)
             panel.set_title(f"{part.label} (n {part.votes})", fontsize=7)
             panel.tick_params(axis="x", labelbottom=True)
         for panel in grid.flat[len(parts) :]:
             panel.set_visible(False)
-        figure.supxlabel("Elo with 95 % intervals, each type rated by itself", fontsize=8)
+        text = "Elo with 95 % intervals, each type rated by itself;"
+        text += f" ranks at the right, * with fewer than {FEW_VOTES} votes"
+        figure.supxlabel(text, fontsize=8)
         return write_figure(figure, file_format)
 
 
@@ -162,9 +176,8 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         votes[a, b] = votes[b, a] = pair.votes
     shares = np.divide(scores, votes, out=np.full_like(scores, np.nan), where=votes > 0)
     with house_style():
-        names = [f"{row.model}  {n}" for n, row in enumerate(rows, start=1)]
         side_in = 0.62 * max(len(rows), 2)
-        names_in = 0.4 + 0.08 * max(map(len, names), default=0)
+        names_in = 0.6 + 0.08 * max((len(row.model) for row in rows), default=0)
         figure = Figure(figsize=(side_in + names_in, side_in + 0.9), layout="constrained")
         axes = figure.add_subplot()
         colours = LinearSegmentedColormap.from_list("score", _HEAT)
@@ -173,16 +186,19 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         for a, b in zip(*map(list, np.nonzero(votes)), strict=True):
             text = f"{whole_percent(shares[a, b])}\n{votes[a, b]:.0f}"
             axes.text(b, a, text, ha="center", va="center")
-        name_lines(axes, names, [row.is_simulated for row in rows])
+        _name_ranked(axes, rows)
         axes.grid(visible=False)
-        axes.set_xticks(range(len(rows)), [str(n + 1) for n in range(len(rows))])
-        axes.set_xlabel("Score of the row in percent,\na tie half a win; votes beneath")
+        axes.set_xticks(range(len(rows)), [_rank_text(row) for row in rows])
+        axes.set_xlabel(
+            "Columns in the order of the rows. Score\nof the row in percent, a tie half a win;\n"
+            "votes beneath"
+        )
         return write_figure(figure, file_format)
 
 
 @draw_once
 def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
-    """Draw numbered points with their intervals, and beside them a key with their names."""
+    """Draw points with letters and intervals, and beside them what the letters stand for."""
     from matplotlib.figure import Figure
 
     with house_style():
@@ -209,7 +225,28 @@ def _draw_intervals(axes: Axes, rows: Sequence[Row], intervals: Mapping[str, Int
     for place, row in enumerate(rows):
         if row.slug in intervals:
             draw_interval(axes, place, intervals[row.slug], simulated=row.is_simulated)
-    name_lines(axes, [row.model for row in rows], [row.is_simulated for row in rows])
+
+
+def _rank_text(line: Row | TypeStanding) -> str:
+    return "–" if line.rank is None else str(line.rank)
+
+
+def _name_ranked(axes: Axes, rows: Sequence[Row]) -> None:
+    """Name the lines of a chart, each with its rank."""
+    names = [f"{row.model}  {_rank_text(row)}" for row in rows]
+    name_lines(axes, names, [row.is_simulated for row in rows])
+    edge = (0, 1), (-2, 2), "axes fraction", "offset points"
+    axes.annotate("Rank", *edge, ha="right", color=SOFT)
+
+
+def _note_ranks(axes: Axes, rows: Sequence[Row], part: TypeRating) -> None:
+    """Write ranks beside the lines of a panel, with a star where there are few votes."""
+    place = {row.slug: n for n, row in enumerate(rows)}
+    for line in part.lines:
+        if line.votes:
+            text = f"{_rank_text(line)}{'*' if line.few else ''}"
+            at, across = (1, place[line.slug]), ("axes fraction", "data")
+            axes.annotate(text, at, (3, 0), across, "offset points", va="center", fontsize=7)
 
 
 def _draw_point(axes: Axes, point: Point) -> None:
@@ -222,10 +259,10 @@ def _draw_point(axes: Axes, point: Point) -> None:
         simulated=row.is_simulated,
         colour=_CLASSES.get(point.model_class, MARK),
         upright=True,
-        label=f"{point.number}  {name}" + (f" ({kind})" if kind else ""),
+        label=f"{point.key}  {name}, rank {_rank_text(row)}" + (f" ({kind})" if kind else ""),
     )
     place = (point.x, row.rating or 0.0)
-    axes.annotate(str(point.number), place, (4, 4), textcoords="offset points")
+    axes.annotate(point.key, place, (4, 4), textcoords="offset points")
 
 
 def _scale_logarithmically(axes: Axes) -> None:

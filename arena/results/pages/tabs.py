@@ -17,7 +17,7 @@ from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import BoardRemarks, PairRecord, PanelRater
 from arena.results.exports.agreement import agreement_by_question
-from arena.results.exports.charts import scatters_of
+from arena.results.exports.charts import key_rows, scatters_of
 from arena.results.exports.tables import (
     EARLY_LOOK,
     LeaderboardTable,
@@ -28,6 +28,7 @@ from arena.results.pages.plots import PlacedInterval, plot
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
+from arena.results.services.analysis import FEW_VOTES
 from arena.results.services.questions import compare_questions
 from augment.models import EndpointModel, Simulation
 from augment.services.judging.driving_scores import scores_of_augmentations
@@ -35,8 +36,6 @@ from augment.services.judging.simulations import SCORES, Options
 
 Context = dict[str, Any]
 
-FEW = 30
-"""Fewer votes are too few to read much from."""
 LOG_LINES = 200
 
 
@@ -138,8 +137,8 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         parts.append({"kept": part, "rows": rows, "reasons": reasons})
     return {
         "parts": parts,
-        "few_votes": FEW,
-        "any_few": any(row.votes < FEW for part in parts for row in part["rows"]),
+        "few_votes": FEW_VOTES,
+        "any_few": any(row.votes < FEW_VOTES for part in parts for row in part["rows"]),
     }
 
 
@@ -207,7 +206,7 @@ def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
-    lines = _numbered(table, {line.slug: line for line in snapshot.results.displacement})
+    lines = _keyed(table, {line.slug: line for line in snapshot.results.displacement})
     return {
         "lines": lines,
         "has_chart": "displacement" in scatters_of(snapshot, table),
@@ -231,7 +230,7 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against money, by class of model."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
-    lines = _numbered(table, {line.slug: line for line in snapshot.results.cost})
+    lines = _keyed(table, {line.slug: line for line in snapshot.results.cost})
     return {
         "lines": [
             line
@@ -289,10 +288,10 @@ def _mark(share: Estimate) -> PlacedInterval | None:
     return PlacedInterval(lower=lower, rating=value, upper=upper)
 
 
-def _numbered(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:
-    """What was found of each contestant, by its place in the table."""
+def _keyed(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:
+    """What was found of each contestant, with its key in the charts."""
     return [
-        {"number": number, "row": row, "found": found[row.slug]}
-        for number, row in enumerate(table.rows, start=1)
+        {"key": key, "row": row, "found": found[row.slug]}
+        for key, row in key_rows(table)
         if row.slug in found
     ]
