@@ -84,7 +84,10 @@ def test_every_task_is_there_in_every_format_and_losses_are_listed() -> None:
     ]
     losses = json.loads(files["losses.json"])
     assert {"format", "cell", "text", "changes_scene", "is_refused"} == losses[0].keys()
-    assert checksum(small_set()).encode() in files["README.txt"]
+    readme = files["README.txt"].decode()
+    assert all(
+        text in readme for text in (checksum(small_set()), "authors (a list", "models (a list")
+    )
     assert [name for name in files if name.startswith("references/")] == ["references/near.json"]
 
 

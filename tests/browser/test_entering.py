@@ -102,6 +102,8 @@ def _submit(enno: Hand, folder: Path) -> None:
     enno.press("Submissions")
     enno.press("New submission")
     enno.send(answers)
+    expect(enno.page.locator("[data-chosen] output")).to_contain_text("answers.zip")
+    enno.press("Send it")
     enno.sees(f"{TASKS} of {TASKS} read", within_ms=OVER_MS)
     enno.sees("An admin decides next")
 

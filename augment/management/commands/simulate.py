@@ -4,11 +4,16 @@ from pathlib import Path
 from typing import Any
 
 from django.db import transaction
+from django.db.models import Q
 
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.drive_files import drive_files, read_shard
-from augment.services.judging.driving_scores import clearance_text, least_clearance_m
+from augment.services.judging.driving_scores import (
+    clearance_text,
+    drives_of_job,
+    least_clearance_m,
+)
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
@@ -21,7 +26,7 @@ class Command(TerminalCommand):
     help = (
         "Let a planner drive every result of a job, with the scenes before the change and with "
         "the reference, for 15 s each (interPlan's own for 30 s); or one scenario. What was "
-        "driven so before stays."
+        "driven so before stays, and its scores are printed."
     )
 
     arguments = {
@@ -51,7 +56,7 @@ class Command(TerminalCommand):
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Plan the rows, then drive them here, one line each, or queue them."""
+        """Plan the rows, then drive them here or queue them; one line each, also of earlier ones."""
         how = Options(
             planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
@@ -67,17 +72,23 @@ class Command(TerminalCommand):
         with transaction.atomic():
             if scenario is not None:
                 waiting = simulations.plan_scenario(scenario=scenario, options=how, also=also)
+                drives = Simulation.OF_SCENES & Q(scenario=scenario)
             else:
                 assert job is not None
                 waiting = simulations.plan_job(job=job, options=how, also=also)
+                drives = drives_of_job(job)
             if options["queue"]:
                 transaction.on_commit(lambda: enqueue_simulations(waiting))
         if options["queue"]:
             self.stdout.write(f"{len(waiting)} drives wait for the workers.")
             return
-        for number, pk in enumerate(waiting, start=1):
-            simulations.Drives(also).perform(pk)
-            self._say(pk, f"{number}/{len(waiting)}")
+        keys = list(
+            how.of(Simulation.objects.filter(drives)).order_by("pk").values_list("pk", flat=True)
+        )
+        for number, pk in enumerate(keys, start=1):
+            if pk in waiting:
+                simulations.Drives(also).perform(pk)
+            self._say(pk, f"{number}/{len(keys)}")
 
     def _drive_files(self, options: dict[str, Any], how: Options) -> None:
         source, shard = Path(options["what"]), read_shard(options["shard"])
