@@ -14,7 +14,7 @@ from django.core.management.base import CommandError
 from pytest_django import Settings
 
 from augment.errors import UnknownName
-from augment.models import GenerationJob, Simulation
+from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.judging import driving_scores, simulations
 from augment.services.judging.simulations import DRIVES, Options
 from augment.services.work import Settlement
@@ -164,4 +164,8 @@ def test_the_command_line_names_a_planner_for_its_own_process_alone(settings: Se
     with pytest.raises(CommandError, match="pdm-closed"):
         said("Round 1", planner=STRAIGHT.planner, queue=True)
     assert not Simulation.objects.exists()
-    assert "[3/3]" in said("Round 1", planner=STRAIGHT.planner)
+    first = said("Round 1", planner=STRAIGHT.planner)
+    assert "[3/3]" in first
+    assert said("Round 1", planner=STRAIGHT.planner) == first, "what was driven already"
+    (place,) = Scenario.objects.values_list("slug", flat=True)
+    assert said(place, planner=STRAIGHT.planner).count("nuPlan") == 2
