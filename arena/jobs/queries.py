@@ -38,7 +38,7 @@ class View(NamedTuple):
     rows: int
 
 
-MARKS = View("marks", cells=300, columns=10, samples=10, rows=50)
+MARKS = View("marks", cells=300, columns=10, samples=10, rows=10)
 PICTURES = View("pictures", cells=12, columns=4, samples=2, rows=3)
 VIEWS = {view.name: view for view in (MARKS, PICTURES)}
 

@@ -77,11 +77,12 @@ class ChoiceForm(forms.Form):
         return cleaned
 
     @property
-    def opened_types(self) -> list[str]:
-        """Return types of which some scenarios are ticked, not all, for the template."""
+    def chosen_counts(self) -> dict[str, int]:
+        """Return how many scenarios of each type are ticked singly, for the template."""
         chosen = set(self["scenarios"].value() or ())
-        slugs = {group.type: {row.slug for row in group.scenarios} for group in self.groups}
-        return [name for name, its in slugs.items() if its & chosen and its - chosen]
+        return {
+            group.type: sum(row.slug in chosen for row in group.scenarios) for group in self.groups
+        }
 
 
 class LinesField(forms.CharField):

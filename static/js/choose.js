@@ -10,6 +10,8 @@ function refresh() {
     const all = group.querySelector("[data-all]");
     if (!all) continue;
     const ticked = members(group).filter((box) => box.checked).length;
+    const said = group.querySelector("[data-ticked]");
+    if (said) said.textContent = ticked ? `: ${ticked} chosen` : "";
     all.checked = ticked > 0 && ticked === members(group).length;
     all.indeterminate = ticked > 0 && !all.checked;
   }

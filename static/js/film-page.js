@@ -1,7 +1,8 @@
 // Films on pages without a vote: each group of pictures has a bar, and loads when it is first played.
 import { load, Player } from "./films.js";
 
-for (const group of document.querySelectorAll("[data-films]")) {
+const groups = document.querySelectorAll("[data-films]");
+for (const group of groups) {
   const bar = group.querySelector(".film-bar");
   const images = [...group.querySelectorAll("img[data-film]")];
   if (!bar || !images.length) continue;
@@ -14,6 +15,7 @@ for (const group of document.querySelectorAll("[data-films]")) {
   const player = new Player(bar);
   const begin = async (plays, then) => {
     for (const name of ["click", "input"]) bar.removeEventListener(name, first, true);
+    bar.classList.remove("is-idle");
     try {
       player.show(await load(images.map((image) => image.dataset.film)), frames, plays);
       then?.();
@@ -28,6 +30,7 @@ for (const group of document.querySelectorAll("[data-films]")) {
     begin(wanted === "play", () => (wanted ? wanted === "play" || player[wanted]() : player.jump(step)));
   };
   bar.hidden = false;
+  if (groups.length > 1) bar.classList.add("is-idle"); // a page of them has a button each
   if (group.dataset.films === "auto") begin();
   else for (const name of ["click", "input"]) bar.addEventListener(name, first, true);
 }

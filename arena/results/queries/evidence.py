@@ -22,7 +22,7 @@ from arena.results.queries.votes import (
 )
 from augment.models import Augmentation
 
-PER_PAGE = 20
+PER_PAGE = 10
 CHUNK = 2000
 """So many votes are read at once for a file."""
 
