@@ -62,10 +62,13 @@ NOT_KEPT = "private, no-store"
 """Nothing of a page stays behind in a browser after signing out, nor in a proxy."""
 
 NOT_USED = (
-    *("bluetooth", "camera", "display-capture", "geolocation", "microphone", "midi", "payment"),
+    *("camera", "display-capture", "geolocation", "microphone", "midi", "payment"),
     *("publickey-credentials-get", "serial", "usb"),
 )
-"""Features of browsers that no page needs, so none may ask for them."""
+"""Features of browsers that no page needs, so none may ask for them.
+
+Bluetooth is none of them: Chromium on Linux does not know it and warns on every page.
+"""
 
 POLICY = ", ".join(f"{feature}=()" for feature in NOT_USED)
 

@@ -10,7 +10,8 @@ from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
 from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now as rate
-from augment.models import Submission
+from augment.models import GenerationJob, Submission
+from tests.drives import driven
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world
@@ -46,12 +47,14 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     study.allow_simulated = True
     study.save()
     rate(study=study, rounds=100, filters=Filters())
-    code = [study.code]
+    code, job = [study.code], GenerationJob.objects.earliest("pk")
+    driven(job)
     named = {f"tab {tab}": reverse("results-tab", args=[*code, tab]) for tab in TABS}
     named |= {
         name: reverse(name, args=code)
         for name in ("study", "preregistration", "results-votes", "results-judges")
     }
+    named["job driving"] = reverse("job-tab", args=[job.code, "driving"])
     board = make_board(name="City", study=study)
     publish_table(board, write=write_table)
     named["board"] = reverse("board", args=[board.code])
