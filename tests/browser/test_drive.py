@@ -38,6 +38,18 @@ def picture(page: Page, number: int) -> str:
     return str(shown)
 
 
+def test_the_player_fits_a_small_laptop(browser: Browser, live_server: LiveServer) -> None:
+    row, laptop = driven(finished(rows.launch()))[-1], {"width": 1366, "height": 768}
+    page = opened(browser, live_server.url, row, viewport=laptop)
+    for number in (2, 1):  # before beside after, then one drive alone
+        end = page.locator("#timeline").bounding_box()
+        assert end is not None
+        assert end["y"] + end["height"] <= laptop["height"], f"{number} drives"
+        page.evaluate("document.querySelector('.views').className = 'views'")
+        page.locator(".views figure").first.evaluate("figure => figure.remove()")
+    page.context.close()
+
+
 def test_both_drives_are_played_stepped_and_scrubbed_in_step(
     browser: Browser, live_server: LiveServer
 ) -> None:
