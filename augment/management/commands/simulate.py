@@ -7,13 +7,8 @@ from django.db import transaction
 from django.db.models import Q
 
 from augment.models import Scenario, Simulation
-from augment.services.judging import simulations
+from augment.services.judging import driving_scores, simulations
 from augment.services.judging.drive_files import drive_files, read_shard
-from augment.services.judging.driving_scores import (
-    clearance_text,
-    drives_of_job,
-    least_clearance_m,
-)
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
@@ -56,7 +51,7 @@ class Command(TerminalCommand):
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Plan the rows, then drive them here or queue them; one line each, also of earlier ones."""
+        """Plan the rows, then drive them here or queue them; print a line for each drive."""
         how = Options(
             planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
@@ -76,15 +71,14 @@ class Command(TerminalCommand):
             else:
                 assert job is not None
                 waiting = simulations.plan_job(job=job, options=how, also=also)
-                drives = drives_of_job(job)
+                drives = driving_scores.drives_of_job(job)
             if options["queue"]:
                 transaction.on_commit(lambda: enqueue_simulations(waiting))
         if options["queue"]:
             self.stdout.write(f"{len(waiting)} drives wait for the workers.")
             return
-        keys = list(
-            how.of(Simulation.objects.filter(drives)).order_by("pk").values_list("pk", flat=True)
-        )
+        rows = how.of(Simulation.objects.filter(drives)).order_by("pk")
+        keys = list(rows.values_list("pk", flat=True))
         for number, pk in enumerate(keys, start=1):
             if pk in waiting:
                 simulations.Drives(also).perform(pk)
@@ -103,7 +97,8 @@ class Command(TerminalCommand):
         result = row.reason or "driven by a worker"
         if row.state == Simulation.State.DONE:
             nuplan, interplan = (100.0 * (getattr(row, name) or 0.0) for name in SCORES.values())
-            clearance = clearance_text(least_clearance_m(row))
+            least_m = driving_scores.least_clearance_m(row)
+            clearance = driving_scores.clearance_text(least_m)
             result = f"nuPlan {nuplan:.1f}, interPlan {interplan:.1f}, clearance {clearance}"
         self.stdout.write(f"[{place}] {row.scenario.slug}, {who}: {result}")
         self.stdout.flush()
