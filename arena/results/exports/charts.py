@@ -13,7 +13,7 @@ import numpy as np
 
 from arena.models import Snapshot
 from arena.rating.lines import whole_percent
-from arena.rating.snapshot_document import PairRecord, TypeRating, TypeStanding
+from arena.rating.snapshot_document import PairRecord, TypeRating
 from arena.results.exports.drawing import (
     INK,
     MARK,
@@ -188,7 +188,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
             axes.text(b, a, text, ha="center", va="center")
         _name_ranked(axes, rows)
         axes.grid(visible=False)
-        axes.set_xticks(range(len(rows)), [_rank_text(row) for row in rows])
+        axes.set_xticks(range(len(rows)), [str(row.rank or "–") for row in rows])
         axes.set_xlabel(
             "Columns in the order of the rows. Score\nof the row in percent, a tie half a win;\n"
             "votes beneath"
@@ -227,13 +227,9 @@ def _draw_intervals(axes: Axes, rows: Sequence[Row], intervals: Mapping[str, Int
             draw_interval(axes, place, intervals[row.slug], simulated=row.is_simulated)
 
 
-def _rank_text(line: Row | TypeStanding) -> str:
-    return "–" if line.rank is None else str(line.rank)
-
-
 def _name_ranked(axes: Axes, rows: Sequence[Row]) -> None:
     """Name the lines of a chart, each with its rank."""
-    names = [f"{row.model}  {_rank_text(row)}" for row in rows]
+    names = [f"{row.model}  {row.rank or '–'}" for row in rows]
     name_lines(axes, names, [row.is_simulated for row in rows])
     edge = (0, 1), (-2, 2), "axes fraction", "offset points"
     axes.annotate("Rank", *edge, ha="right", color=SOFT)
@@ -244,7 +240,7 @@ def _note_ranks(axes: Axes, rows: Sequence[Row], part: TypeRating) -> None:
     place = {row.slug: n for n, row in enumerate(rows)}
     for line in part.lines:
         if line.votes:
-            text = f"{_rank_text(line)}{'*' if line.few else ''}"
+            text = f"{line.rank or '–'}{'*' if line.few else ''}"
             at, across = (1, place[line.slug]), ("axes fraction", "data")
             axes.annotate(text, at, (3, 0), across, "offset points", va="center", fontsize=7)
 
@@ -259,7 +255,7 @@ def _draw_point(axes: Axes, point: Point) -> None:
         simulated=row.is_simulated,
         colour=_CLASSES.get(point.model_class, MARK),
         upright=True,
-        label=f"{point.key}  {name}, rank {_rank_text(row)}" + (f" ({kind})" if kind else ""),
+        label=f"{point.key}  {name}, rank {row.rank or '–'}" + (f" ({kind})" if kind else ""),
     )
     place = (point.x, row.rating or 0.0)
     axes.annotate(point.key, place, (4, 4), textcoords="offset points")
