@@ -60,7 +60,10 @@ async function showAnew() {
   const isOver = !fresh || !("live" in fresh.dataset);
   if (isOver) {
     // "It is launched" is no news beside what came of it.
-    for (const line of document.querySelectorAll(".messages > :not(.is-bad)")) line.remove();
+    for (const list of document.querySelectorAll(".messages")) {
+      for (const line of list.querySelectorAll("li:not(.is-bad)")) line.remove();
+      if (!list.children.length) list.parentNode.remove();
+    }
   }
   if (isOver && "reload" in live().dataset && !isTouched) location.reload();
   else if (fresh && !document.activeElement.matches("#live :is(input, select, textarea)")) {
