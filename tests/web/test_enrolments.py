@@ -54,7 +54,8 @@ def test_the_page_says_what_one_agrees_to_and_takes_the_id_from_the_address(
 def test_the_page_promises_as_many_pairs_as_the_ballot_has(
     enrolment: Enrolment, votes: int, pairs: int
 ) -> None:
-    Study.objects.update(rules={**enrolment.study.rules, "repeat_share": 0.34})
+    shares = {"repeat_share": 0.34, "check_share": 0.5}  # and nothing to check with
+    Study.objects.update(rules=enrolment.study.rules | shares)
     Enrolment.objects.update(votes_each=votes)
     page = Client().get(reverse("enrol", args=[enrolment.token])).content.decode()
     join(Client(), enrolment)
