@@ -216,7 +216,8 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
         return _take_on(request, enrolment, ids)
     if "go_on" in request.POST:
         return _sign_in(request, voter.expert, study)
-    return render(request, "enrol.html", {"enrolment": enrolment, "voter": voter})
+    pairs = study.matchups.filter(expert=voter.expert).count()
+    return render(request, "enrol.html", {"enrolment": enrolment, "voter": voter, "pairs": pairs})
 
 
 def _read_ids(request: HttpRequest) -> dict[str, str]:
