@@ -116,9 +116,9 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
     )
-    given = choice.get("finish_reason") or choice.get("native_finish_reason")
-    given = given.get("type", given) if isinstance(given, dict) else given  # as SGLang has it
-    reason = doubts.read(_ANSWER, read_as, given, str, "choices.0.finish_reason") or ""
+    ending = choice.get("finish_reason") or choice.get("native_finish_reason")
+    ending = ending.get("type", ending) if isinstance(ending, dict) else ending  # of SGLang
+    reason = doubts.read(_ANSWER, read_as, ending, str, "choices.0.finish_reason") or ""
     # Without a choice the answer itself is the error, whatever its form.
     error = read_error([answer.get("error"), choice.get("error")] if choice else answer)
     around = [{**answer, "choices": 0, "usage": 0}, {**choice, "message": 0}]
@@ -207,9 +207,8 @@ def _read_message(
 ) -> tuple[list[tuple[str, str]], list[ToolCall]]:
     """Return text, thoughts, refusal and what can't be read, each by its kind, and the calls."""
     thoughts = next((message[name] for name in _REASONING if message.get(name)), None)
-    content, uses = _split_calls(message.get("content"))
     pieces = [
-        *_pieces(content, "content"),
+        *_pieces(message.get("content"), "content"),
         *_pieces(thoughts, "reasoning", "thought"),
         *_pieces(message.get("refusal") or None, "refusal", "refusal"),
     ]
@@ -217,7 +216,7 @@ def _read_message(
         pieces.append(("unread", "the message has none of the fields of a message"))
     made: list[ToolCall] = []
     calls = message.get("tool_calls")
-    calls = calls or uses or calls
+    calls = calls or _find_uses(message.get("content")) or calls
     if calls is None and message.get("function_call"):
         calls = [{"function": message["function_call"]}]  # as it was called before 2024
     if calls is not None and not isinstance(calls, list):
@@ -257,16 +256,12 @@ def _read_message(
     return pieces, made
 
 
-def _split_calls(content: object) -> tuple[object, list[object]]:
-    """Return a message's content, and the calls that Anthropic puts among its parts."""
+def _find_uses(content: object) -> list[object]:
+    """Return the calls that Anthropic puts among the parts of a message."""
     parts = content if isinstance(content, list) else []
     uses = [part for part in parts if isinstance(part, dict) and part.get("type") == "tool_use"]
-    named = [{"name": part.get("name"), "arguments": part.get("input")} for part in uses]
-    calls = [
-        {"id": part.get("id"), "function": function}
-        for part, function in zip(uses, named, strict=True)
-    ]
-    return [part for part in parts if part not in uses] if uses else content, [*calls]
+    functions = [{"name": part.get("name"), "arguments": part.get("input")} for part in uses]
+    return [{"id": use.get("id"), "function": functions[at]} for at, use in enumerate(uses)]
 
 
 def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str, str]]:
@@ -276,7 +271,7 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
     elif isinstance(value, list):
         for number, item in enumerate(value):
             yield from _pieces(item, f"{path}.{number}", kind)
-    elif isinstance(value, dict):
+    elif isinstance(value, dict) and value.get("type") != "tool_use":
         name = next((name for name in _WORDS if value.get(name) is not None), None)
         if name is None:
             yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
@@ -285,7 +280,7 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
             yield from _pieces(value[name], path, _KINDS.get(str(value.get("type")), kind))
     elif value is True and kind == "refusal":
         yield kind, ""
-    elif value is not None:
+    elif value is not None and not isinstance(value, dict):
         yield "unread", f"{path} is {kind_of(value)}, not a text"
 
 
@@ -407,8 +402,8 @@ def _refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str |
 
 def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
     """Return the seconds that an answer asks to wait, and a remark on what can't be read."""
-    given = {name: fields[name].strip() for name in _WAITS if fields.get(name, "").strip()}
-    for name, text in given.items():
+    waits = {name: fields[name].strip() for name in _WAITS if fields.get(name, "").strip()}
+    for name, text in waits.items():
         match = _WAIT.fullmatch(text)
         try:
             if match is not None:
@@ -422,5 +417,5 @@ def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
             continue
         if math.isfinite(seconds):
             return max(0.0, seconds), ""
-    unread = next(iter(given.items()), None)
+    unread = next(iter(waits.items()), None)
     return None, f" (its {unread[0]} can't be read: {unread[1][:40]!r})" if unread else ""
