@@ -79,7 +79,7 @@ COLUMNS = (
     _column("options"),
     _column("question", key="", field="snapshot.question"),
     _column("sends"),
-    _column("settled_ties", Dtype.WHOLE, is_old=False),
+    _column("settled_ties", Dtype.WHOLE, RATING, BOARD, is_old=False),
     _column("votes_sha256", key="", field="snapshot.votes_sha256", is_old=False),
 )
 WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)

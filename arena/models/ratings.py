@@ -13,7 +13,7 @@ from django.utils.functional import cached_property
 from arena.models.people import fresh_token
 from arena.models.studies import Study
 from arena.models.votes import Question
-from arena.rating.lines import Line, join_counts
+from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
 from augment.models import AppendOnly, Contestant, Work, account_column
 
@@ -117,11 +117,6 @@ class Snapshot(Work):
     def votes_cast(self) -> int:
         """How many counted votes people gave; earlier ratings count settled ties with them."""
         return self.votes_counted - (self.settled_ties or 0)
-
-    @property
-    def votes_counted_text(self) -> str:
-        """The same, and after a plus the ties that nobody was shown."""
-        return join_counts(self.votes_cast, self.settled_ties)
 
 
 class Standing(models.Model):

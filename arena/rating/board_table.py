@@ -7,13 +7,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeVar
 
-from arena.rating.lines import Line
+from arena.rating.lines import AnyLine, Line, votes_text
 from arena.rating.snapshot_document import read_document
 
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
 
-AnyLine = TypeVar("AnyLine", bound=Line)
 AnyName = TypeVar("AnyName")
 
 
@@ -22,9 +21,11 @@ class BoardLine(Line):
     """One contestant's line; `name` is what people know.
 
     Attributes:
+        votes, ties: Those that people gave; older tables count settled ties with them.
         since: The day of the first table that has it, as ISO 8601.
         authors: Of a submission, else none.
         is_open: Whether a submission's code and weights are public; None where nobody says.
+        settled_ties: Ties on pairs that nobody was shown, which are rated as well.
     """
 
     slug: str
@@ -33,6 +34,7 @@ class BoardLine(Line):
     since: str
     authors: tuple[str, ...] = ()
     is_open: bool | None = None
+    settled_ties: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +71,7 @@ class BoardTableDocument:
         left_out: How many votes do not count, by reason.
         notes: What must be said with the numbers.
         versions: Of what the numbers depend on, by name.
+        settled_ties: On pairs that nobody was shown; None where `votes` counts them as well.
     """
 
     format: Literal["scenario-arena/board-table"] = "scenario-arena/board-table"
@@ -90,6 +93,12 @@ class BoardTableDocument:
     notes: tuple[str, ...]
     versions: dict[str, str]
     includes_simulated: bool
+    settled_ties: int | None = None
+
+    @property
+    def votes_text(self) -> str:
+        """How many votes count, and apart from them the ties of pairs that nobody was shown."""
+        return votes_text(self.votes, self.settled_ties)
 
     @property
     def made_on(self) -> str:

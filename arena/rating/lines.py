@@ -5,7 +5,10 @@ show them.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+AnyLine = TypeVar("AnyLine", bound="Line")
 
 UNKNOWN = "--"
 MINUS = "\N{MINUS SIGN}"
@@ -46,9 +49,9 @@ def interval_text(rating: float | None, lower: float | None, upper: float | None
     return f"-{max(rating - lower, 0.1):.1f}/+{max(upper - rating, 0.1):.1f}"
 
 
-def join_counts(votes: int, settled_ties: int | None) -> str:
-    """Return votes as they were cast, and after a plus ties on pairs that nobody was shown."""
-    return f"{votes} + {settled_ties}" if settled_ties else str(votes)
+def join_counts(votes: int | None, settled: int | None) -> str:
+    """Return votes as they were cast, and after a plus those that are ties nobody was shown."""
+    return f"{(votes or 0) - settled} + {settled}" if settled else str(votes)
 
 
 def with_minus(text: str) -> str:
@@ -73,6 +76,11 @@ def says_no_order(lines: Sequence["Line"]) -> bool:
     """Whether all ranks are 1: then nobody can be told from anybody, and no rank is shown."""
     ranks = [line.rank for line in lines if line.rank is not None]
     return len(lines) > 1 and len(ranks) != 1 and set(ranks) <= {1}
+
+
+def hide_ranks(lines: Iterable[AnyLine]) -> list[AnyLine]:
+    """Return the lines without ranks and places left."""
+    return [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
 
 
 def votes_text(votes: int, settled: int | None) -> str:

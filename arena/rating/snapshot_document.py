@@ -169,7 +169,11 @@ class Trust:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairRecord:
-    """Wins, ties and losses of `a` against `b`, and how often they were to be judged."""
+    """Wins, ties and losses of `a` against `b`, and how often they were to be judged.
+
+    Attributes:
+        settled: How many of the ties nobody was shown; None where they were not counted apart.
+    """
 
     a: str
     b: str
@@ -178,6 +182,7 @@ class PairRecord:
     losses: int
     both_miss: int
     planned: int | None
+    settled: int | None = field(default=None, metadata=_WHERE_SET)
 
     @property
     def votes(self) -> int:
@@ -187,7 +192,11 @@ class PairRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TypeStanding:
-    """A contestant among the votes on one scenario type; `few` are too few to read much from."""
+    """A contestant among the votes on one scenario type; `few` are too few to read much from.
+
+    Attributes:
+        settled: How many of the votes are ties that nobody was shown; None as of pairs.
+    """
 
     slug: str
     rating: float | None
@@ -197,6 +206,7 @@ class TypeStanding:
     note: Kept | None = field(default=None, metadata=_SINCE_2)
     votes: int
     few: bool
+    settled: int | None = field(default=None, metadata=_WHERE_SET)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,6 +216,7 @@ class TypeRating:
     Attributes:
         label: The type's name as people read it.
         reasons: Why ratings are missing; None where only the status says so.
+        settled: How many of the votes are ties that nobody was shown; None as of pairs.
     """
 
     type: str
@@ -215,6 +226,7 @@ class TypeRating:
     status: str
     reasons: tuple[Kept, ...] | None = None
     lines: tuple[TypeStanding, ...]
+    settled: int | None = field(default=None, metadata=_WHERE_SET)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

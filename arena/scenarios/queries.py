@@ -12,7 +12,7 @@ from django.db.models import Case, Count, Q, QuerySet, When
 
 from arena.people.queries import role_of
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
-from augment.services.scenarios.benchmarks import Split, Stratum
+from augment.services.scenarios.benchmarks import Split, Stratum, public_origins
 from augment.services.scenarios.scenes import type_choices
 from augment.services.texts import motion_in_words
 
@@ -160,10 +160,12 @@ def _differences(was: dict[str, Any], line: dict[str, Any]) -> Iterator[str]:
 
 
 def list_benchmarks() -> QuerySet[Benchmark]:
-    """Return all of them with the number of their tasks, the newest version of a name first."""
-    in_practice = Q(items__split=Split.PRACTICE)
+    """Return all with their tasks, and how many are public, the newest version of a name first."""
+    is_public = Q(items__split=Split.TEST, items__scenario__origin__in=public_origins())
     rows = Benchmark.objects.annotate(
-        tasks=Count("items"), practice=Count("items", filter=in_practice)
+        tasks=Count("items"),
+        practice=Count("items", filter=Q(items__split=Split.PRACTICE)),
+        public=Count("items", filter=is_public),
     )
     return rows.order_by("slug", "-version")
 

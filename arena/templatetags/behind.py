@@ -10,6 +10,7 @@ from django.urls import reverse
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
+from arena.rating.lines import join_counts
 from arena.results.queries.search import VoteSearch
 from augment.models import Event
 
@@ -26,7 +27,7 @@ def votes_url(context: Context, **search: Any) -> str:
 
 @register.simple_tag(takes_context=True)
 def behind(
-    context: Context, number: int | None, text: object = None, **search: Any
+    context: Context, number: int | None, text: object = None, settled: Any = None, **search: Any
 ) -> SafeString | str:
     """A number, or what stands for it, as a link to so many votes; plain where there are none.
 
@@ -34,9 +35,10 @@ def behind(
         context: With the study, the rating and whether whoever asks may see single votes.
         number: Of votes.
         text: What is written instead.
+        settled: How many of them are ties that nobody was shown, written after a plus.
         search: Of `VoteSearch`.
     """
-    shown = number if text is None else text
+    shown = join_counts(number, settled) if text is None else text
     if not number or not context.get("has_evidence"):
         return str(shown)
     return format_html(

@@ -6,17 +6,19 @@ import json
 from datetime import datetime
 
 import pytest
+from django.template.loader import render_to_string
 from pyarrow import parquet
 
 from arena.models import Snapshot, Study, Vote
 from arena.results.api import SnapshotDocument
-from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.tables import leaderboard_table, method_text
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.exports.writers import FORMATS, plain_text
+from arena.results.exports.writers import FORMATS, RATING_FILES, plain_text
+from arena.results.pages.tabs import TABS
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.services.ratings import plan_snapshot, votes_of
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.ratings import votes_of
 from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
@@ -83,6 +85,9 @@ def test_settled_pairs_are_ties_of_experts_but_no_judgements_of_theirs() -> None
     said = f"6 pairs that nobody can tell apart were not shown and count as {settled} ties"
     assert any(said in warning for warning in whole.results.board.warnings)
     assert any("are left out" in warning for warning in alone.results.board.warnings)
+    queued = plan_snapshot(study=study)
+    assert "seed" not in method_text(queued)
+    assert "seed 0" in method_text(plan_snapshot(study=study, unit="vote", method="elo"))
     planned = {frozenset((pair.a, pair.b)): pair for pair in whole.results.pairs}
     assert planned[frozenset(("ann", "bob"))].planned == planned[frozenset(("ann", "bob"))].votes
 
@@ -110,6 +115,23 @@ def _check_that_ties_stand_apart(rating: Snapshot, voted: int, ties: int) -> Non
             parts = (int(row[name]) for name in ("wins", "ties", "losses"))
             assert sum(parts) == int(row["votes"])
     assert {line["votes_sha256"] for line in lines} == {rating.votes_sha256}
+    files = RATING_FILES["all"].make(rating)
+    pairs, types = (
+        list(csv.DictReader(files[name].decode().splitlines()))
+        for name in ("pairs.csv", "types.csv")
+    )
+    assert {list(row)[-1] for row in (*pairs, *types)} == {"settled_ties"}
+    assert sum(int(row["ties"]) for row in pairs) == voted
+    assert sum(int(row["votes"]) for row in types) == 2 * voted
+    assert sum(int(row["settled_ties"]) for row in pairs) == ties
+    assert sum(int(row["settled_ties"]) for row in types) == 2 * ties
+    drawn = {"snapshot": rating, "study": rating.study}
+    pages = {name: TABS[name](rating, table) | drawn for name in ("pairs", "types")}
+    for name, marks in (("pairs", 2), ("types", 3)):
+        page = render_to_string(f"results/{name}.html", pages[name])
+        assert page.count(f" + {ties}") == (marks if ties else 0)
+    (part,) = pages["types"]["parts"]
+    assert sum(row.votes_cast for row in part["rows"]) == 2 * voted
 
 
 def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> None:

@@ -11,6 +11,7 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.scenarios import services
+from arena.scenarios.queries import list_benchmarks
 from augment.benchmark.folder import read_folder
 from augment.benchmark.values import Split
 from augment.errors import Conflict, InvalidDocument, UnknownName
@@ -176,8 +177,15 @@ def test_a_benchmark_whose_test_references_can_be_known_says_so(
     assert public in capsys.readouterr().err
     assert (tmp_path / "folder" / "WARNING.txt").read_text().startswith(f"{public}\n{alike}\n")
     assert read_folder(tmp_path / "folder").name == "streets"
-    page = signed_in(people()["admin"]).get(reverse("benchmark", args=[row.code]))
+    admin = signed_in(people()["admin"])
+    page = admin.get(reverse("benchmark", args=[row.code]))
     assert public in page.content.decode()
+    assert [(one.slug, one.tasks, one.public) for one in list_benchmarks()] == [
+        ("other", 1, 0),
+        ("streets", 5, 1),
+    ]
+    listed = admin.get(reverse("benchmarks")).content.decode()
+    assert listed.count("Test references are public: 1 of its tasks.") == 1
 
 
 def test_a_follow_up_is_left_out_and_refused_where_it_is_named(streets: list[Scenario]) -> None:

@@ -1,5 +1,6 @@
 """Boards: a batch's pairs, what is pooled, and tables that stay as they were published."""
 
+import csv
 import json
 
 import choix
@@ -8,6 +9,7 @@ import pytest
 
 from arena.errors import StudyStillOpen
 from arena.models import Board, BoardTable, Matchup, Study, Vote
+from arena.rating.board_table import table_from_document
 from arena.results.exports.board_files import board_folder
 from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now
@@ -71,6 +73,34 @@ def test_a_table_rates_the_pooled_votes_on_the_scale_of_the_first_study(board: B
         _elo_by_choix(["ann", "bob", "cid", "dot"], ["ann", "bob", "cid"])
     )
     assert np.mean([found[slug] or 0 for slug in ("ann", "bob", "cid")]) == pytest.approx(1000)
+
+
+def test_a_table_counts_ties_that_nobody_was_shown_apart(board: Board) -> None:
+    study = board.studies.get()
+    study.rules["identical"] = [["place-0", "ann", "bob"], ["place-1", "ann", "bob"]]
+    study.save()
+    table = published(board, 1)
+    document = table.document
+    ties = document.settled_ties or 0
+    assert (document.votes, document.studies[0].votes) == (36, 36)
+    assert {line.slug: line.settled_ties for line in document.lines} == {
+        "ann": ties,
+        "bob": ties,
+        "cid": 0,
+    }
+    assert ties > 0
+    rows = list(csv.DictReader(table.files["csv"].splitlines()))
+    assert list(rows[0])[-2:] == ["settled_ties", "remarks"]
+    assert {row["remarks"] for row in rows} == {" ".join(document.notes)}
+    for row in rows:
+        assert int(row["votes"]) == sum(int(row[name]) for name in ("wins", "ties", "losses"))
+    assert sum(int(row["votes"]) for row in rows) == 72
+    page = table.files["html"]
+    assert f"36 votes and {ties} ties on pairs that nobody was shown" in page
+    assert page.count(f" + {ties}</td>") == 2
+    old = json.loads(table.files["json"])
+    del old["settled_ties"], old["lines"][0]["settled_ties"]
+    assert table_from_document(old).votes_text == "36 votes"
 
 
 def _elo_by_choix(slugs: list[str], founders: list[str]) -> dict[str, float]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from django.template.loader import render_to_string
 
+from arena.exports.cells import Columns, Dtype
 from arena.exports.files import write_whole
 from arena.exports.formats import json_bytes, sheet_csv, sheet_of
 from arena.exports.leaderboard import BOARD, file_columns
@@ -30,9 +31,11 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
     rows = rows_of(table)
     simulated = " (simulated)" if table.includes_simulated else ""
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
+    remarks: Columns = {"remarks": (lambda _: " ".join(table.notes), Dtype.TEXT)}
+    columns = {**file_columns(BOARD), **remarks}
     return {
         "json": json_bytes(asdict(table)).decode(),
-        "csv": sheet_csv(sheet_of(table.lines, file_columns(BOARD), name="board-table")).decode(),
+        "csv": sheet_csv(sheet_of(table.lines, columns, name="board-table")).decode(),
         "svg": chart.decode(),
         "html": render_to_string("boards/frozen.html", _shown(table)),
     }

@@ -151,7 +151,7 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
             _draw_intervals(panel, rows, intervals)
             name_lines(panel, [row.model for row in rows], [row.is_simulated for row in rows])
             _note_ranks(panel, rows, part)
-            panel.set_title(f"{part.label} (n {part.votes})", fontsize=7)
+            panel.set_title(f"{part.label} (n {part.votes - (part.settled or 0)})", fontsize=7)
             panel.tick_params(axis="x", labelbottom=True)
         for panel in grid.flat[len(parts) :]:
             panel.set_visible(False)

@@ -11,9 +11,10 @@ from django.db.models import F
 
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.rating.lines import Line, join_counts, notes_by_reason, says_no_order, votes_text
+from arena.rating.lines import Line, hide_ranks, notes_by_reason, says_no_order, votes_text
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
+from arena.rating.snapshot_document import BoardRemarks
 from arena.results.queries.votes import LeftOut
 from arena.studies.services.opening import preregistration_sha256
 from arena.studies.services.plan import Answered, answer_hypotheses
@@ -49,7 +50,8 @@ def method_text(rating: Snapshot) -> str:
     is_usual = rating.study.questions == [Question.INSTRUCTION]
     asked = "" if is_usual else f", question {rating.question}"
     # Nothing is drawn for a closed form; earlier ratings name the seed all the same.
-    is_drawn = rating.settled_ties is None or not is_closed_form(rating)
+    is_old = rating.state == Snapshot.State.READY and rating.settled_ties is None
+    is_drawn = is_old or not is_closed_form(rating)
     seed = f", seed {rating.seed}" if is_drawn else ""
     return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{asked}"
 
@@ -86,19 +88,9 @@ class Row(Line):
         return self.votes - self.settled_ties
 
     @property
-    def votes_counted_text(self) -> str:
-        """The votes that people gave, and after a plus the ties that nobody was shown."""
-        return join_counts(self.votes_cast, self.settled_ties)
-
-    @property
     def ties_cast(self) -> int:
         """The ties among them."""
         return self.ties - self.settled_ties
-
-    @property
-    def score_text(self) -> str:
-        """The mean score of a vote, a dash without votes."""
-        return f"{self.score_percent} %" if self.votes else "–"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,17 +122,10 @@ class LeaderboardTable:
         return method_text(self.snapshot)
 
     @property
-    def is_closed_form(self) -> bool:
-        """Whether intervals come from a formula and not from resampled rounds."""
-        return is_closed_form(self.snapshot)
-
-    @property
     def warnings(self) -> list[str]:
         """Sentences that no reader may miss, for files."""
-        marks = {
-            SIMULATED_TABLE: self.snapshot.includes_simulated,
-            EARLY_LOOK: self.snapshot.is_early,
-        }
+        rating = self.snapshot
+        marks = {SIMULATED_TABLE: rating.includes_simulated, EARLY_LOOK: rating.is_early}
         said = [mark for mark, holds in marks.items() if holds]
         return [*said, *filter(None, [" ".join(self.reasons)]), *self.notes]
 
@@ -175,15 +160,9 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
     if board.order:
         standings.sort(key=lambda standing: board.order.index(standing.slug))
-    rows = [
-        replace(
-            _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0),
-            settled_ties=(board.settled or {}).get(standing.slug, 0),
-        )
-        for standing in standings
-    ]
+    rows = [_row(standing, board) for standing in standings]
     if says_no_order(rows):
-        rows = [replace(row, rank=None, rank_best=None, rank_worst=None) for row in rows]
+        rows = hide_ranks(rows)
         reasons = (*reasons, NOT_RANKED)
     return LeaderboardTable(
         snapshot=snapshot,
@@ -204,7 +183,7 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
     return replace(table, left_out=left_out)
 
 
-def _row(standing: Standing, part: int) -> Row:
+def _row(standing: Standing, board: BoardRemarks) -> Row:
     name, variant, who = standing.name, standing.variant, standing.contestant
     last_word = name.rpartition(" ")[2]
     options, sends = (who.frozen_options, who.sends) if who else (None, None)
@@ -214,7 +193,8 @@ def _row(standing: Standing, part: int) -> Row:
         slug=standing.slug,
         kind=standing.kind,
         is_simulated=standing.is_simulated,
-        part=part,
+        part=board.parts.get(standing.slug, APART) if board.parts else 0,
+        settled_ties=(board.settled or {}).get(standing.slug, 0),
         options=json.dumps(options, sort_keys=True) if options else "",
         sends=json.dumps(sends, sort_keys=True) if sends else "",
         card=who.card if who else None,

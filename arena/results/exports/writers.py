@@ -3,7 +3,8 @@
 The same snapshot always gives the same bytes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -34,7 +35,7 @@ from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.agreement import FORMATS as AGREEMENT_FORMATS
 from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
-from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
+from arena.results.exports.tables import LeaderboardTable, Row, is_closed_form, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
@@ -68,7 +69,7 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
     """Return what JSON files say of a rating beside its lines."""
     rating, settled = table.snapshot, table.snapshot.results.board.settled_ties
     # Older ratings had no word for resamples.
-    notes: dict[str, Any] = {"intervals": rating.intervals} if table.is_closed_form else {}
+    notes: dict[str, Any] = {"intervals": rating.intervals} if is_closed_form(rating) else {}
     if rating.covariates:
         notes["covariates"] = rating.covariates
     return {
@@ -332,19 +333,32 @@ def _pairs_csv(results: Results) -> bytes:
     judged = {(value.a, value.b): value for value in results.board.p_values or ()}
     rows = (
         [
-            *attrgetter(*names)(pair),
+            *attrgetter(*names)(replace(pair, ties=pair.ties - (pair.settled or 0))),
             *(getattr(judged.get((pair.a, pair.b)), name, None) for name in more.values()),
+            pair.settled,
         ]
         for pair in results.pairs
     )
-    return csv_text([*names, *more], rows).encode()
+    return _csv_with_ties([*names, *more], rows)
 
 
 def _types_csv(results: Results) -> bytes:
     head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few", "note")
     read = attrgetter("slug", "rank", "rating", "lower", "upper", "votes", "few", "note")
-    rows = ((part.type, *read(line)) for part in results.types for line in part.lines)
-    return csv_text(head, rows).encode()
+    rows = (
+        [part.type, *read(replace(line, votes=line.votes - (line.settled or 0))), line.settled]
+        for part in results.types
+        for line in part.lines
+    )
+    return _csv_with_ties(head, rows)
+
+
+def _csv_with_ties(head: Sequence[str], rows: Iterable[list[Any]]) -> bytes:
+    """Write rows that end with their unshown ties, which earlier ratings do not know."""
+    written = list(rows)
+    if all(row[-1] is None for row in written):
+        return csv_text(head, [row[:-1] for row in written]).encode()
+    return csv_text([*head, "settled_ties"], written).encode()
 
 
 RATERS: dict[str, Value] = {

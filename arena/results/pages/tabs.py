@@ -114,10 +114,8 @@ def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One chart of all scenario types, and a table each."""
-    whole, names = (
-        {row.slug: row for row in table.rows},
-        ("rank", "rating", "lower", "upper", "votes"),
-    )
+    whole = {row.slug: row for row in table.rows}
+    names = ("rank", "rating", "lower", "upper", "votes")
     parts: list[Context] = []
     for part in snapshot.results.types:
         rows = [
@@ -126,6 +124,7 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
                 rank_best=None,
                 rank_worst=None,
                 note=line.note or "",
+                settled_ties=line.settled or 0,
                 **{name: getattr(line, name) for name in names},
             )
             for line in part.lines
@@ -138,7 +137,7 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     return {
         "parts": parts,
         "few_votes": FEW_VOTES,
-        "any_few": any(row.votes < FEW_VOTES for part in parts for row in part["rows"]),
+        "any_few": any(row.votes_cast < FEW_VOTES for part in parts for row in part["rows"]),
     }
 
 

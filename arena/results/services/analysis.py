@@ -1,9 +1,10 @@
 """Votes as arrays, and a rating by pairs, scenario types, displacement and cost."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from arena.rating.snapshot_document import (
     TypeRating,
     TypeStanding,
 )
-from arena.results.queries.votes import Competitor, Filters, Judged, is_imported
+from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, Judged, is_imported
 from augment.services.judging.displacement import of_rows, summarise
 from augment.services.scenarios.scenes import in_type_order, type_label
 
@@ -106,7 +107,10 @@ def pairs(
     """Wins, ties, losses of every pair that met or should have, from the first one's view."""
     wins, ties = count_wins(comparisons)
     names = comparisons.names
-    missed = Counter(frozenset((vote.left, vote.right)) for vote in votes if vote.both_miss)
+    pairs_of_votes = [(frozenset((vote.left, vote.right)), vote) for vote in votes]
+    missed = Counter(pair for pair, vote in pairs_of_votes if vote.both_miss)
+    settled = Counter(pair for pair, vote in pairs_of_votes if vote.kind == AUTOMATIC)
+    planned = planned + settled if planned else planned
     return tuple(
         PairRecord(
             a=one,
@@ -116,6 +120,7 @@ def pairs(
             losses=int(wins[j, i]),
             both_miss=missed[frozenset((one, names[j]))],
             planned=planned[frozenset((one, names[j]))] if planned else None,
+            settled=settled[frozenset((one, names[j]))],
         )
         for i, one in enumerate(names)
         for j in range(i + 1, len(names))
@@ -140,18 +145,32 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     return planned
 
 
-def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
+def count_settled_ties(votes: Iterable[Judged]) -> Counter[str]:
+    """Return how many ties on pairs that nobody was shown count for whom, sorted by slug."""
+    ties = [(vote.left, vote.right) for vote in votes if vote.kind == AUTOMATIC]
+    return Counter(sorted(chain.from_iterable(ties)))
+
+
+def by_type(
+    arrays: VoteArrays, votes: Sequence[Judged], board: Leaderboard
+) -> tuple[TypeRating, ...]:
     """The rating of every scenario type on its own, as the board's, in the catalogue's order.
 
     Args:
         arrays: The votes that count.
+        votes: The same.
         board: Their rating.
     """
     known = in_type_order(name for name in arrays.types if name)
-    return tuple(_rate_type(arrays, name, board) for name in known)
+    return tuple(
+        _rate_type(arrays, name, count_settled_ties(x for x in votes if x.type == name), board)
+        for name in known
+    )
 
 
-def _rate_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
+def _rate_type(
+    arrays: VoteArrays, name: str, ties: Counter[str], whole: Leaderboard
+) -> TypeRating:
     votes = select_votes(arrays.comparisons, arrays.type_of == arrays.types.index(name))
     board = rate(
         votes,
@@ -177,10 +196,12 @@ def _rate_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
                 rank=line.rank,
                 note=line.note or None,
                 votes=line.votes,
-                few=line.votes < FEW_VOTES,
+                few=line.votes - ties[line.name] < FEW_VOTES,
+                settled=ties[line.name],
             )
             for line in board.standings
         ),
+        settled=ties.total() // 2,
     )
 
 

@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from datetime import UTC, datetime
 
 from django.contrib.auth.models import User
@@ -15,11 +15,18 @@ from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
 from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy, anchor_lines
 from arena.rating.leaderboard import Leaderboard, rate
-from arena.rating.lines import Line, says_no_order
+from arena.rating.lines import Line, hide_ranks, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
-from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, last_vote_of, vote_set
-from arena.results.services.analysis import vote_arrays
+from arena.results.queries.votes import (
+    AUTOMATIC,
+    Competitor,
+    Filters,
+    VoteSet,
+    last_vote_of,
+    vote_set,
+)
+from arena.results.services.analysis import count_settled_ties, vote_arrays
 from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
@@ -195,15 +202,16 @@ def make_document(
     rated = rate(arrays.comparisons, founders=founders)
     remarks = board_remarks(rated, arrays)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
+    settled = count_settled_ties(votes)
+    not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
+    cast = len(votes) - settled.total() // 2
+    standings = hide_ranks(rated.standings) if not_ranked else rated.standings
     since = {line.slug: line.since for line in before.lines} if before else {}
     lines = tuple(
-        _board_line(line, by_slug[line.name], since.get(line.name, made_at[:10]))
-        for line in anchor_lines(_without_equal_ranks(rated.standings), founders)
+        _board_line(line, by_slug[line.name], since.get(line.name, made_at[:10]), settled)
+        for line in anchor_lines(standings, founders)
     )
-    cast = sum(vote.kind != AUTOMATIC for vote in votes)
-    left_out = sum((Counter(one.left_out) for one in found), Counter[str]())
     judges = {vote.judge: vote.judge_name for vote in votes}
-    not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
     return BoardTableDocument(
         board=board.name,
         number=number,
@@ -214,17 +222,16 @@ def make_document(
         method=_method_text(rated),
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
-        studies=tuple(
-            _pooled(study, len(one.counted)) for study, one in zip(studies, found, strict=True)
-        ),
+        studies=tuple(map(_pooled, studies, found)),
         founders=founders,
-        votes=len(votes),
+        votes=cast,
         votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
-        left_out=dict(sorted(left_out.items())),
+        left_out=dict(sorted(sum((Counter(x.left_out) for x in found), Counter[str]()).items())),
         notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
         versions={name: str(version) for name, version in software_versions().items()},
         includes_simulated=any(who.is_simulated for who in competitors)
         or any(vote.is_simulated for vote in votes),
+        settled_ties=len(votes) - cast,
     )
 
 
@@ -258,25 +265,18 @@ def _test_split(benchmark: Benchmark) -> list[tuple[str, ...]]:
     return list(scenarios.values_list(*_SHOWN))
 
 
-def _pooled(study: Study, votes: int) -> PooledStudy:
+def _pooled(study: Study, votes: VoteSet) -> PooledStudy:
     return PooledStudy(
         name=study.name,
         code=str(study.code),
         closed_at=study.closed_at.astimezone(UTC).isoformat() if study.closed_at else "",
-        votes=votes,
+        votes=sum(vote.kind != AUTOMATIC for vote in votes.counted),
         preregistration=preregistration_sha256(study),
         challengers=tuple(study.rules.get("challengers", ())),
     )
 
 
-def _without_equal_ranks(lines: Sequence[Line]) -> list[Line]:
-    """The lines; without ranks where all of these are the same."""
-    if not says_no_order(lines):
-        return list(lines)
-    return [replace(line, rank=None, rank_best=None, rank_worst=None) for line in lines]
-
-
-def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:
+def _board_line(line: Line, who: Competitor, since: str, settled: Counter[str]) -> BoardLine:
     card = (who.contestant and who.contestant.card) or {}
     return BoardLine(
         slug=who.slug,
@@ -285,5 +285,8 @@ def _board_line(line: Line, who: Competitor, since: str) -> BoardLine:
         since=since,
         authors=tuple(card.get("authors", ())),
         is_open=card.get("is_open"),
-        **asdict(line) | {"name": who.name},
+        settled_ties=settled[who.slug],
+        **asdict(line)
+        | {"name": who.name, "votes": line.votes - settled[who.slug]}
+        | {"ties": line.ties - settled[who.slug]},
     )

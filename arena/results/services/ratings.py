@@ -1,11 +1,9 @@
 """Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
 
 import platform
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import chain
 from typing import TypedDict, TypeVar, Unpack
 
 import numpy
@@ -360,19 +358,15 @@ def _results(
     study = snapshot.study
     from_file = vote_queries.is_imported(study)
     filters = vote_queries.Filters.of_document(snapshot.filters)
-    ties = [
-        (vote.left, vote.right) for vote in votes.counted if vote.kind == vote_queries.AUTOMATIC
-    ]
     planned = analysis.planned_pairs(study, filters)
-    planned.update(map(frozenset, ties))
-    settled = dict(sorted(Counter(chain.from_iterable(ties)).items()))
+    settled = dict(analysis.count_settled_ties(votes.counted))
     remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
     return Results(
         version=RESULTS_VERSION,
         board=replace(board_remarks(board, arrays, *filter(None, [remark])), settled=settled),
         trust=trust(arrays, votes, seed=snapshot.seed),
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
-        types=analysis.by_type(arrays, board),
+        types=analysis.by_type(arrays, votes.counted, board),
         displacement=() if from_file else analysis.displacement(study),
         cost=() if from_file else analysis.cost(study, votes.competitors),
         models={

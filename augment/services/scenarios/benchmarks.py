@@ -14,7 +14,7 @@ from uuid import UUID
 import numpy as np
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.db.models import F, Max, prefetch_related_objects
+from django.db.models import F, Max, QuerySet, prefetch_related_objects
 from django.utils import timezone
 
 from augment.benchmark.folder import MOST_TASKS, checksum
@@ -112,6 +112,11 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
     ]
 
 
+def public_origins() -> QuerySet[Scenario, Any]:
+    """Return the origins of the catalogue's scenarios, whose references anybody can read."""
+    return Scenario.objects.exclude(catalogue_set="").values("origin")
+
+
 def list_remarks(row: Benchmark | None) -> tuple[str, ...]:
     """Return what has to be said with every score: how many test references can be known.
 
@@ -119,7 +124,7 @@ def list_remarks(row: Benchmark | None) -> tuple[str, ...]:
     before variants had an origin may hand out a variant of a test task with its reference.
     """
     tests = BenchmarkItem.objects.filter(benchmark=row, split=Split.TEST)
-    public = Scenario.objects.exclude(catalogue_set="").values("origin")
+    public = public_origins()
     practice = BenchmarkItem.objects.filter(split=Split.PRACTICE).values("scenario__origin")
     remarks = {
         "Test references are public: {} of {} come with the project or vary such.": public,
