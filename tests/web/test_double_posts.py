@@ -1,5 +1,6 @@
 """What is sent three times at once, on any page and by any operation, is made once."""
 
+import json
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -17,23 +18,27 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.api.urls import urlpatterns as OPERATIONS
-from arena.models import ApiToken, Receipt
+from arena.models import ApiToken, Receipt, Study
+from arena.results.services.ratings import rate_now
 from arena.site import receipts
 from arena.site.urls import urlpatterns as PAGES
 from arena.studies.services.opening import close_study
-from augment.models import Augmentation, EndpointModel, GenerationJob, Scenario
+from augment.models import Augmentation, Benchmark, EndpointModel, GenerationJob, Scenario
 from augment.services.running import jobs
 from augment.services.running.jobs import JobRequest
-from tests import study_rows
+from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from tests import entering, study_rows
 from tests.api.asking import error_of
 from tests.api.test_making import CAR, STREET
 from tests.api.tokens import secret_of
 from tests.jobs.models import Model, add_llama, ran
 from tests.jobs.rows import add_scenario, only_row
+from tests.opening import open_study
 from tests.web.addresses import address
 from tests.web.cast import World, people, signed_in, world
+from tests.web.test_vote_uploads import FINE as VOTES
 
-pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow]
+pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow, pytest.mark.timeout(900)]
 
 SWEPT = {"number": "add[0].x_m", "low": 19, "high": 21, "count": 2, "planner": "idm"}
 HERE = "http://127.0.0.1:1/v1"
@@ -45,21 +50,39 @@ Body = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cast:
-    """A study that is closed, an answer that can be changed further, a scenario with a range."""
+    """A study that is closed and rated, and one that is open; what else requests are about.
+
+    Attributes:
+        answer: Can be changed further.
+        ranged: A scenario whose intent has a range.
+        streets: A benchmark.
+    """
 
     here: World
     answer: Augmentation
     ranged: Scenario
-
-    def __post_init__(self) -> None:
-        close_study(study=self.here.study)
+    open_study: Study
+    streets: Benchmark
 
     def url(self, name: str) -> str:
-        if name.endswith(("follow-up", "follow-ups")):
+        if name == "invite":
+            return reverse(name, args=[self.open_study.code])
+        if name.endswith(("correct", "follow-up", "follow-ups")):
             return reverse(name, args=[self.answer.code])
+        if name in ("faults", "job-simulate"):
+            return reverse(name, args=[self.answer.job.code])
+        if name == "results-share":
+            rating = self.here.study.snapshots.get()
+            return reverse(name, args=[self.here.study.code, rating.code])
         if "family" in name:
             return reverse(name, args=[self.ranged.code])
         return address(name, self.here)
+
+    @staticmethod
+    def study() -> Body:
+        scenarios = [f"place-{number}" for number in range(6)]
+        who = {"contestants": ["ann", "bob"], "experts": ["eva"], "scenarios": scenarios}
+        return who | {"name": "Third", "votes_per_expert": 4}
 
     def job(self) -> Body:
         return {"name": "Twice", "contestants": ["llama"], "scenarios": ["far"]}
@@ -67,7 +90,36 @@ class Cast:
     def page_forms(self) -> dict[str, tuple[dict[str, int], Body]]:
         """By page: how many rows its form makes, and what is sent."""
         judge = str(EndpointModel.objects.get(model="llama3.1").code)
+        tasks = {"scenarios": "place-*", "practice": "20", "seed": "1"}
+        packed = entering.packed(**{"far": entering.ONE_CONE}).read()
+        rows = b"scene,type,instruction,slug\nstreet,cut_in,Let a car cut in.,one\n"
+        drawn = {"type": "jaywalking_pedestrian", "instruction": "Let somebody cross."}
+        moved = json.dumps(entering.ONE_CONE)
         return {
+            "author": ({"authorship": 1}, {"expert": "eva", "contestant": "ann"}),
+            "benchmark-new": ({"benchmark": 1}, tasks | {"slug": "places", "title": "Places"}),
+            "benchmark-write": ({"benchmarkfile": 1}, {}),
+            "board-publish": ({"boardtable": 1}, {}),
+            "contestant-new": (
+                {"contestant": 1},
+                {"model": "local|llama3.1", "variant": "fc", "slug": "newest"},
+            ),
+            "correct": ({"augmentation": 1, "generationjob": 1}, {"modification": moved}),
+            "endpoint-model-new": ({"endpointmodel": 1, "probe": 1}, {"model": "newest"}),
+            "endpoint-probe": ({"probe": 1}, {}),
+            "faults": ({"labellinground": 1}, {"name": "Faults", "experts": "eva", "seed": "1"}),
+            "import-votes": ({"study": 1}, {"name": "Elsewhere", "file": ("votes.csv", VOTES)}),
+            "invite": ({"invitation": 2}, {}),
+            "job-simulate": ({"simulation": 3}, {}),
+            "results-share": ({"sharedrating": 1}, {}),
+            "scenarios-bulk": ({"scenario": 1}, {"file": ("rows.csv", rows)}),
+            "scenarios-write": ({"scenariofile": 1}, {}),
+            "scene": ({"scenario": 1}, drawn),
+            "study-write": ({"studyfile": 1}, {}),
+            "submission-new": (
+                {"submission": 1},
+                {"benchmark": str(self.streets.code), "file": ("ours.zip", packed)},
+            ),
             "api-tokens": ({"apitoken": 1}, {"name": "Mine", "role": "admin", "days": "7"}),
             "boards": ({"board": 1}, {"name": "Town", "study": str(self.here.study.code)}),
             "endpoint-new": (
@@ -80,7 +132,7 @@ class Cast:
             "job-new": ({"generationjob": 1}, self.job() | {"cap_calls": "5"}),
             "judge-start": ({"judgerun": 1}, {"judge": judge, "sure": "1"}),
             "people": ({"user": 1}, {"username": "ada", "role": "expert"}),
-            "scene-send": ({"sceneupload": 1}, {"file": STREET, "format": ""}),
+            "scene-send": ({"sceneupload": 1}, {"file": ("street.json", STREET), "format": ""}),
             "study-again": ({"studydraft": 1}, {}),
             "study-new": ({"studydraft": 1}, {"name": "Round 3", "keep": "1"}),
             "study-rate": ({"snapshot": 1}, {}),
@@ -101,9 +153,17 @@ class Cast:
             "api-people": ({"user": 1}, {"username": "bob", "role": "expert"}),
             "api-probe": ({"probe": 1}, {}),
             "api-scenarios": ({"scenario": 1}, edit | {"type": "construction_zone"}),
+            "api-studies": ({"study": 1}, self.study()),
+            "api-submissions": (
+                {"submission": 1},
+                {
+                    "benchmark": "streets",
+                    "file": ("ours.zip", entering.packed(far=entering.EMPTY).read()),
+                },
+            ),
             "api-snapshots": ({"snapshot": 1}, {"rounds": 100}),
             "api-sweeps": ({"sweep": 1}, SWEPT),
-            "api-uploads": ({"sceneupload": 1}, {"file": STREET}),
+            "api-uploads": ({"sceneupload": 1}, {"file": ("street.json", STREET)}),
         }
 
 
@@ -120,7 +180,16 @@ def cast() -> Cast:
     ranged.save()
     asked = JobRequest(name="Far", contestants=["llama"], scenarios=["far"])
     answer = ran(only_row(jobs.launch(asked)), Model())
-    return Cast(here=here, answer=answer, ranged=ranged)
+    rate_now(study=close_study(study=here.study), rounds=100)
+    return Cast(
+        here=here,
+        answer=answer,
+        ranged=ranged,
+        open_study=open_study(**Cast.study() | {"name": "Second", "experts": ["eva", "finn"]}),
+        streets=make_benchmark(
+            BenchmarkRequest(slug="streets", title="Streets", scenarios=["far"])
+        ),
+    )
 
 
 @pytest.fixture
@@ -129,9 +198,9 @@ def admin() -> Client:
 
 
 def as_files(body: Body) -> Body:
-    """The body with its bytes as files, which are read to their end when they are sent."""
+    """The body, names with contents as files, which are read to their end once sent."""
     return {
-        name: SimpleUploadedFile("street.json", value) if isinstance(value, bytes) else value
+        name: SimpleUploadedFile(*value) if isinstance(value, tuple) else value
         for name, value in body.items()
     }
 
@@ -196,7 +265,7 @@ def test_every_operation_counts_once(cast: Cast) -> None:
             continue
         name, url = pattern.name or "", cast.url(pattern.name or "")
         expected, body = bodies.pop(name, ({}, {}))
-        is_form = any(isinstance(value, bytes) for value in body.values())
+        is_form = any(isinstance(value, tuple) for value in body.values())
 
         def send(
             url: str = url, body: Body = body, key: str = name, is_form: bool = is_form
