@@ -11,7 +11,6 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.scenarios import services
-from arena.scenarios.queries import list_benchmarks
 from augment.benchmark.folder import read_folder
 from augment.benchmark.values import Split
 from augment.errors import Conflict, InvalidDocument, UnknownName
@@ -180,8 +179,6 @@ def test_a_benchmark_whose_test_references_can_be_known_says_so(
     admin = signed_in(people()["admin"])
     page = admin.get(reverse("benchmark", args=[row.code]))
     assert public in page.content.decode()
-    counts = list_benchmarks().values_list("slug", "tasks", "public")
-    assert list(counts) == [("other", 1, 0), ("streets", 5, 1)]
     listed = admin.get(reverse("benchmarks")).content.decode()
     assert listed.count("Test references are public: 1 of its tasks.") == 1
 
