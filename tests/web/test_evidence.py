@@ -89,7 +89,7 @@ def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, reader:
     assert len(judged_twice) == agreement.units == 18
     listed = list(vote_page(rated, VoteSearch(order="disputed"), 1))
     said = [vote.pair.disagreement for vote in listed if vote.pair]
-    assert said == [1.0, 1.0, 0.5, 0.5, *[0.0] * 16]
+    assert said == [1.0, 1.0, 0.5, 0.5, *[0.0] * 6]
     first = first_card(grid(reader, rated, order="disputed"))
     assert "place-5" in first
     assert "disagreement 100 % of" in first
