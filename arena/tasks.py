@@ -1,4 +1,4 @@
-"""What workers do for arena; see augment.tasks."""
+"""Celery tasks of arena; see augment.tasks."""
 
 from functools import partial
 

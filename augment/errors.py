@@ -220,22 +220,22 @@ class QueueUnreachable(QueueFault):
         )
 
 
-class Unwanted(AugmentError):
+class NotNeeded(AugmentError):
     """Nobody needs the answer of a call any more. Ask nothing further; give up what is asked."""
 
 
-class WorkerStopping(Unwanted):
+class WorkerStopping(NotNeeded):
     """Shutting down: no more model calls; the row is requeued."""
 
 
-class LeaseLost(Unwanted):
+class LeaseLost(NotNeeded):
     """Another worker has this row now. Drop the result; the new holder brings its own."""
 
     def __init__(self) -> None:
         super().__init__("the row was taken back")
 
 
-class JobCancelled(Unwanted):
+class JobCancelled(NotNeeded):
     """The job was cancelled while one of its rows was worked on. The row is cancelled with it."""
 
     def __init__(self) -> None:
@@ -246,14 +246,14 @@ class QuestionInFlight(AugmentError):
     """Somebody else has just asked the model the same: wait for that answer."""
 
 
-class Abandoned(ModelFault):
+class CallDropped(ModelFault):
     """A call in flight was given up, because nobody needs its answer; it may be billed.
 
     Args:
         why: What ended the need.
     """
 
-    def __init__(self, why: Unwanted) -> None:
+    def __init__(self, why: NotNeeded) -> None:
         self.why = why
         super().__init__(f"given up before there was an answer: {why}")
 

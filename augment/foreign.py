@@ -29,8 +29,8 @@ _MOST_LISTED = 40
 _KINDS = {bool: "a boolean", int: "a number", float: "a number", str: "a text", list: "a list"}
 
 
-def kind_of(value: object) -> str:
-    """Return what a value of JSON is, in words."""
+def describe_kind(value: object) -> str:
+    """Return a JSON value's kind in words."""
     return _KINDS.get(type(value), "an object")
 
 
@@ -40,12 +40,12 @@ def fault_at(place: str, text: str) -> InvalidDocument:
 
 
 def name_all(meanings: Mapping[Value, str]) -> dict[str, Value]:
-    """Return what each name of a format means, from the names of each meaning."""
+    """Return the meaning of each name of a format, from the names of each meaning."""
     return {name: meaning for meaning, names in meanings.items() for name in names.split()}
 
 
 def look_up(table: Mapping[Key, Value], key: object, place: str) -> Value:
-    """Return what a name of the format means.
+    """Return the meaning of a name of the format.
 
     Raises:
         InvalidDocument: The table does not have it.
@@ -155,7 +155,7 @@ def read_as(value: object, kind: type[Value], place: str) -> Value:
         InvalidDocument: It is of another kind.
     """
     if not isinstance(value, kind):
-        raise fault_at(place, f"expected {kind_of(kind())}, got {str(value)[:40]!r}")
+        raise fault_at(place, f"expected {describe_kind(kind())}, got {str(value)[:40]!r}")
     return value
 
 
@@ -179,7 +179,7 @@ def read_speed(value: object, place: str, unit_mps: float = 1.0) -> float:
 
 
 class Doubts:
-    """What of a document was not understood or had to be assumed, counted for its notes.
+    """Parts of a document that were not understood or had to be assumed, counted for its notes.
 
     Attributes:
         faults: By the kind of what is left out with them.
@@ -200,7 +200,7 @@ class Doubts:
     def read(
         self, kind: str, read: Callable[..., Value | None], value: Any, *args: Any
     ) -> Value | None:
-        """Return what is read from a value; None where it is absent, or counted as a fault."""
+        """Return the value as read; None if it is absent or counted as a fault."""
         if value is not None:
             with self.about(kind):
                 return read(value, *args)
@@ -209,7 +209,7 @@ class Doubts:
     def read_all(
         self, kind: str, read: Callable[..., Value | None], rows: Iterable[tuple[Any, ...]]
     ) -> list[Value]:
-        """Return what can be read, each from the arguments in a row."""
+        """Return the readable values, each from the arguments in a row."""
         return [made for row in rows if (made := self.read(kind, read, *row)) is not None]
 
     def doubt_unknown(

@@ -199,7 +199,7 @@ def enqueue_judge(run_pk: int) -> int:
 
 
 def sender(kind: WorkKind[Any]) -> Callable[[int], int]:
-    """Return what sends the message of one row; as `enqueue`."""
+    """Return a function that sends the message of one row; as `enqueue`."""
     return lambda pk: enqueue(kind, [pk])
 
 

@@ -68,7 +68,7 @@ def measure(folder: Path) -> list[list[str]]:
     try:
         assert model.stdout is not None
         model.stdout.readline()
-        scenarios = demo.scenarios_of(None)[:SCENARIOS]
+        scenarios = demo.list_slugs(None)[:SCENARIOS]
         request = JobRequest(name="a", contestants=["sim-good-otm"], scenarios=scenarios)
 
         def ask() -> list[int]:

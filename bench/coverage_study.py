@@ -23,7 +23,7 @@ from arena.rating.panel import judge_rater
 from arena.rating.ranking import FEWEST_TO_JUDGE, judge_pairs
 from arena.rating.reliability import Evidence, evidence_of_repeats, raters, repeat_consistency
 from arena.rating.rules import Unit
-from arena.rating.sandwich import pulls_of_model, spread_of
+from arena.rating.sandwich import estimate_spread, pulls_of_model
 from arena.rating.snapshot_document import PanelRater
 from bench.worlds import World, paper_ratings
 
@@ -98,7 +98,7 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
     met = Meetings(len(truth), counts)
     strengths = models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     pulls = pulls_of_model(votes, met, counts.games, strengths)
-    rating, spread = to_elo(strengths), spread_of(pulls, Unit.TWO_WAY)
+    rating, spread = to_elo(strengths), estimate_spread(pulls, Unit.TWO_WAY)
     half_widths = {
         DEFAULT: spread.half_widths(),
         SINGLE: 1.959964 * np.sqrt(pulls.by_row().diagonal()),

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from augment.checks.finding import FaultClass
-from augment.fake_llm.careless import put
+from augment.fake_llm.careless import move_to
 from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
@@ -119,7 +119,7 @@ def straight_line(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents
 
     def laid_out(agent: TrafficAgent) -> TrafficAgent:
         place = route.locate_agent(agent)
-        return name_lane(route, put(agent, place.ahead_m, place.left_m))
+        return name_lane(route, move_to(agent, place.ahead_m, place.left_m))
 
     made = change_each(agents, laid_out)
     off_m = [_seen_m(route, was, one) for one, was in zip(made, agents, strict=True)]

@@ -15,7 +15,7 @@ import numpy as np
 from augment.scene.planned_motion import EGO_ID, MotionPreset
 from augment.scene.planned_mover import PlannedMover
 from augment.simulation import shapes
-from augment.simulation.drive import Drive, expert_of, run
+from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import PDM_CLOSED, planner_named
 from augment.simulation.road import Road
 from augment.simulation.score import collisions, criticality, score_drive
@@ -74,7 +74,7 @@ def meet(slug: str) -> Met:
         braking_mps2=max(required_braking_mps2(changed)),
         least_m=critical["least_distance_m"],
         fault=any(one.at_fault for one in met),
-        score=score_drive(drive, expert_of(setting, road)).value,
+        score=score_drive(drive, find_expert(setting, road)).value,
     )
 
 

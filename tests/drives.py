@@ -11,11 +11,11 @@ from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.judging import simulations
 from augment.services.judging.simulations import Options
-from augment.simulation.drive import expert_of, run
+from augment.simulation.drive import find_expert, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.trace import trace_of
+from augment.simulation.trace import make_trace
 from augment.simulation.traffic import DriveSetting
 from tests.scenes import cone, scene
 
@@ -27,9 +27,9 @@ def short_drive() -> tuple[bytes, dict[str, Any]]:
     setting = DriveSetting(scene=scene(), modification=change)
     road = Road(setting.scene)
     drive = run(setting, PdmClosed((0.0, 1.0)), road=road, steps=12)
-    score = score_drive(drive, expert_of(setting, road, steps=12))
-    document = simulations.document_of(drive, dict.fromkeys(ScoreKind, score))
-    trace = json.dumps(trace_of(setting, drive, score)).encode()
+    score = score_drive(drive, find_expert(setting, road, steps=12))
+    document = simulations.drive_document(drive, dict.fromkeys(ScoreKind, score))
+    trace = json.dumps(make_trace(setting, drive, score)).encode()
     return zlib.compress(trace), document
 
 

@@ -7,7 +7,12 @@ from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.planned_motion import AtTime, PlannedMotion, PointPath
-from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, view_of
+from augment.services.scenarios.pictures import (
+    draw_picture,
+    load_camera,
+    original_picture,
+    picture_view,
+)
 from tests import study_rows
 from tests.scenes import vehicle
 
@@ -31,11 +36,11 @@ def a_moving_study(*, scenarios: int, votes: int) -> Study:
         )
         row.save()
     for row in rows:
-        camera = camera_of(row.scenario)
+        camera = load_camera(row.scenario)
         original_picture(row.scenario)
         change = Modification(added=(cars[row.contestant.slug],))
-        study_rows.hang(row, picture_of(row.scenario, change, camera))
+        study_rows.hang(row, draw_picture(row.scenario, change, camera))
         row.scenario.matchups.update(
-            original_image=row.scenario.original_image, view=view_of(camera)
+            original_image=row.scenario.original_image, view=picture_view(camera)
         )
     return study

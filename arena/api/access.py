@@ -1,4 +1,4 @@
-"""Who asks, by a token or a session, and which roles may use a resource."""
+"""Identity of a request, by a token or a session, and the roles that may use a resource."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from rest_framework.request import Request
 from arena.errors import TokenOver
 from arena.models import ApiToken
 from arena.people.links import use_api_token
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 
 SCHEME = "bearer"
 ADMINS = ("admin",)
@@ -47,4 +47,4 @@ class RoleAllowed(BasePermission):
     def has_permission(self, request: Request, view: Any) -> bool:
         """Return whether the account has one of the roles."""
         allowed = view.readers if request.method in SAFE_METHODS else view.writers
-        return role_of(request.user) in (allowed or (*view.readers, *view.writers))
+        return top_role(request.user) in (allowed or (*view.readers, *view.writers))

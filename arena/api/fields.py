@@ -8,7 +8,7 @@ from rest_framework import serializers
 from rest_framework.exceptions import ParseError
 from rest_framework.parsers import JSONParser
 
-from augment.services.inputs import Input, InputKind, inputs_of
+from augment.services.inputs import Input, InputKind, to_inputs
 
 
 class SoundJSONParser(JSONParser):
@@ -124,7 +124,7 @@ class RequestBody(StrictSerializer):
     def get_fields(self) -> dict[str, Field]:
         """Return a field for each input."""
         return {
-            one.name: body_field(one) for one in inputs_of(self.request)
+            one.name: body_field(one) for one in to_inputs(self.request)
         } | super().get_fields()
 
 

@@ -189,7 +189,7 @@ ERRORS_OF_CHANGES = ERRORS | {
 
 
 class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-call]
-    """How the document describes tokens."""
+    """Token scheme as the OpenAPI document describes it."""
 
     target_class = "arena.api.access.BearerToken"
     name = "token"
@@ -204,7 +204,7 @@ class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-c
 
 
 class ErrorDetail(serializers.Serializer[Any]):
-    """What went wrong."""
+    """Error of a request: a sentence and its place."""
 
     code = serializers.CharField(help_text="For programs.")
     message = serializers.CharField(help_text="A sentence for people.")
@@ -354,7 +354,7 @@ USUAL, MOST = 100, 500
 
 
 class PageQuery(StrictSerializer):
-    """Which page of a list."""
+    """Page of a list."""
 
     limit = serializers.IntegerField(
         min_value=1, max_value=MOST, default=USUAL, help_text="Rows of a page."
@@ -365,7 +365,7 @@ class PageQuery(StrictSerializer):
 
 
 @cache
-def page_of(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[Any]:
+def page_serializer(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[Any]:
     """Return the serializer of a page, for the document."""
     return inline_serializer(
         name=line.__name__.removesuffix("Document") + "Page",

@@ -1,4 +1,4 @@
-"""What the log leaves out."""
+"""Filter that keeps secrets out of the log."""
 
 import logging
 import re

@@ -28,7 +28,7 @@ CLIENT = Config(
 """Standard retries wait longer each time: a bucket that is gone for a moment costs no picture."""
 
 
-def _named(deed: str, method: Callable[..., Any]) -> Callable[..., Any]:
+def _describe_fault(deed: str, method: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(method)
     def call(self: S3Media, name: str) -> Any:
         with self._faults_named(deed, name):
@@ -54,10 +54,10 @@ class S3Media(S3Storage):  # type: ignore[misc] # it has no types
             **options,
         )
 
-    exists = _named("look for", S3Storage.exists)
-    size = _named("look for", S3Storage.size)
-    delete = _named("delete", S3Storage.delete)
-    listdir = _named("list", S3Storage.listdir)
+    exists = _describe_fault("look for", S3Storage.exists)
+    size = _describe_fault("look for", S3Storage.size)
+    delete = _describe_fault("delete", S3Storage.delete)
+    listdir = _describe_fault("list", S3Storage.listdir)
 
     def _open(self, name: str, mode: str = "rb") -> File[bytes]:
         if mode != "rb":
@@ -77,10 +77,10 @@ class S3Media(S3Storage):  # type: ignore[misc] # it has no types
         except (BotoCoreError, ClientError, Boto3Error) as fault:
             place = f"s3://{self.bucket_name}/{self.location}".rstrip("/")
             logger.error("Could not %s %s in %s: %s", deed, name or "anything", place, fault)
-            raise MediaFault(deed, place, _kind_of(fault)) from fault
+            raise MediaFault(deed, place, _fault_code(fault)) from fault
 
 
-def _kind_of(fault: Exception) -> str:
+def _fault_code(fault: Exception) -> str:
     """In a word: the code that the bucket answered, or what kept an answer away."""
     first = fault.__cause__ if isinstance(fault, Boto3Error) and fault.__cause__ else fault
     if isinstance(first, ClientError):

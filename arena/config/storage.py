@@ -1,4 +1,4 @@
-"""How pictures and static files are stored on this machine."""
+"""Storage of pictures and static files on this machine."""
 
 from __future__ import annotations
 

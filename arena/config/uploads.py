@@ -1,4 +1,4 @@
-"""How large a file may be that comes by a form, before any page has looked at it."""
+"""Size limit of a file that comes by a form, before any page has looked at it."""
 
 from typing import Any
 

@@ -19,7 +19,7 @@ from arena.api.views import (
     WarnedDocument,
     keep_and_send,
     operation,
-    page_of,
+    page_serializer,
 )
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
@@ -32,7 +32,7 @@ KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.C
 
 
 class ContestantQuery(PageQuery):
-    """Which contestants."""
+    """Filter of a list of contestants."""
 
     kind = serializers.ChoiceField(choices=KINDS, required=False)
     variant = serializers.ChoiceField(choices=list(VARIANTS), required=False)
@@ -66,7 +66,7 @@ class ContestantsView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation(page_of(ContestantDocument), query=ContestantQuery, name="listContestants")
+    @operation(page_serializer(ContestantDocument), query=ContestantQuery, name="listContestants")
     def get(self, given: Given) -> Response:
         """Contestants by slug.
 
@@ -167,7 +167,7 @@ class ModelsView(ApiView):
 
 
 class ProbeView(ApiView):
-    """What a model can do, asked by a worker."""
+    """Probe of a model's abilities, carried out by a worker."""
 
     readers, writers = STAFF, ADMINS
 

@@ -11,9 +11,9 @@ from django.forms import model_to_dict
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.contestants.queries import asking_of, probe_lines, state_of
-from arena.people.queries import role_of
-from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
+from arena.contestants.queries import probe_lines, probe_state, show_options
+from arena.people.queries import top_role
+from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm, offer
 from arena.site.listing import read_listing, read_page
@@ -28,9 +28,9 @@ from augment.services.endpoints.contestants import (
 )
 from augment.services.endpoints.known_endpoints import MODEL_FACTS, EndpointFacts, EndpointRequest
 from augment.services.endpoints.probing import add_model, plan_probe
-from augment.services.endpoints.treatments import respondents_of
+from augment.services.endpoints.treatments import read_respondents
 from augment.services.events import retire
-from augment.services.inputs import inputs_of, read_request, read_values
+from augment.services.inputs import read_request, read_values, to_inputs
 from augment.services.running.matrix import SEPARATOR
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
@@ -39,7 +39,7 @@ CONTESTANTS_AT_ONCE = 50
 
 
 class OptionsForm(RequestForm):
-    """How a contestant asks its model; what is empty stays open."""
+    """Options with which a contestant asks its model; an empty field stays open."""
 
     inputs = OPTION_INPUTS
 
@@ -58,7 +58,7 @@ class ContestantForm(OptionsForm):
     """A model, a variant, and how it asks."""
 
     inputs = (
-        *(one for one in inputs_of(ContestantRequest) if one.name in ("variant", "name")),
+        *(one for one in to_inputs(ContestantRequest) if one.name in ("variant", "name")),
         *OPTION_INPUTS,
     )
     model = forms.ChoiceField(label="Model")
@@ -77,7 +77,7 @@ class ContestantForm(OptionsForm):
         offer(self, "model", choices)
 
     def to_request(self) -> ContestantRequest:
-        """Return what is asked for; the short name is made where none is given."""
+        """Return the request; the short name is made where none is entered."""
         given = self.cleaned_data
         options = read_values(OPTION_INPUTS, given)
         endpoint, model = given["model"].split(SEPARATOR, 1)
@@ -89,13 +89,13 @@ class ContestantForm(OptionsForm):
 class EndpointForm(RequestForm):
     """A new endpoint."""
 
-    inputs = inputs_of(EndpointRequest)
+    inputs = to_inputs(EndpointRequest)
 
 
 class EndpointFactsForm(RequestForm):
-    """What of an endpoint can be changed."""
+    """Facts about an endpoint that can be changed."""
 
-    inputs = inputs_of(EndpointFacts)
+    inputs = to_inputs(EndpointFacts)
 
 
 ABILITIES = {
@@ -106,7 +106,7 @@ ABILITIES = {
 
 
 class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
-    """What somebody knows of a model; what is left empty is unknown."""
+    """Facts that somebody knows about a model; an empty field is unknown."""
 
     class Meta:
         model = EndpointModel
@@ -143,7 +143,7 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "studies": row.studies.all(),
     }
     try:
-        context |= {"asking": asking_of(row), "respondents": respondents_of(row)}
+        context |= {"asking": show_options(row), "respondents": read_respondents(row)}
     except AugmentError as error:  # a role's endpoint is gone, or the variant
         messages.warning(request, str(error))
     return render(request, "contestants/contestant.html", context)
@@ -155,7 +155,7 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
     form = ContestantForm(request.POST or None, initial=request.GET.dict())
     if form.is_valid():
         with refusals_in(form):
-            row = add_contestant(form.to_request(), user_of(request))
+            row = add_contestant(form.to_request(), get_user(request))
             messages.success(request, f"“{row.name}” is added.")
             return redirect("contestant", code=row.code)
     return render(request, "contestants/new.html", {"form": form})
@@ -165,7 +165,7 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
 def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a contestant, or take that back."""
     row = get_object_or_404(Contestant, code=code)
-    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")
+    retire(row, actor=get_user(request), is_retired=request.POST.get("retired") != "no")
 
 
 # --- Endpoints and models ----------------------------------------------------------------------
@@ -185,7 +185,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
     if form.is_valid():
         with refusals_in(form):
             wanted = read_request(EndpointRequest, form.cleaned_data)
-            row = known_endpoints.add_endpoint(wanted, user_of(request))
+            row = known_endpoints.add_endpoint(wanted, get_user(request))
             messages.success(request, f"“{row.label}” is added. Name its models now.")
             return redirect("endpoint", code=row.code)
     context = {"form": form, "variables": sorted(workforce().keys)}
@@ -200,10 +200,10 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if form.is_valid():
         with refusals_in(form):
             facts = read_request(EndpointFacts, form.cleaned_data)
-            known_endpoints.change_endpoint(row, facts=facts, actor=user_of(request))
+            known_endpoints.change_endpoint(row, facts=facts, actor=get_user(request))
             messages.success(request, "Kept. It counts for the next call.")
             return redirect("endpoint", code=row.code)
-    models = [(model, state_of(model, model.probes.first())) for model in row.models.all()]
+    models = [(model, probe_state(model, model.probes.first())) for model in row.models.all()]
     staff = workforce()
     context = {
         "row": row,
@@ -219,8 +219,8 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _sent_by_admin(request: HttpRequest) -> Any:
-    """Return what was posted, if anything; researchers may look and not change."""
-    if request.method == "POST" and role_of(request.user) != ADMIN:
+    """Return the posted data, if any; researchers may look and not change."""
+    if request.method == "POST" and top_role(request.user) != ADMIN:
         raise PermissionDenied
     return request.POST or None
 
@@ -229,7 +229,7 @@ def _sent_by_admin(request: HttpRequest) -> Any:
 def new_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Note a model of an endpoint with its listed price, and have a worker probe it."""
     endpoint = get_object_or_404(Endpoint, code=code)
-    probe = add_model(endpoint, model=request.POST.get("model", ""), actor=user_of(request))
+    probe = add_model(endpoint, model=request.POST.get("model", ""), actor=get_user(request))
     send_later(request, enqueue_probe, probe.pk)
     return redirect("endpoint-model", code=probe.model.code)
 
@@ -241,7 +241,7 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = ModelForm(_sent_by_admin(request), instance=row)
     if form.is_valid():
         with refusals_in(form):
-            known_endpoints.change_model(row, facts=form.cleaned_data, actor=user_of(request))
+            known_endpoints.change_model(row, facts=form.cleaned_data, actor=get_user(request))
             messages.success(request, "Kept. It counts for contestants that have not run yet.")
             return redirect("endpoint-model", code=code)
     probe = row.probes.first()
@@ -251,7 +251,7 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "form": form,
         "probe": probe,
         **wait_for_workers(waits=is_live),
-        "state": state_of(row, probe),
+        "state": probe_state(row, probe),
         "lines": probe_lines(row, probe),
     }
     return render(request, "endpoints/model.html", context, status=422 if form.errors else 200)
@@ -261,4 +261,4 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def probe_model(request: HttpRequest, code: uuid.UUID) -> None:
     """Have a worker ask the model what it can do."""
     row = get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)
-    send_later(request, enqueue_probe, plan_probe(row, actor=user_of(request)).pk)
+    send_later(request, enqueue_probe, plan_probe(row, actor=get_user(request)).pk)

@@ -5,7 +5,7 @@ from typing import Any
 from augment.models import Contestant, EndpointModel, Probe
 from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.endpoints.probing import ABILITIES
-from augment.services.endpoints.treatments import left_out, options_of
+from augment.services.endpoints.treatments import list_unsent_options, read_options
 
 
 def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any]]:
@@ -37,7 +37,7 @@ def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any
     return lines
 
 
-def state_of(model: EndpointModel, probe: Probe | None) -> str:
+def probe_state(model: EndpointModel, probe: Probe | None) -> str:
     """Return in a word what the last probe of a model came to: for pages."""
     if probe is not None and probe.state in (*Probe.UNDER_WAY, Probe.State.FAILED):
         return "failed" if probe.state == Probe.State.FAILED else "asked"
@@ -46,7 +46,7 @@ def state_of(model: EndpointModel, probe: Probe | None) -> str:
     return {True: "works", False: "silent", None: "unknown"}[answers]
 
 
-def asking_of(
+def show_options(
     contestant: Contestant, made_with: dict[str, Any] | None = None
 ) -> dict[str, Any] | None:
     """Return a contestant's options as a page shows them, None where it asks no model.
@@ -57,8 +57,8 @@ def asking_of(
     """
     if contestant.endpoint is None:
         return None
-    options = made_with or options_of(contestant).to_document()
-    lacking = left_out(contestant)
+    options = made_with or read_options(contestant).to_document()
+    lacking = list_unsent_options(contestant)
     lines = [
         {
             "label": one.label,

@@ -13,7 +13,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 class Dtype(StrEnum):
-    """What a column of a Parquet file can hold; every cell may be empty."""
+    """Type of a Parquet column; every cell may be empty."""
 
     TEXT = "string"
     WHOLE = "int64"
@@ -64,12 +64,12 @@ def csv_parts(
     for written, row in enumerate(rows, start=1):
         writer.writerow([cell(value, number) for value in row])
         if written % AT_ONCE == 0:
-            yield _taken(sheet)
-    yield _taken(sheet)
+            yield _take_written(sheet)
+    yield _take_written(sheet)
 
 
-def _taken(sheet: io.StringIO) -> bytes:
-    """What was written since the last time."""
+def _take_written(sheet: io.StringIO) -> bytes:
+    """Return the bytes written since the last call."""
     content = sheet.getvalue().encode()
     sheet.seek(0)
     sheet.truncate()

@@ -1,4 +1,4 @@
-"""What all writers share: formats, tables of typed columns, and downloads.
+"""Formats, tables of typed columns and downloads, shared by all writers.
 
 The same rows always give the same bytes. What is unknown or does not exist is empty.
 """
@@ -26,7 +26,7 @@ Named = TypeVar("Named")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format(Generic[Table]):
-    """How a table can be written.
+    """File format of a table.
 
     Attributes:
         suffix: Of the file's name, without the dot.
@@ -136,7 +136,7 @@ class Sheet:
     facts: Mapping[str, object] = field(default_factory=dict)
 
 
-def sheet_of(
+def make_sheet(
     lines: Iterable[object], columns: Columns, *, name: str, digits: int | None = 4, **more: Any
 ) -> Sheet:
     """Return a row of plain values for each line.
@@ -176,7 +176,7 @@ def read_value(line: Any, value: Value, digits: int | None = 4) -> object:
             return read
 
 
-def csv_of(columns: Mapping[str, Value], lines: Iterable[object]) -> bytes:
+def make_csv(columns: Mapping[str, Value], lines: Iterable[object]) -> bytes:
     """Return a CSV file with one line a row; floats have two decimals."""
     rows = ([read_value(line, value, None) for value in columns.values()] for line in lines)
     return csv_text(list(columns), rows).encode()

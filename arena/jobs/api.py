@@ -24,7 +24,7 @@ from arena.api.views import (
     file_operation,
     keep_and_send,
     operation,
-    page_of,
+    page_serializer,
 )
 from arena.exports.formats import download
 from arena.jobs.exports.tables import JOB_TABLES
@@ -38,13 +38,13 @@ from augment.tasks import enqueue_augmentation, enqueue_job
 
 
 class JobQuery(PageQuery):
-    """Which jobs."""
+    """Filter of a list of jobs."""
 
     state = serializers.ChoiceField(choices=GenerationJob.State.values, required=False)
 
 
 class CountsDocument(serializers.Serializer[Any]):
-    """How many augmentations of a job are in each state."""
+    """Number of a job's augmentations in each state."""
 
     state = serializers.CharField(source="job.state")
     total = serializers.IntegerField()
@@ -134,7 +134,7 @@ class JobsView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation(page_of(JobDocument), query=JobQuery, name="listJobs")
+    @operation(page_serializer(JobDocument), query=JobQuery, name="listJobs")
     def get(self, given: Given) -> Response:
         """Jobs, the youngest first.
 
@@ -187,7 +187,7 @@ class EstimateView(ApiView):
 
     @operation(EstimateDocument, takes=EstimateBody, name="estimateJob")
     def post(self, given: Given) -> Any:
-        """What a job would use.
+        """Return the estimate of a job.
 
         From recorded calls; null where there are none, or no price.
         """
@@ -215,7 +215,7 @@ class JobExportView(FileView):
 
 
 class AugmentationDocument(RowDocument[Augmentation], WarnedDocument):
-    """What one contestant made of one scenario."""
+    """Augmentation of one scenario by one contestant."""
 
     job = serializers.UUIDField(source="job.code")
     scenario = serializers.CharField(source="scenario.slug")
@@ -237,7 +237,7 @@ class AugmentationDocument(RowDocument[Augmentation], WarnedDocument):
 
 
 class FollowUpBody(RequestBody):
-    """What to change in an answer; a missing cap is none."""
+    """Change that is asked for in an answer; a missing cap is no cap."""
 
     request = FollowUpRequest
 
@@ -257,7 +257,7 @@ class AugmentationView(ApiView):
 
 
 class FollowUpsView(ApiView):
-    """What a contestant is told next."""
+    """Follow-ups of an augmentation: the contestant's next instructions."""
 
     writers = ADMINS
 

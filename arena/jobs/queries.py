@@ -29,7 +29,7 @@ _LEAN = (*("code", "state", "sample", "image", "scenario_id", "contestant_id"), 
 
 
 class View(NamedTuple):
-    """How cells are shown: at most so many on a page, but for a single row, and of each kind."""
+    """Limits on the cells that a page shows: how many, of which row, of which kind."""
 
     name: str
     cells: int
@@ -45,7 +45,7 @@ VIEWS = {view.name: view for view in (MARKS, PICTURES)}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """Which part of a grid is asked for; pages count from 1."""
+    """Part of a grid; pages count from 1."""
 
     view: View = PICTURES
     row: int = 1
@@ -96,7 +96,7 @@ def grid_part(job: GenerationJob, part: Part) -> dict[str, Any]:
 # --- Drives ------------------------------------------------------------------------------------
 
 
-def before_of(row: Simulation) -> Simulation | None:
+def find_unmodified_drive(row: Simulation) -> Simulation | None:
     """The same scene before the change, driven the same way; None until that is done."""
     options = Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
     rows = options.of(Simulation.objects.filter(scenario_id=row.scenario_id))
@@ -104,14 +104,14 @@ def before_of(row: Simulation) -> Simulation | None:
     return drives.exclude(pk=row.pk).first()
 
 
-def shown_augmentations(study: Study) -> frozenset[int]:
+def list_shown_ids(study: Study) -> frozenset[int]:
     """The primary keys of all augmentations in the study's matchups; one query."""
     rows = study.matchups.order_by().values_list("left", "right").distinct()
     return frozenset(pk for pair in rows for pk in pair)
 
 
 def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:
-    """By the contestant's primary key, over all augmentations that a study shows; one query."""
+    """Return spending by the contestant's primary key over a study's augmentations; one query."""
     return sum_spending(Q(attempt__augmentation__in=augmentations), by=CONTESTANT)
 
 
@@ -142,7 +142,7 @@ class LabellingProgress:
 
     @property
     def left(self) -> int:
-        """What still waits for a label: nothing in a closed labelling."""
+        """Number of tasks without a label; 0 in a closed labelling."""
         return 0 if self.labelling.closed_at else self.planned - self.labelled
 
 
@@ -157,7 +157,7 @@ def find_labellings(**narrow: Any) -> list[LabellingProgress]:
     ]
 
 
-def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
+def labelling_progress(*, expert: User, code: UUID) -> LabellingProgress:
     """One of the expert's own labellings.
 
     Raises:
@@ -170,7 +170,7 @@ def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
 
 
 def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
-    """What the expert labels next, None when all is done or the labelling is closed."""
+    """Return the expert's next task, None when all is done or the labelling is closed."""
     if labelling.closed_at is not None:
         return None
     waiting = labelling.tasks.filter(expert=expert, label=None)

@@ -52,7 +52,7 @@ def open_labelling(
     if not is_new:
         raise Conflict(f"There is a labelling called '{name}' already; choose another name.")
     labelling.experts.set(people)
-    tasks = [task for expert in people for task in _planned(labelling, expert)]
+    tasks = [task for expert in people for task in _plan_tasks(labelling, expert)]
     if not tasks:
         raise NothingToPlan("These experts have nothing left to label in this job.")
     LabelTask.objects.bulk_create(tasks)
@@ -132,7 +132,7 @@ def _experts(usernames: Sequence[str]) -> list[User]:
     return experts
 
 
-def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:
+def _plan_tasks(labelling: LabellingRound, expert: User) -> list[LabelTask]:
     rows = Augmentation.objects.filter(job=labelling.job, state=Augmentation.State.DONE)
     left = rows.exclude(label_tasks__expert=expert).order_by("scenario__slug", "contestant__slug")
     order = list(left.values_list("pk", flat=True))

@@ -45,7 +45,7 @@ from arena.results.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
 from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
-from augment.services.judging.simulations import allowed_planners
+from augment.services.judging.simulations import list_allowed_planners
 from augment.services.scenarios.pictures import THUMBNAILS
 from augment.services.texts import is_stored_name
 
@@ -71,7 +71,7 @@ class BackupUnreadable(ArenaError):
 
 @dataclass(slots=True)
 class Manifest:
-    """What is in the file."""
+    """Manifest of a backup: its versions, tables and the hash of each file."""
 
     migrations: list[str]
     made_at: str = ""
@@ -135,7 +135,7 @@ def _fill(archive: zipfile.ZipFile, now: datetime, say: Say) -> Manifest:
     manifest = Manifest(
         made_at=now.isoformat(),
         database=connection.vendor,
-        migrations=stored_rows.applied_migrations(),
+        migrations=stored_rows.list_migrations(),
     )
 
     def add(name: str, content: Iterable[bytes]) -> int:
@@ -154,7 +154,7 @@ def _fill(archive: zipfile.ZipFile, now: datetime, say: Say) -> Manifest:
 
     with stored_rows.frozen_rows():
         for model in stored_rows.find_tables():
-            label = stored_rows.label_of(model)
+            label = stored_rows.model_label(model)
             lines = map(stored_rows.as_line, stored_rows.read_values(model._base_manager.all()))
             manifest.rows[label] = add(f"{ROWS}{label}.jsonl", lines)
     say(f"rows: {sum(manifest.rows.values())} of {len(manifest.rows)} tables")
@@ -198,7 +198,7 @@ def _open_file(path: Path) -> IO[bytes]:
 
 
 def read_manifest(source: Members, *, wanted: str = FORMAT) -> Manifest:
-    """Return what it says of itself, held against what is in it, every byte.
+    """Return the manifest, checked against every byte of the file.
 
     Raises:
         BackupUnreadable: Another kind of file, a later version, or a member is missing, broken
@@ -262,7 +262,7 @@ def restore_backup(path: Path, *, say: Say) -> Manifest:
         manifest = read_manifest(source)
         say(f"whole: a backup of {manifest.made_at}, {manifest.database}")
         tables = stored_rows.find_tables()
-        if {stored_rows.label_of(model) for model in tables} != manifest.rows.keys():
+        if {stored_rows.model_label(model) for model in tables} != manifest.rows.keys():
             raise BackupUnreadable("This backup has other tables than this release.")
         strange = [name for name in manifest.media if not is_stored_name(name)]
         for name in strange:  # what somebody else laid there
@@ -297,7 +297,7 @@ def import_study(folder: Path, *, say: Say) -> Manifest:
     if strange := sorted(name for name in manifest.media if not is_stored_name(name)):
         raise BackupUnreadable(f"This has files that no study has: {MEDIA}{strange[0]}.")
     labels = manifest.rows.keys()
-    tables = [m for m in stored_rows.find_tables() if stored_rows.label_of(m) in labels]
+    tables = [m for m in stored_rows.find_tables() if stored_rows.model_label(m) in labels]
 
     def write() -> None:
         _write_rows(source, manifest, tables, _check_of_study)
@@ -321,10 +321,10 @@ def _check_of_study(row: models.Model) -> None:
             f"state: {getattr(row, 'state', '')!r} is not over; a study's folder holds what has "
             "ended"
         )
-    if isinstance(row, Simulation) and row.planner not in allowed_planners():
+    if isinstance(row, Simulation) and row.planner not in list_allowed_planners():
         raise ValueError(
             f"planner: {row.planner!r} is not allowed here, only "
-            f"{', '.join(allowed_planners())}; ARENA_PLANNERS names more"
+            f"{', '.join(list_allowed_planners())}; ARENA_PLANNERS names more"
         )
 
 
@@ -332,7 +332,7 @@ def _restore(
     source: Members, manifest: Manifest, media: list[str], write: Callable[[], None], say: Say
 ) -> None:
     """Take in pictures and rows, or neither."""
-    ours, theirs = set(stored_rows.applied_migrations()), set(manifest.migrations)
+    ours, theirs = set(stored_rows.list_migrations()), set(manifest.migrations)
     if ours != theirs:
         lacking = ", ".join(sorted(ours - theirs)) or "nothing"
         beyond = ", ".join(sorted(theirs - ours)) or "nothing"
@@ -353,7 +353,7 @@ def _restore(
         _write_media(source, media, written)
         say(f"pictures: {len(written)}")
         with transaction.atomic():
-            stored_rows.prepared_rows().delete()
+            stored_rows.list_prepared_rows().delete()
             write()
     except BaseException:
         for name in written:
@@ -383,7 +383,7 @@ def _write_rows(
 ) -> None:
     """Store the rows and hold them against each other now, not when all is kept already."""
     for model in tables:
-        label = stored_rows.label_of(model)
+        label = stored_rows.model_label(model)
         try:
             with source[f"{ROWS}{label}.jsonl"]() as lines:
                 number = stored_rows.write_rows(model, lines, check=check)

@@ -98,7 +98,7 @@ def start_drives() -> list[int]:
     Returns:
         The keys of the drives.
     """
-    rows = models.Scenario.objects.filter(slug__in=demo.scenarios_of(DRIVEN_PER_TYPE))
+    rows = models.Scenario.objects.filter(slug__in=demo.list_slugs(DRIVEN_PER_TYPE))
     waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
     return waiting

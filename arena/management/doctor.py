@@ -1,4 +1,4 @@
-"""What is wrong with an installation, and what to do about it.
+"""Checks of an installation: its faults and their remedies.
 
 Each examination looks at one part and says in a sentence what it found. `broken`: something that
 people need does not work; `doubtful`: it works, and will surprise somebody.
@@ -23,13 +23,13 @@ from arena.people.queries import find_admins
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Endpoint, GenerationJob
-from augment.services.endpoints.known_endpoints import key_of
+from augment.services.endpoints.known_endpoints import read_key
 
 ENOUGH_BYTES = 1 << 30
 
 
 class Level(StrEnum):
-    """How bad it is."""
+    """Severity of a fault."""
 
     FINE = "fine"
     DOUBTFUL = "doubtful"
@@ -180,7 +180,7 @@ def _accounts() -> Ailments:
 def _endpoints() -> Ailments:
     for endpoint in Endpoint.objects.all():
         try:
-            key_of(endpoint)
+            read_key(endpoint)
         except (KeyMissing, KeyNotAllowed) as error:
             remedy = "Set it where the workers run."
             yield broken(f"endpoint {endpoint.label}", str(error), remedy)

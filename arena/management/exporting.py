@@ -1,4 +1,4 @@
-"""What `manage.py export` can write: the arguments of each kind, and the file it makes."""
+"""Kinds of `manage.py export`: the arguments of each, and the file that it makes."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
 from arena.exports.formats import Export, format_named
-from arena.jobs.exports.files import made_of
+from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
 from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
-from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
+from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHARTS, RATING_FILES
 from arena.results.queries.access import snapshot_to_export
 from arena.results.services.ratings import log_early_look
@@ -113,7 +113,7 @@ def _write_votes(options: Chosen, say: Say) -> ExportedFile:
     """Write the votes that the rating counted; of a cancelled study all that were given."""
     study = study_named(options["study"])
     if study.state == Study.State.CANCELLED:
-        return _write(Export(VOTE_FORMATS, unrated_votes), options["format"], lambda: study)
+        return _write(Export(VOTE_FORMATS, list_unrated), options["format"], lambda: study)
     return _write_rating(options, say)
 
 
@@ -166,7 +166,7 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         f"{len(written.losses)} things could not be said as {exported.format}; "
         f"{len(written.refused)} refused."
     )
-    made = made_of(exported, slugify(exported.origin.name) or exported.origin.code)
+    made = pack_scenarios(exported, slugify(exported.origin.name) or exported.origin.code)
     return ExportedFile(made.content.read(), "zip", False, name=made.name)
 
 

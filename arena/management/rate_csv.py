@@ -104,7 +104,7 @@ def run(
     seed: int = 0,
     format: str = "table",
 ) -> str:
-    """Return what to print for a file.
+    """Return the text to print for a file.
 
     Raises:
         CsvNotRated: The file can't be read or the options don't fit it.
@@ -180,7 +180,7 @@ def _choose_unit(there: Sequence[str], method: Method, wanted: str | None) -> Un
 
 @dataclass(frozen=True, slots=True)
 class RatedCsv:
-    """What came out for a file.
+    """Result for a file of votes.
 
     Attributes:
         told_apart: The pairs that differ with all judged at once; None where the intervals do not
@@ -193,7 +193,7 @@ class RatedCsv:
 
     @property
     def method(self) -> str:
-        """How the numbers came about."""
+        """Method behind the numbers, in one line."""
         board = self.board
         found = (
             f"in closed form ({_CLUSTERED[board.unit]})"
@@ -204,7 +204,7 @@ class RatedCsv:
 
     @property
     def missing(self) -> list[str]:
-        """What is missing in which lines, and why."""
+        """Missing values with their lines and reasons."""
         return notes_by_reason((line.name, line.note) for line in self.board.standings)
 
     @property
@@ -214,7 +214,7 @@ class RatedCsv:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What the lines have in the columns of CSV and JSON."""
+        """Values of each line in the columns of CSV and JSON."""
         return [
             {name: getattr(line, field) for name, field in COLUMNS.items()}
             for line in self.board.standings
@@ -267,7 +267,7 @@ def _write_json(rated: RatedCsv) -> str:
         "standings": standings,
         "pairs": None if rated.told_apart is None else _pairs(board, rated.told_apart),
     }
-    return json.dumps(_rounded(document), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(_round(document), indent=2, ensure_ascii=False) + "\n"
 
 
 def _pairs(board: Leaderboard, found: Separation) -> list[dict[str, Any]]:
@@ -283,12 +283,12 @@ def _pairs(board: Leaderboard, found: Separation) -> list[dict[str, Any]]:
     ]
 
 
-def _rounded(value: Any) -> Any:
+def _round(value: Any) -> Any:
     """Round the numbers of a document to four decimals."""
     if isinstance(value, dict):
-        return {name: _rounded(inner) for name, inner in value.items()}
+        return {name: _round(inner) for name, inner in value.items()}
     if isinstance(value, list):
-        return [_rounded(inner) for inner in value]
+        return [_round(inner) for inner in value]
     return round(value, 4) if isinstance(value, float) else value
 
 

@@ -5,13 +5,13 @@ from functools import cached_property
 
 from django.db import models
 
-from arena.models.people import Coded
+from arena.models.people import CodedModel
 from arena.models.studies import Study
 from arena.rating.board_table import BoardTableDocument, table_from_document
 from augment.models import AppendOnly, Benchmark
 
 
-class Board(Coded):
+class Board(CodedModel):
     """A series of studies, the first one and then batches, whose votes are rated together."""
 
     name = models.CharField(max_length=100, unique=True)
@@ -56,5 +56,5 @@ class BoardTable(AppendOnly):
 
     @cached_property
     def document(self) -> BoardTableDocument:
-        """What it says."""
+        """Content of the table as a typed value."""
         return table_from_document(json.loads(self.files["json"]))

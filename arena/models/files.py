@@ -46,7 +46,7 @@ class WrittenFile(Work):
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a worker has it, or will have it."""
+        """True while a worker has it or will have it."""
         return self.state in self.UNDER_WAY
 
     def alike(self) -> models.QuerySet[Self]:
@@ -62,7 +62,7 @@ def state_is_known(name: str) -> models.CheckConstraint:
 
 
 def ready_is_stored(name: str) -> models.CheckConstraint:
-    """What is ready can be read."""
+    """Constraint that a file in state ready has content."""
     return models.CheckConstraint(name=name, condition=~Q(state="ready") | ~Q(stored=""))
 
 

@@ -12,7 +12,7 @@ from django.db.models.signals import post_save
 from django.dispatch import receiver
 
 
-class Coded(models.Model):
+class CodedModel(models.Model):
     """A row that addresses name by a random code."""
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
@@ -25,7 +25,7 @@ class Coded(models.Model):
 
 
 class Person(models.Model):
-    """What an account is beside its login: a public code, a pseudonym and preferences."""
+    """Account details beside its login: a public code, a pseudonym and preferences."""
 
     user = models.OneToOneField(
         settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="person"
@@ -65,7 +65,7 @@ def fresh_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-class ApiToken(Coded):
+class ApiToken(CodedModel):
     """One token of one account. It is shown once and kept only as a hash.
 
     The role is never more than the owner's of the moment; see `arena.people.queries`.
@@ -103,7 +103,7 @@ class ApiToken(Coded):
         )
 
     def state(self, now: datetime) -> State:
-        """Whether the token works at that time, and if not, why."""
+        """Return whether the token works at that time, and if not, why."""
         if self.revoked_at is not None:
             return self.State.REVOKED
         return self.State.EXPIRED if self.expires_at <= now else self.State.ALIVE

@@ -105,7 +105,7 @@ class Snapshot(Work):
 
     @property
     def question(self) -> str:
-        """What was asked in the votes that it rates; older ones know of one question."""
+        """Question of the rated votes; older ratings know a single question."""
         return str(self.filters.get("question", Question.INSTRUCTION))
 
     @cached_property
@@ -115,7 +115,7 @@ class Snapshot(Work):
 
     @property
     def votes_cast(self) -> int:
-        """How many counted votes people gave; earlier ratings count settled ties with them."""
+        """Number of counted votes by people; earlier ratings count settled ties with them."""
         return self.votes_counted - (self.settled_ties or 0)
 
 
@@ -165,8 +165,8 @@ STORED = tuple(
 """The fields of a line that a snapshot stores; names in a board are slugs."""
 
 
-def stored_values(line: Line | Standing) -> dict[str, Any]:
-    """Return what a line says in the fields that are stored."""
+def snapshot_values(line: Line | Standing) -> dict[str, Any]:
+    """Return a line's values of the stored fields."""
     return {name: getattr(line, name) for name in STORED}
 
 

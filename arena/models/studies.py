@@ -4,18 +4,18 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
-from arena.models.people import Coded, fresh_token
+from arena.models.people import CodedModel, fresh_token
 from arena.pairing import order
 from augment.models import Augmentation, Contestant, JudgeRun, Scenario
 
 
 def one_question() -> list[str]:
-    """Return what a study asks about each pair unless it says otherwise."""
+    """Return the default questions about each pair."""
     return ["instruction"]
 
 
-class Study(Coded):
-    """What experts vote on; its rules are fixed when it opens. A StudyDraft comes before it."""
+class Study(CodedModel):
+    """Comparison on which experts vote; its rules are fixed at its opening, after a StudyDraft."""
 
     class State(models.TextChoices):
         OPEN = "open", "Open"
@@ -78,11 +78,11 @@ class Study(Coded):
 
     @property
     def shows_all_samples(self) -> bool:
-        """Whether each sample of a scenario is judged on its own."""
+        """True if each sample of a scenario is judged on its own."""
         return bool(self.rules.get("samples") == "all")
 
 
-class Matchup(Coded):
+class Matchup(CodedModel):
     """One planned showing of two augmentations of one scenario to one expert.
 
     Camera and pictures are kept as they were when it was planned: a scenario that is edited later

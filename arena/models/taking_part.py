@@ -1,4 +1,4 @@
-"""How people take part in studies: links, enrolments, authorships, practice; and drafts."""
+"""Participation in studies: links, enrolments, authorships, practice; and drafts."""
 
 import hashlib
 import secrets
@@ -9,12 +9,12 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
-from arena.models.people import Coded, fresh_token
+from arena.models.people import CodedModel, fresh_token
 from arena.models.studies import Study
 from augment.models import Augmentation, Contestant, Scenario, account_column
 
 
-class Invitation(Coded):
+class Invitation(CodedModel):
     """One link for one expert, from a study or from the page of people.
 
     Its token is sent once and kept only as a hash. A new link replaces the one before from the
@@ -53,7 +53,7 @@ class Invitation(Coded):
         )
 
     def state(self, now: datetime) -> State:
-        """Whether the link works at that time, and if not, why."""
+        """Return whether the link works at that time, and if not, why."""
         if self.revoked_at is not None:
             return self.State.REVOKED
         if self.expires_at <= now:
@@ -62,7 +62,7 @@ class Invitation(Coded):
 
 
 def token_digest(token: str) -> str:
-    """What is stored of a token: 32 random bytes need no salt and no slow hash."""
+    """Return the stored digest of a token: 32 random bytes need no salt and no slow hash."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
@@ -75,7 +75,7 @@ def fresh_completion_code() -> str:
     return "".join(secrets.choice(_SIGNS) for _ in range(10))
 
 
-class Enrolment(Coded):
+class Enrolment(CodedModel):
     """One link for everybody who wants to take part in a study, up to so many.
 
     Its token is no secret of anybody: it gives a place, never somebody's account. It is kept as it
@@ -111,11 +111,11 @@ class Enrolment(Coded):
 
     @property
     def consent_sha256(self) -> str:
-        """Of the text as it is now."""
+        """SHA-256 of the consent text as it is now."""
         return hashlib.sha256(self.consent.encode()).hexdigest()
 
 
-class EnrolledVoter(Coded):
+class EnrolledVoter(CodedModel):
     """Somebody who took a place, and what is needed to thank or pay them."""
 
     enrolment = models.ForeignKey(Enrolment, on_delete=models.CASCADE, related_name="voters")
@@ -145,7 +145,7 @@ class EnrolledVoter(Coded):
         )
 
 
-class Authorship(Coded):
+class Authorship(CodedModel):
     """An expert has a stake in a contestant of the study; no expert ever learns of it.
 
     What is taken back is deleted here and stays in the log.
@@ -213,21 +213,21 @@ class PracticePair(models.Model):
 
     @property
     def left(self) -> Augmentation:
-        """What stands left, which is A."""
+        """Augmentation on the left, which is A."""
         return self.good if self.good_is_left else self.broken
 
     @property
     def right(self) -> Augmentation:
-        """What stands right, which is B."""
+        """Augmentation on the right, which is B."""
         return self.broken if self.good_is_left else self.good
 
     @property
     def is_right(self) -> bool:
-        """Whether the expert chose the right picture."""
+        """True if the expert chose the right picture."""
         return self.answer == (self.Answer.LEFT if self.good_is_left else self.Answer.RIGHT)
 
 
-class StudyDraft(Coded):
+class StudyDraft(CodedModel):
     """The fields of a new study as they were left; opening it makes the Study.
 
     It names people, contestants, scenarios and jobs and holds none of them: whoever retires or
@@ -252,10 +252,10 @@ class StudyDraft(Coded):
 
     @property
     def name(self) -> str:
-        """What the study is to be called; may be empty."""
+        """Name of the future study; may be empty."""
         return str(self.entered.get("name", ""))
 
     def names_in(self, field: str) -> list[str]:
-        """What is chosen in a field of names."""
+        """Return the names chosen in a field."""
         found: Any = self.entered.get(field, [])
         return list(found)

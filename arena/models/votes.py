@@ -1,4 +1,4 @@
-"""What experts decide."""
+"""Decisions of experts: votes, reports and labels of faults."""
 
 from itertools import combinations
 
@@ -7,7 +7,7 @@ from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext_lazy as _
 
-from arena.models.people import Coded, fresh_token
+from arena.models.people import CodedModel, fresh_token
 from arena.models.studies import Matchup
 from augment.models import AppendOnly, Augmentation, GenerationJob
 
@@ -35,7 +35,7 @@ OUTCOME_LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
 
 
 class Question(models.TextChoices):
-    """What may be asked about a pair; a study asks one to three of them, the primary one first."""
+    """Question about a pair; a study asks one to three of them, the primary one first."""
 
     INSTRUCTION = "instruction", _("Which image carries out the instruction better?")
     REALISM = "realism", _("Which image is more realistic?")
@@ -43,7 +43,7 @@ class Question(models.TextChoices):
 
 
 class Vote(AppendOnly):
-    """What the expert decided. Append-only: a change is a new row that supersedes the old one.
+    """Decision of an expert. Append-only: a change is a new row that supersedes the old one.
 
     Each question of a study has a vote of its own, given in their order.
 
@@ -159,7 +159,7 @@ class Vote(AppendOnly):
 
 
 class Report(AppendOnly):
-    """What an expert reports about a matchup, whatever the vote. Append-only."""
+    """Problem with a matchup that an expert reports, whatever the vote. Append-only."""
 
     class Reason(models.TextChoices):
         PICTURE_WRONG = "picture_wrong", _("Something is wrong with an image")
@@ -210,7 +210,7 @@ class Report(AppendOnly):
         )
 
 
-class LabellingRound(Coded):
+class LabellingRound(CodedModel):
     """Experts look at the augmentations of one job, each alone, and name their faults."""
 
     name = models.CharField(max_length=120, unique=True, help_text="experts see it")
@@ -227,7 +227,7 @@ class LabellingRound(Coded):
         return self.name
 
 
-class LabelTask(Coded):
+class LabelTask(CodedModel):
     """One planned showing of one augmentation to one expert."""
 
     labelling = models.ForeignKey(LabellingRound, on_delete=models.CASCADE, related_name="tasks")
@@ -257,7 +257,7 @@ class LabelTask(Coded):
 
 
 class FaultLabel(AppendOnly):
-    """Which faults an expert sees in one augmentation: any of three, or none. Append-only.
+    """Faults that an expert sees in one augmentation: any of three, or none. Append-only.
 
     What the checks guessed is kept as it was when the label was saved; null where they could
     not be run.

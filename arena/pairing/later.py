@@ -26,7 +26,7 @@ class GridUnit(NamedTuple):
     scenario: int
 
 
-def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[GridUnit]:
+def main_units(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[GridUnit]:
     """Return the units of the main showings."""
     rows, columns = grid.row_of_pair, grid.column_of_scenario
     return [
@@ -40,7 +40,7 @@ def judges(grid: Grid, so_far: Mapping[str, Sequence[PlannedMatchup]]) -> IntArr
     """Return how many experts are to judge each unit (P, S)."""
     counts = np.zeros(grid.showable.shape, dtype=np.int64)
     for showings in so_far.values():
-        for unit in units_of(grid, showings):
+        for unit in main_units(grid, showings):
             counts[unit] += 1
     return counts
 
@@ -67,7 +67,7 @@ def deal(
     Raises:
         NothingToPlan: A pair has no scenario left for any of them.
     """
-    known = {name: set(units_of(grid, so_far[name])) for name in to}
+    known = {name: set(main_units(grid, so_far[name])) for name in to}
     counts = judges(grid, so_far)
     dealt: dict[str, list[GridUnit]] = {name: [] for name in to}
     for index in rng.permutation(len(units)):
@@ -203,7 +203,7 @@ def _draw_repeats(
     old = [s for s in mains if s.position <= latest and s.position not in done]
     offered = [
         Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, again=showing.position)
-        for showing, wanted in zip(old, units_of(grid, old), strict=True)
+        for showing, wanted in zip(old, main_units(grid, old), strict=True)
     ]
     if len(offered) < count:
         offered = [

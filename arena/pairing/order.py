@@ -37,7 +37,7 @@ class Slot:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extras:
-    """What an expert sees on top of the chosen units.
+    """Showings of an expert on top of the units of the plan.
 
     Attributes:
         repeated: Units (pair, scenario) that come a second time.
@@ -48,7 +48,7 @@ class Extras:
     checks: tuple[int, ...] = ()
 
 
-def put_in_order(
+def order_units(
     chosen: BoolArray,
     extras: Sequence[Extras],
     gap: int,
@@ -73,7 +73,7 @@ def put_in_order(
     for row, more in zip(counts, extras, strict=True):
         for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
             row[scenario] += 1
-    held = min(largest_gap(_summed(row, bases), gap) for row in counts)
+    held = min(largest_gap(_sum_samples(row, bases), gap) for row in counts)
     return [
         _order(mine, more, row, held, distance, rng, bases)
         for mine, more, row in zip(chosen, extras, counts, strict=True)
@@ -98,8 +98,8 @@ def _order(
     best: list[Slot] = []
     nearest = -1
     for _ in range(TRIES if more.repeated else 1):
-        columns = _columns(sequence(_summed(counts, bases), gap, rng), counts, bases, rng)
-        slots = _filled(waiting, more, columns, distance, rng)
+        columns = _columns(sequence(_sum_samples(counts, bases), gap, rng), counts, bases, rng)
+        slots = _fill_places(waiting, more, columns, distance, rng)
         gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
         if min(gaps, default=distance) > nearest:
             best, nearest = slots, min(gaps, default=distance)
@@ -108,7 +108,7 @@ def _order(
     return best
 
 
-def _summed(counts: IntArray, bases: IntArray) -> IntArray:
+def _sum_samples(counts: IntArray, bases: IntArray) -> IntArray:
     """Showings of each scenario, over its samples."""
     return np.bincount(bases, weights=counts, minlength=int(bases.max()) + 1).astype(np.int64)
 
@@ -116,7 +116,7 @@ def _summed(counts: IntArray, bases: IntArray) -> IntArray:
 def _columns(
     scenarios: list[int], counts: IntArray, bases: IntArray, rng: np.random.Generator
 ) -> list[int]:
-    """Which column each place of a scenario goes to: its only one, or its samples by lot."""
+    """Return the column of each place of a scenario: its only one, or its samples by lot."""
     if len(set(bases.tolist())) == len(bases):
         return scenarios
     waiting = {
@@ -129,14 +129,14 @@ def _columns(
     return [waiting[scenario].pop() for scenario in scenarios]
 
 
-def _filled(
+def _fill_places(
     waiting: list[list[int]],
     more: Extras,
     scenarios: list[int],
     distance: int,
     rng: np.random.Generator,
 ) -> list[Slot]:
-    """Which unit or extra each place of a scenario gets; repeats far from what they show again."""
+    """Return the unit or extra at each place of a scenario; repeats far from the first."""
     places: dict[int, list[int]] = {}
     for index, scenario in enumerate(scenarios):
         places.setdefault(scenario, []).append(index)
@@ -167,7 +167,7 @@ def _two_places(places: list[int], distance: int, rng: np.random.Generator) -> t
 def deal_sides(
     orders: list[list[tuple[int, int]]], pairs: int, rng: np.random.Generator
 ) -> list[BoolArray]:
-    """Which showings to turn around: half of each expert's of a pair, odd ones in turn."""
+    """Return the showings to turn around: half of each expert's of a pair, odd ones in turn."""
     flipped = [np.zeros(len(order), dtype=bool) for order in orders]
     odd_turn = rng.random(pairs) < 0.5
     for expert in rng.permutation(len(orders)):

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from arena.pairing.order import CHECK, MAIN, BoolArray, Extras, Slot, deal_sides, put_in_order
+from arena.pairing.order import CHECK, MAIN, BoolArray, Extras, Slot, deal_sides, order_units
 from arena.pairing.rules import (
     Check,
     Entry,
@@ -51,7 +51,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     chosen = choose_units(grid.showable, experts, votes, rng)
     bring_together(chosen, grid.showable, rules.overlap_share, rng)
     extras = [_extras(rules, grid, mine, rng) for mine in chosen]
-    orders, gap = put_in_order(
+    orders, gap = order_units(
         chosen, extras, rules.scenario_gap, rules.repeat_distance, rng, grid.bases
     )
     mains = [

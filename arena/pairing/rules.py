@@ -1,4 +1,4 @@
-"""What a plan is made from, and what it is made of: plain values."""
+"""Plain values that a plan is made from and made of."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ _SAMPLE = "#"
 """Between a scenario and the number of a sample; no slug has one."""
 
 
-def place_of(scenario: str, sample: int) -> str:
+def sample_place(scenario: str, sample: int) -> str:
     """The name of one sample of a scenario, where each is judged on its own."""
     return f"{scenario}{_SAMPLE}{sample}"
 
 
-def scenario_of(place: str) -> str:
+def scenario_at(place: str) -> str:
     """The scenario of a place: itself, or what its sample is one of."""
     return place.partition(_SAMPLE)[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """What can be shown: a contestant's picture of a scenario.
+    """Contestant's picture of a scenario, which can be shown.
 
     Attributes:
-        scenario: Or one sample of it, by `place_of`.
+        scenario: Or one sample of it, by `sample_place`.
         sample: Which of the contestant's answers it is.
         picture: Names the picture's content; two entries with the same picture look the same, so
             they are never shown against each other.
@@ -89,8 +89,8 @@ class PlanRules:
 
     @property
     def grid(self) -> Grid:
-        """What can be shown of the entries."""
-        return grid_of(self.entries, self.alike, self.challengers)
+        """Pairs of entries that can be shown."""
+        return make_grid(self.entries, self.alike, self.challengers)
 
     def count_extras(self, votes: int) -> tuple[int, int]:
         """Return how many repeats and checks come on top of that many votes of one expert."""
@@ -153,12 +153,12 @@ class Grid:
     @property
     def bases(self) -> IntArray:
         """(S,) which columns are samples of one scenario: those with the same number."""
-        names = [scenario_of(place) for place in self.scenarios]
+        names = [scenario_at(place) for place in self.scenarios]
         known = {name: number for number, name in enumerate(dict.fromkeys(names))}
         return np.array([known[name] for name in names], dtype=np.int64)
 
 
-def grid_of(
+def make_grid(
     entries: tuple[Entry, ...],
     alike: tuple[tuple[str, str, str], ...] = (),
     challengers: Sequence[str] = (),

@@ -1,4 +1,4 @@
-"""Which units each expert judges: balanced over scenarios first, then over pairs.
+"""Assignment of units to experts: balanced over scenarios first, then over pairs.
 
 Notation: E experts, P pairs, S scenarios.
 """

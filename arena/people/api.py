@@ -10,7 +10,7 @@ from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
 from arena.api.views import ApiView, Given, operation
 from arena.people.links import accept, find_invitation, make_api_token, make_link_path
-from arena.people.queries import ROLES, role_given, role_of
+from arena.people.queries import ROLES, role_given, top_role
 from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin
 
 DAYS = 30
@@ -130,6 +130,6 @@ class WelcomeView(ApiView):
 
 
 def _token(user: User, name: str) -> dict[str, Any]:
-    role = role_of(user) or ""
+    role = top_role(user) or ""
     fresh = make_api_token(owner=user, name=name, role=role, days=DAYS)
     return {"token": fresh.secret, "role": role, "expires_at": fresh.token.expires_at}

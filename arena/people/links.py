@@ -16,7 +16,7 @@ from django.utils.translation import gettext as _
 
 from arena.errors import LinkOver, NotYours, TokenOver, TooManyRequests
 from arena.models import ApiToken, Authorship, Invitation, Study, token_digest
-from arena.people.queries import TOKEN_ROLES, effective_role, may_be_let_in, role_of
+from arena.people.queries import TOKEN_ROLES, effective_role, may_be_let_in, top_role
 from arena.people.services import end_links, end_sessions, make_welcome_token
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_change
@@ -61,7 +61,7 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
         Conflict: It is to work for another time, or the owner has too many.
     """
     name = one_line("name", name, what="token", longest=80)
-    offered = TOKEN_ROLES.get(role_of(owner) or "", ())
+    offered = TOKEN_ROLES.get(top_role(owner) or "", ())
     if role not in offered:
         raise UnknownName("role", role, list(offered))
     if days not in DAYS:
@@ -107,7 +107,7 @@ def use_api_token(secret: str) -> tuple[User, ApiToken]:
         revoked_at=None, expires_at__gt=timezone.now(), owner__is_active=True
     )
     token = alive.filter(token_sha256=token_digest(secret)).first()
-    role = None if token is None else effective_role(token.role, role_of(token.owner))
+    role = None if token is None else effective_role(token.role, top_role(token.owner))
     if token is None or role is None:
         raise TokenOver("This token opens nothing: it is unknown, expired or revoked.")
     _count(token, REQUESTS[role])
@@ -158,7 +158,7 @@ def make_link_path(user: User, *, study: Study | None = None, actor: User | None
     Raises:
         Conflict, NotYours: See `invite`.
     """
-    if study is None and role_of(user) != "expert":
+    if study is None and top_role(user) != "expert":
         return reverse("welcome", args=[make_welcome_token(user, actor=actor)])
     if study is None:
         end_links(user)

@@ -30,11 +30,11 @@ from arena.people.queries import (
     TOKEN_ROLES,
     Language,
     by_pseudonym,
+    chosen_language,
     has_admin,
     is_forgotten,
-    language_of,
     role_given,
-    role_of,
+    top_role,
 )
 from arena.site.access import (
     ADMIN,
@@ -48,8 +48,8 @@ from arena.site.access import (
     STAFF,
     act_for,
     form_for,
+    get_user,
     keep_secret,
-    user_of,
 )
 from arena.site.acts import refusals_in
 from arena.site.forms import offer
@@ -130,7 +130,7 @@ class SignIn(LoginView):
 
 def with_own_language(answer: HttpResponse, user: User) -> HttpResponse:
     """Set this browser's language to what the account chose, if it chose any."""
-    if chosen := language_of(user):
+    if chosen := chosen_language(user):
         keep_language(answer, chosen)
     return answer
 
@@ -160,7 +160,7 @@ def link_page(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
 
 @link_page
 def first_page(request: HttpRequest, token: str = "") -> HttpResponse:
-    """Where the first admin is made, by the printed code or by the link that ends with it."""
+    """Create the first admin, by the printed code or by the link that ends with it."""
     if token or has_admin():
         services.check_first_link(token)
     form = FirstForm(request.POST or None, initial={"code": token})
@@ -174,7 +174,7 @@ def first_page(request: HttpRequest, token: str = "") -> HttpResponse:
 
 @link_page
 def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
-    """Where somebody sets the password of an account that was made for them."""
+    """Let an account's owner set the password of an account that an admin made."""
     user = services.find_welcomed(token)
     form = SetPasswordForm(user, request.POST or None)
     if form.is_valid():
@@ -189,7 +189,7 @@ def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
 @require_http_methods(FORM_METHODS)
 def password_page(request: HttpRequest) -> HttpResponse:
     """One's own password; other devices are signed out by a new one."""
-    user = user_of(request)
+    user = get_user(request)
     form = PasswordChangeForm(user, request.POST or None)
     if not user.has_usable_password():
         messages.info(request, _("You sign in by a link, not by a password."))
@@ -212,7 +212,7 @@ def people_page(request: HttpRequest) -> HttpResponse:
     if form.is_valid():
         with refusals_in(form):
             user = services.create_person(
-                **form.cleaned_data, password=None, actor=user_of(request)
+                **form.cleaned_data, password=None, actor=get_user(request)
             )
             return show_new_links(request, [user])
     context = {"lines": _list_accounts(), "form": form, "roles": ROLE_NAMES.items()}
@@ -246,7 +246,7 @@ def make_link(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @act_for(ADMIN, back="people")
 def change_person(request: HttpRequest, code: uuid.UUID) -> None:
     """Pause, resume, take links back, or give another role: what the pressed button says."""
-    user, actor = find_account(code), user_of(request)
+    user, actor = find_account(code), get_user(request)
     act = request.POST.get("act", "")
     if act in ("pause", "resume"):
         services.set_active(user=user, is_active=act == "resume", actor=actor)
@@ -269,7 +269,7 @@ def show_new_links(
     """Make a link for each of these accounts of one role, and show them this once."""
     lines = []
     for owner in owners:
-        path = links.make_link_path(owner, study=study, actor=user_of(request))
+        path = links.make_link_path(owner, study=study, actor=get_user(request))
         lines.append((owner, request.build_absolute_uri(path)))
     context = {"study": study, "lines": lines, "is_expert": role_given(owners[0]) == EXPERT}
     return render(request, "people/links.html", context, status=CREATED)
@@ -282,8 +282,8 @@ def show_new_links(
 @never_cache
 def tokens_page(request: HttpRequest) -> HttpResponse:
     """One's own tokens, and a form for a new one, which is shown this once."""
-    user, now = user_of(request), timezone.now()
-    roles = TOKEN_ROLES.get(role_of(user) or "", ())
+    user, now = get_user(request), timezone.now()
+    roles = TOKEN_ROLES.get(top_role(user) or "", ())
     form = TokenForm(request.POST or None, roles=roles)
     fresh = None
     if form.is_valid():
@@ -308,7 +308,7 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
 @act_for(ADMIN, RESEARCHER, EXPERT, ENTRANT, back="api-tokens")
 def revoke_token(request: HttpRequest, code: uuid.UUID) -> None:
     """Revoke one of one's own tokens."""
-    user = user_of(request)
+    user = get_user(request)
     token = get_object_or_404(ApiToken, owner=user, code=code)
     revoke_api_token(token=token, actor=user)
     messages.success(request, _("“%(name)s” opens nothing any more.") % {"name": token.name})

@@ -1,4 +1,4 @@
-"""Who somebody is: accounts, roles, preferences, and what their links and tokens open."""
+"""Accounts, roles and preferences, and the rights of their links and tokens."""
 
 import re
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class AccountBackend(ModelBackend):
         return user if user is not None and self.user_can_authenticate(user) else None
 
 
-def role_of(user: User | AnonymousUser) -> str | None:
+def top_role(user: User | AnonymousUser) -> str | None:
     """Return the most powerful role of an account, None without one.
 
     Whoever came by an API token has the token's role.
@@ -49,7 +49,7 @@ def role_given(user: User) -> str | None:
 
 
 def effective_role(role: str, owner_role: str | None) -> str | None:
-    """Return what a token of that role opens while its owner has that role, None for nothing.
+    """Return the role that a token of `role` has now, None if its owner no longer has it.
 
     An admin's token opens what a researcher may once its owner is one.
     """
@@ -73,7 +73,7 @@ def experts() -> QuerySet[User]:
 
 def may_be_let_in(user: User) -> bool:
     """Return whether a link may sign this account in: an active expert, nothing more."""
-    return role_of(user) == "expert" and not user.person.is_simulated
+    return top_role(user) == "expert" and not user.person.is_simulated
 
 
 def by_pseudonym(found: QuerySet[User]) -> list[User]:
@@ -82,7 +82,7 @@ def by_pseudonym(found: QuerySet[User]) -> list[User]:
 
 
 def natural_order(name: str) -> list[tuple[bool, int, str]]:
-    """Return what to sort names by so that numbers in them count as numbers."""
+    """Return a sort key of a name in which numbers count as numbers."""
     parts = re.split(r"(\d+)", name)
     return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in parts]
 
@@ -109,7 +109,7 @@ def is_forgotten(user: User) -> bool:
 
 
 class Theme(StrEnum):
-    """How the pages look to a person; `auto` follows the device."""
+    """Colours of the pages for a person; `auto` follows the device."""
 
     AUTO = "auto"
     LIGHT = "light"
@@ -124,7 +124,7 @@ class Language(StrEnum):
 
     @property
     def label(self) -> str:
-        """What its speakers call it."""
+        """Name of the language in itself."""
         return {"en": "English", "de": "Deutsch"}[self.value]
 
 
@@ -137,20 +137,20 @@ class Profile:
     theme: Theme
 
 
-def profile_of(user: User | AnonymousUser) -> Profile | None:
-    """Return what the page's frame shows of a person; None where nobody is signed in."""
+def frame_profile(user: User | AnonymousUser) -> Profile | None:
+    """Return the account as the page's frame shows it; None if nobody is signed in."""
     if not user.is_authenticated:
         return None
     person: Person | None = getattr(user, "person", None)
     stored = person.preferences.get("theme") if person else None
     return Profile(
         name=person.pseudonym if person else user.get_username(),
-        role=role_of(user),
+        role=top_role(user),
         theme=Theme(stored) if stored in set(Theme) else Theme.AUTO,
     )
 
 
-def language_of(user: User) -> Language | None:
+def chosen_language(user: User) -> Language | None:
     """Return the language that a person chose; None follows the browser."""
     person: Person | None = getattr(user, "person", None)
     stored = person.preferences.get("language") if person else None

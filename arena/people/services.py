@@ -15,7 +15,7 @@ from django.utils import timezone
 
 from arena.errors import LinkOver
 from arena.models import Person
-from arena.people.queries import ROLES, has_admin, is_forgotten, role_of
+from arena.people.queries import ROLES, has_admin, is_forgotten, top_role
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.services.events import log_change
 from augment.services.texts import one_line
@@ -225,7 +225,7 @@ def set_role(*, user: User, role: str, actor: User) -> None:
     _check_role(role)
     check_may_change(user, actor)
     end_links(user)
-    before = {"role": role_of(User.objects.get(pk=user.pk))}
+    before = {"role": top_role(User.objects.get(pk=user.pk))}
     user.groups.set([Group.objects.get_or_create(name=role)[0]])
     user.is_staff = user.is_superuser = role == "admin"
     user.save(update_fields=["is_staff", "is_superuser"])
@@ -243,7 +243,7 @@ def check_may_change(user: User, actor: User) -> None:
     if user.pk == actor.pk:
         raise Conflict("This is your own account; ask another admin.")
     _lock_admins()
-    if role_of(User.objects.get(pk=actor.pk)) != "admin":
+    if top_role(User.objects.get(pk=actor.pk)) != "admin":
         raise Conflict("You are not an admin any more.")
 
 

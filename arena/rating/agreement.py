@@ -1,4 +1,4 @@
-"""Which metric, or other rater, agrees with the experts: beside what experts agree on, and a coin.
+"""Agreement of metrics and raters with experts, beside the experts' own and a coin's.
 
 In: votes on pairs of augmentations, and raters that prefer one of two augmentations. Out: for each
 rater the share of the decided votes with which it agrees, with an interval.
@@ -30,7 +30,7 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairVote:
-    """What an expert said of two augmentations.
+    """Expert's vote on two augmentations.
 
     Attributes:
         judge: Who said it.
@@ -49,7 +49,7 @@ class PairVote:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedRater:
-    """What prefers one of two augmentations.
+    """Rater that prefers one of two augmentations.
 
     Attributes:
         prefers: Takes two codes; 1 where the first is better, 0 for a tie, -1 where the second
@@ -95,7 +95,7 @@ def rater_by_pairs(name: str, preferences: Mapping[tuple[str, str], int]) -> Nam
 
 
 class LineRole(StrEnum):
-    """What a line is: what is measured, or what it is held against."""
+    """Role of a line: a measured rater, or a reference for the others."""
 
     EXPERTS = "experts"
     RATER = "rater"
@@ -104,7 +104,7 @@ class LineRole(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgreementLine:
-    """How one rater agrees with the decided votes.
+    """Agreement of one rater with the decided votes.
 
     Attributes:
         question: What the experts were asked, empty where nobody says.
@@ -247,7 +247,7 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
 
 
 class _Variance(NamedTuple):
-    """Of a mean, by so many clusters."""
+    """Variance of a mean, with its number of clusters."""
 
     value: float
     clusters: int
@@ -263,7 +263,7 @@ def _variance(hits: FloatArray, cluster_of: IntArray) -> _Variance:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Numbered:
+class _NumberedVotes:
     """Votes as numbers.
 
     Attributes:
@@ -281,10 +281,10 @@ class _Numbered:
     types: list[str]
 
 
-def _number(votes: Sequence[PairVote]) -> _Numbered:
+def _number(votes: Sequence[PairVote]) -> _NumberedVotes:
     pairs = [(min(vote.left, vote.right), max(vote.left, vote.right)) for vote in votes]
     signs = [vote.preference if vote.left <= vote.right else -vote.preference for vote in votes]
-    return _Numbered(
+    return _NumberedVotes(
         pairs=list(dict.fromkeys(pairs)),
         pair_of=_places(pairs),
         expert=_places([vote.judge for vote in votes]),
@@ -300,7 +300,7 @@ def _places(names: Sequence[Hashable]) -> IntArray:
     return np.array([place_of[name] for name in names], dtype=np.int64)
 
 
-def _opinion(votes: _Numbered, rater: NamedRater) -> tuple[FloatArray, FloatArray]:
+def _opinion(votes: _NumberedVotes, rater: NamedRater) -> tuple[FloatArray, FloatArray]:
     """(V,) what a rater prefers in each vote's pair, not a number if unknown; (V,) its ties."""
     found = [rater.prefers(*pair) for pair in votes.pairs]
     lean = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
@@ -308,7 +308,7 @@ def _opinion(votes: _Numbered, rater: NamedRater) -> tuple[FloatArray, FloatArra
     return lean, np.asarray(lean == 0.0, dtype=np.float64)
 
 
-def _other_experts(votes: _Numbered) -> tuple[FloatArray, FloatArray]:
+def _other_experts(votes: _NumberedVotes) -> tuple[FloatArray, FloatArray]:
     """(V,) the mean of what the other experts prefer in each vote's pair, and of their ties."""
     own = votes.pair_of * (int(votes.expert.max()) + 1) + votes.expert
     _, own = np.unique(own, return_inverse=True)
@@ -326,7 +326,7 @@ def _other_experts(votes: _Numbered) -> tuple[FloatArray, FloatArray]:
 
 
 def _line(
-    votes: _Numbered,
+    votes: _NumberedVotes,
     name: str,
     role: LineRole,
     lean: FloatArray,

@@ -97,7 +97,7 @@ class BoardTableDocument:
 
     @property
     def votes_text(self) -> str:
-        """How many votes count, and apart from them the ties of pairs that nobody was shown."""
+        """Number of counted votes and, apart from it, of ties on pairs that were not shown."""
         return votes_text(self.votes, self.settled_ties)
 
     @property

@@ -114,7 +114,7 @@ def resample(
 
 
 def rounds_to_draw(votes: Comparisons, counts: PairCounts, rounds: int) -> int:
-    """How many of the rounds say who is determined: fewer where one takes long, 200 at least."""
+    """Return the number of rounds that test who is determined: 200 at least, fewer if slow."""
     each = max(len(votes) + 3 * len(counts.low), len(votes.names) ** 2, 1)
     return min(rounds, max(FEWEST_ROUNDS, _WORK // each))
 
@@ -126,7 +126,7 @@ def _blocks(rounds: int, width: int) -> Iterator[int]:
 
 
 def _vote_draws(seen: IntArray, rng: np.random.Generator) -> Callable[[int], FloatArray]:
-    """Return what draws multinomial counts (K, B) of kinds of votes that were seen (K,) times.
+    """Return a function that draws multinomial counts (K, B) of kinds of votes seen (K,) times.
 
     Independent Poisson counts, given their sum, are multinomial. So a round takes Poisson counts
     for slightly fewer votes than there are, and draws the missing ones singly; one with too many
@@ -232,7 +232,7 @@ class RatedRounds:
 
     @property
     def degenerate(self) -> int:
-        """How many rounds do not determine everybody."""
+        """Number of rounds that do not determine everybody."""
         return int((~self.in_main).any(axis=0).sum())
 
 

@@ -1,4 +1,4 @@
-"""Who scored against whom through chains of comparisons, and what votes allow to be rated.
+"""Groups of contestants connected by chains of comparisons, and whether votes can be rated.
 
 Contestants who reach each other both ways are a part (a strongly connected component of the graph
 of scores), those who met through any chain a group. Strengths exist when everybody is in one part
@@ -77,13 +77,13 @@ def chains_among(contestants: int, counts: PairCounts, *, together: bool = False
         together: Whoever met is one part, whoever won.
     """
     met = Meetings(contestants, counts)
-    scored = _scored(met, counts.games[:, None], counts.scores[:, None])
+    scored = _find_scored(met, counts.games[:, None], counts.scores[:, None])
     connected = closure(scored | scored.transpose(0, 2, 1))[0]
     reached = connected if together else closure(scored)[0]
-    part_of = _numbered(reached & reached.T)
+    part_of = _number_classes(reached & reached.T)
     first = np.unique(part_of, return_index=True)[1]
     reaches = reached[np.ix_(first, first)] & ~np.eye(len(first), dtype=np.bool_)
-    return Chains(part_of=part_of, group_of=_numbered(connected), reaches=reaches)
+    return Chains(part_of=part_of, group_of=_number_classes(connected), reaches=reaches)
 
 
 def chains_in_sets(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
@@ -96,7 +96,7 @@ def chains_in_sets(met: Meetings, games: FloatArray, scores: FloatArray) -> Bool
         games: (P, n) comparisons of each pair in each set.
         scores: (P, n) what `low` scored in them.
     """
-    return closure(_scored(met, games, scores))
+    return closure(_find_scored(met, games, scores))
 
 
 def are_determined(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
@@ -131,7 +131,7 @@ def closure(edges: BoolArray) -> BoolArray:
     return np.unpackbits(reached, axis=2, count=contestants).view(np.bool_)
 
 
-def _scored(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
+def _find_scored(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     """(n, C, C) whether the row's contestant ever scored against the column's; itself counts."""
     everybody = np.arange(met.contestants)
     scored = np.zeros((games.shape[1], len(everybody), len(everybody)), dtype=np.bool_)
@@ -141,7 +141,7 @@ def _scored(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     return scored
 
 
-def _numbered(together: BoolArray) -> IntArray:
+def _number_classes(together: BoolArray) -> IntArray:
     """(C,) the number of each one's class, in the order of their first members."""
     if not len(together):
         return np.empty(0, dtype=np.int64)
@@ -152,7 +152,7 @@ def _numbered(together: BoolArray) -> IntArray:
 
 
 class Status(StrEnum):
-    """What the votes allow."""
+    """Kind of rating that the votes allow."""
 
     RATED = "rated"
     NO_VOTES = "no votes"
@@ -167,7 +167,7 @@ class Status(StrEnum):
 def diagnose(
     names: Sequence[str], votes: Comparisons, chains: Chains
 ) -> tuple[Status, tuple[str, ...]]:
-    """Return what the votes allow to say about the contestants, and the sentences on it.
+    """Return the kind of rating that the votes allow, with sentences on its limits.
 
     Args:
         names: Of all contestants, also those without votes.
@@ -204,14 +204,14 @@ def diagnose(
     return Status.RATED, ()
 
 
-def few_of(names: Sequence[str]) -> Sequence[str]:
+def join_few(names: Sequence[str]) -> Sequence[str]:
     """The first names, and an ellipsis where there are more."""
     return names if len(names) <= NAMED else (*names[:NAMED], "…")
 
 
 def _list(votes: Comparisons, groups: Sequence[IntArray]) -> str:
     return "; ".join(
-        few_of([", ".join(few_of([votes.shown[one] for one in group])) for group in groups])
+        join_few([", ".join(join_few([votes.shown[one] for one in group])) for group in groups])
     )
 
 
@@ -227,7 +227,7 @@ def ranks_across(votes: Comparisons, chains: Chains, unit: Unit, rank: IntArray)
         unit: What hangs together.
         rank: (C,) within the own part, 0 where withheld.
     """
-    is_shown = _shown_parts(votes, chains, unit)
+    is_shown = _find_shown_parts(votes, chains, unit)
     higher = (chains.sizes * is_shown) @ chains.reaches
     is_ranked = (higher > 0) | (is_shown & ~chains.reaches.any(axis=0))
     is_ranked[chains.main_parts()] = True
@@ -255,7 +255,7 @@ def judge_across(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
     return np.asarray(is_told[np.ix_(chains.part_of, chains.part_of)])
 
 
-def _shown_parts(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
+def _find_shown_parts(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
     """(K,) which parts enough independent votes show to be above those that they reach."""
     is_across = chains.part_of[votes.first] != chains.part_of[votes.second]
     votes = select_votes(votes, is_across)

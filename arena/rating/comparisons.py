@@ -61,7 +61,7 @@ class Comparisons:
 
     @property
     def votes(self) -> int:
-        """How many votes there are."""
+        """Number of votes."""
         return int(self.count.sum())
 
 
@@ -187,7 +187,7 @@ def t_above(value: ArrayLike, degrees: ArrayLike) -> FloatArray:
 
 
 def t_quantile(degrees: ArrayLike, probability: float = 0.5 + LEVEL / 2.0) -> FloatArray:
-    """Return what t is below with a probability above a half."""
+    """Return the quantile of Student's t for a probability above a half."""
     return np.asarray(stdtrit(np.maximum(degrees, 1.0), probability))
 
 

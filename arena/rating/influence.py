@@ -1,4 +1,4 @@
-"""How much a table hangs on single experts.
+"""Influence of single experts on a table.
 
 Notation: C contestants, P pairs that met, E experts. Strengths are natural logarithms of odds.
 """
@@ -58,7 +58,7 @@ def without_each_expert(votes: Comparisons, start: FloatArray) -> FloatArray:
 
 
 def rank_changes(strengths: FloatArray, without: FloatArray) -> list[int | None]:
-    """By expert the largest change of a place in the order when their votes are left out.
+    """Return by expert the largest change of a place in the order without their votes.
 
     Args:
         strengths: (C,) by all votes.

@@ -27,7 +27,7 @@ from arena.rating.comparisons import (
     tally,
 )
 from arena.rating.lines import Line
-from arena.rating.parts import Rated, rate_part
+from arena.rating.parts import RatedGroup, rate_part
 from arena.rating.ranking import FEWEST_TO_JUDGE, Separation, join_separations
 from arena.rating.rules import (
     MOST_CONTESTANTS,
@@ -221,7 +221,7 @@ def _unique(*sentences: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sentence for some in sentences for sentence in some))
 
 
-def _refine(status: Status, rated: list[Rated]) -> Status:
+def _refine(status: Status, rated: list[RatedGroup]) -> Status:
     """Return the status by what came out where all could be rated together."""
     if status is not Status.RATED:
         return status
@@ -251,7 +251,7 @@ def _blank_lines(names: tuple[str, ...], counted: list[list[int]]) -> list[Line]
     ]
 
 
-def fill_lines(lines: list[Line], members: IntArray, number: int, found: Rated) -> None:
+def fill_lines(lines: list[Line], members: IntArray, number: int, found: RatedGroup) -> None:
     """Put what a part has under the names of a line's fields into its lines."""
     columns = {
         column.name: np.asarray(values).tolist()

@@ -60,7 +60,7 @@ def with_minus(text: str) -> str:
 
 
 def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
-    """What is missing in lines, those of one reason together: "a, b: too few votes".
+    """Return the missing values of lines, grouped by reason: "a, b: too few votes".
 
     Args:
         notes: Names and what is missing in their lines, empty where nothing is.
@@ -73,7 +73,7 @@ def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def says_no_order(lines: Sequence["Line"]) -> bool:
-    """Whether all ranks are 1: then nobody can be told from anybody, and no rank is shown."""
+    """Return whether all ranks are 1: no pair can be told apart, and no rank is shown."""
     ranks = [line.rank for line in lines if line.rank is not None]
     return len(lines) > 1 and len(ranks) != 1 and set(ranks) <= {1}
 
@@ -84,7 +84,7 @@ def hide_ranks(lines: Iterable[AnyLine]) -> list[AnyLine]:
 
 
 def votes_text(votes: int, settled: int | None) -> str:
-    """How many votes count, and apart from them how many ties on pairs that nobody was shown.
+    """Return the number of counted votes and, apart from it, of ties that were not shown.
 
     Args:
         votes: Without these ties.
@@ -109,7 +109,7 @@ class Line:
         rating, lower, upper: Elo points; the mean of those rated together is 1000. A bound can
             stand alone: without the other one, and without a rating for who won or lost all.
         rank: As the paper defines it: 1 + the number of others whose lower bound is above `upper`.
-            Nobody is first for want of bounds: see `ranking.shown_ranks`.
+            Nobody is first for want of bounds: see `ranking.decide_ranks`.
         rank_best, rank_worst: The simultaneous 95 % rank set: behind everybody who is shown to be
             above and ahead of everybody who is shown to be below, all pairs judged at once.
         part: Who have the same number here are rated together; ratings and ranks of different
@@ -180,5 +180,5 @@ class Line:
 
     @property
     def has_bound(self) -> bool:
-        """Whether there is an interval, be it open on one side."""
+        """True if there is an interval, be it open on one side."""
         return self.lower is not None or self.upper is not None

@@ -48,7 +48,7 @@ class DidNotConverge(ArithmeticError):
 
 
 class Meetings:
-    """Who met whom: sums over the pairs of each of C contestants."""
+    """Sums over the votes of each of C contestants' pairs."""
 
     def __init__(self, contestants: int, counts: PairCounts) -> None:
         from scipy.sparse import csr_array  # slow to load

@@ -28,7 +28,7 @@ ONE_SIDED = 0.7
 
 
 class Reliability(StrEnum):
-    """What is to be done about an expert, the most urgent first."""
+    """Judgement on an expert, the most urgent first."""
 
     LOOK = "look here"
     UNKNOWN = "can't tell yet"
@@ -90,7 +90,7 @@ def _evidence_of_checks(rater: PanelRater) -> Evidence:
 
 
 def _reasons_to_look(rater: PanelRater) -> list[str]:
-    """Return what asks for a look by itself: no time, one side, two checks failed and a fifth."""
+    """Return single reasons to look: no time, one side only, two failed checks and a fifth."""
     checks, passed = rater.checks
     left, decided = rater.left.value or 0.0, (1.0 - rater.ties) * rater.votes
     share, side = max((left, "left"), (1.0 - left, "right"))

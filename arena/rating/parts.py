@@ -21,20 +21,20 @@ from arena.rating.ranking import (
     Separation,
     above_by_bounds,
     above_in_rounds,
+    decide_ranks,
     judge_pairs,
     rank_sets,
-    shown_ranks,
 )
 from arena.rating.rules import Intervals, Method, Rules
-from arena.rating.sandwich import Pulls, pulls_of_model, spread_of
+from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model
 
 _SAME = 1e-6
 """Points. Intervals that are narrower say nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rated:
-    """What came out for contestants rated together; arrays are (C,), None where undetermined.
+class RatedGroup:
+    """Ratings of contestants rated together; arrays are (C,), None where undetermined.
 
     What is called as a field of `lines.Line` goes into the lines of the table.
 
@@ -59,7 +59,7 @@ class Rated:
     warnings: tuple[str, ...] = ()
 
 
-def rate_part(votes: Comparisons, rules: Rules) -> Rated:
+def rate_part(votes: Comparisons, rules: Rules) -> RatedGroup:
     """Rate contestants who have votes and can all be rated among each other."""
     if rules.method is Method.ELO:
         samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
@@ -71,9 +71,9 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
         fitted = _fit_votes(votes, counts, met, rules)
         if fitted is None:
             note = (remarks.NOT_RATED,) * len(votes.names)
-            return Rated(note=note, explanation=(remarks.NO_DAVIDSON,))
+            return RatedGroup(note=note, explanation=(remarks.NO_DAVIDSON,))
         point, rounds = fitted, _rate_rounds(votes, counts, met, rules, fitted)
-    plain = Rated(
+    plain = RatedGroup(
         rating=point.rating,
         tie_strength=point.tie_strength,
         degenerate=rounds.degenerate,
@@ -100,9 +100,9 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     )
 
 
-def _with_intervals(plain: Rated, found: "_Intervals", average: float) -> Rated:
+def _with_intervals(plain: RatedGroup, found: "_Intervals", average: float) -> RatedGroup:
     """Add bounds and ranks, and why some are missing."""
-    rank = shown_ranks(found.lower, found.upper, average=average)
+    rank = decide_ranks(found.lower, found.upper, average=average)
     best, worst = rank_sets(above_by_bounds(found.above, found.lower, found.upper))
     has_lower, has_upper = ~np.isnan(found.lower), ~np.isnan(found.upper)
     known = zip(has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True)
@@ -141,7 +141,7 @@ class _Point:
 def _fit_votes(
     votes: Comparisons, counts: PairCounts, met: Meetings, rules: Rules
 ) -> _Point | None:
-    """None where the votes determine no ratings in Davidson's model."""
+    """Return the point estimate, None if the votes determine none in Davidson's model."""
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
     has_ties = rules.method is Method.DAVIDSON and 0 < ties[0] < votes.votes
     games, scores = counts.games[:, None], counts.scores[:, None]
@@ -204,7 +204,7 @@ class _Intervals:
 def _find_intervals(
     point: _Point, values: FloatArray, reference: BoolArray, rules: Rules
 ) -> _Intervals | None:
-    """None where the votes set no bound, or leave intervals without a width.
+    """Return the intervals, None if the votes set no bound or leave intervals without a width.
 
     Args:
         point: What the data say.
@@ -218,10 +218,10 @@ def _find_intervals(
         return None
     spread = None
     if point.pulls is not None:
-        spread = spread_of(point.pulls, rules.unit, reference)
+        spread = estimate_spread(point.pulls, rules.unit, reference)
         founders = reference & np.isin(point.pulls.votes.names, list(rules.founders))
         is_anchored = founders.sum() > 1
-        around = spread_of(point.pulls, rules.unit, founders) if is_anchored else spread
+        around = estimate_spread(point.pulls, rules.unit, founders) if is_anchored else spread
         half = around.half_widths()
         # A bound is missing where the rounds leave it open.
         lower = np.where(np.isnan(lower), np.nan, rating - half)

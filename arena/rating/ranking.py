@@ -1,4 +1,4 @@
-"""Who can be told apart from whom: the paper's rank, rank sets, and all pairs at once.
+"""Separation of contestants: the paper's rank, rank sets, and all pairs at once.
 
 By intervals in closed form the largest of all standardised differences among equals is drawn as
 it comes about: ratings from their covariance, and beside them the squares of so few clusters as
@@ -53,7 +53,7 @@ def ranks(lower: ArrayLike, upper: ArrayLike) -> IntArray:
     return np.asarray(1 + len(lowest_first) - not_above, dtype=np.int64)
 
 
-def shown_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntArray:
+def decide_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntArray:
     """Ranks by the bounds that there are; 0 where these do not decide one.
 
     Nobody is first for want of bounds. Without an upper bound the first rank takes a lower bound
@@ -120,7 +120,7 @@ def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
         gaps /= error[some, None]
         np.maximum(largest, np.abs(gaps, out=gaps).max(axis=0, initial=0.0), out=largest)
     critical = float(np.quantile(largest, LEVEL)) if len(largest) else np.inf
-    apart = _square_of(len(rating), np.abs(rating[low] - rating[high]) / error > critical, False)
+    apart = _to_square(len(rating), np.abs(rating[low] - rating[high]) / error > critical, False)
     return apart & (rating[:, None] > rating[None, :])
 
 
@@ -133,7 +133,7 @@ _SINCE_5 = {"since": 5}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairP:
-    """How likely a difference as large as that of `a` and `b` is among equals, in any pair.
+    """Probability among equals of a difference as large as that of `a` and `b`, in any pair.
 
     Attributes:
         difference: Points by which `a` is above `b`; `lower` and `upper` are of its own interval.
@@ -149,7 +149,7 @@ class PairP:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Separation:
-    """Which pairs differ, all pairs judged at once: the error is 5 % for the whole table.
+    """Pairs that differ, all judged at once: the error is 5 % for the whole table.
 
     Attributes:
         above: (C, C) whether the row's contestant is above the column's.
@@ -211,7 +211,7 @@ def join_separations(separations: Sequence[Separation], across: BoolArray) -> Se
 
 
 def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -> Separation:
-    """Which pairs of ratings (C,) differ, at 5 % for all of them together.
+    """Return the pairs of ratings (C,) that differ, at 5 % for all of them together.
 
     Args:
         rating: In points.
@@ -237,12 +237,12 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     caution = CAUTION if spread.fewest >= FEWEST_TO_JUDGE else 2.0 * CAUTION
     adjusted = np.minimum(caution * adjusted, 1.0)
     difference = rating[:, None] - rating[None, :]
-    apart = _square_of(contestants, adjusted <= 1.0 - LEVEL, False)
+    apart = _to_square(contestants, adjusted <= 1.0 - LEVEL, False)
     return Separation(
         above=apart & (difference > 0.0),
-        p_value=_square_of(contestants, adjusted, 1.0),
+        p_value=_to_square(contestants, adjusted, 1.0),
         difference=difference,
-        half=_square_of(contestants, t_quantile(degrees) * error, 0.0),
+        half=_to_square(contestants, t_quantile(degrees) * error, 0.0),
     )
 
 
@@ -340,7 +340,7 @@ def _step_down(size: FloatArray, drawn: SingleArray) -> FloatArray:
     return adjusted
 
 
-def _square_of(contestants: int, values: NDArray[Any], diagonal: float) -> NDArray[Any]:
+def _to_square(contestants: int, values: NDArray[Any], diagonal: float) -> NDArray[Any]:
     """(C, C), symmetric, of what pairs have (P,)."""
     low, high = np.triu_indices(contestants, 1)
     square = np.full((contestants, contestants), diagonal, dtype=values.dtype)

@@ -1,4 +1,4 @@
-"""How well experts agree with each other and with themselves, and what can be said of each.
+"""Agreement of experts with each other and with themselves, and a judgement on each.
 
 Krippendorff's alpha, Gwet's AC1 and percent agreement come with intervals. Nothing here removes a
 vote: who differs from the others may be the one who looks closest.
@@ -38,7 +38,7 @@ _TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))
 
 
 class DifferenceMetric(StrEnum):
-    """How far two values are apart: all alike, or a win two steps from a loss."""
+    """Distance of two values: all differences alike, or a win two steps from a loss."""
 
     NOMINAL = "nominal"
     INTERVAL = "interval"
@@ -46,7 +46,7 @@ class DifferenceMetric(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """What experts who judged the same units make of each other.
+    """Agreement of experts who judged the same units.
 
     Attributes:
         alpha: Krippendorff's, values as names.
@@ -210,7 +210,7 @@ FAST_MS = 1000.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """How far answers speak for an expert who looks, and against one who does not.
+    """Evidence of answers for an attentive expert against a careless one.
 
     Logarithms of likelihood ratios, and what is expected of them: pieces of evidence are added up.
 
@@ -227,7 +227,7 @@ class Evidence:
 
     @classmethod
     def of_trials(cls, hits: float, trials: float, *, looking: float, guessing: float) -> Self:
-        """Of hits among trials, with the chance of a hit of who looks and who does not."""
+        """Return the evidence of hits among trials, given both experts' chances of a hit."""
         weight = math.log(looking / guessing * (1.0 - guessing) / (1.0 - looking))
         return cls(
             gain=weight * (hits - trials * guessing),
@@ -301,10 +301,10 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
                 median_ms=float(np.median(timed)) if len(timed) else None,
                 fast=float((timed < FAST_MS).mean()) if len(timed) else None,
                 ties=float((votes.score[own] == 0.5).mean()),
-                left=_share_of(won_left[decided]),
+                left=_estimate_share(won_left[decided]),
                 agreement=_mean(agreed[shared]),
                 shared=int(shared.sum()),
-                favourites=_share_of(won_left[foreseen] == (lead[foreseen] > 0)),
+                favourites=_estimate_share(won_left[foreseen] == (lead[foreseen] > 0)),
                 decided=int(foreseen.sum()),
                 evidence=evidence[expert],
             )
@@ -392,7 +392,7 @@ def _mean(values: FloatArray) -> Estimate:
     return Estimate(value=value, lower=max(value - half, 0.0), upper=min(value + half, 1.0))
 
 
-def _share_of(hits: BoolArray) -> Estimate:
+def _estimate_share(hits: BoolArray) -> Estimate:
     return wilson(int(hits.sum()), len(hits)) if len(hits) else Estimate(value=None)
 
 

@@ -1,10 +1,10 @@
-"""What to say with ratings: why something is missing, and what to keep in mind."""
+"""Remarks on ratings: reasons of missing values, and caveats."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from arena.rating.chains import few_of
+from arena.rating.chains import join_few
 from arena.rating.comparisons import BoolArray, Comparisons, count_codes
 from arena.rating.rules import Intervals, Rules, Unit
 
@@ -67,7 +67,7 @@ def who_is_open(votes: Comparisons, is_open: BoolArray) -> str:
     names = [votes.shown[place] for place in np.flatnonzero(is_open)]
     rest = "; the others' intervals do not rest on them" if not is_open.all() else ""
     return (
-        f"The votes set no two bounds for {', '.join(few_of(names))}: too few votes, or hardly "
+        f"The votes set no two bounds for {', '.join(join_few(names))}: too few votes, or hardly "
         f"any score on one side. The lines say what is missing{rest}."
     )
 
@@ -81,7 +81,7 @@ def why_no_intervals(votes: Comparisons, unit: Unit) -> str:
 
 
 def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) -> list[str]:
-    """What to keep in mind with intervals by these rules."""
+    """Return the caveats of intervals by these rules."""
     found: list[str] = []
     is_resampled = rules.intervals is Intervals.RESAMPLES
     for kind in Unit.TWO_WAY.kinds:

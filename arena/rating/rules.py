@@ -1,4 +1,4 @@
-"""How to rate: method, what hangs together, how intervals are found, how often, by which seed."""
+"""Rules of a rating: method, clusters, kind of intervals, number of rounds, seed."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +8,7 @@ FEWEST_DRAWS, MOST_DRAWS = 100, 100_000
 
 
 class Method(StrEnum):
-    """How votes become ratings."""
+    """Method that turns votes into ratings."""
 
     BRADLEY_TERRY = "bt"
     DAVIDSON = "davidson"
@@ -16,7 +16,7 @@ class Method(StrEnum):
 
 
 class Unit(StrEnum):
-    """What hangs together, and what the bootstrap draws."""
+    """Cluster of dependent votes, and unit of the bootstrap."""
 
     VOTE = "vote"
     SCENARIO = "scenario"
@@ -30,7 +30,7 @@ class Unit(StrEnum):
 
 
 class Intervals(StrEnum):
-    """How intervals are found: in closed form, or as percentiles of resampled rounds."""
+    """Kind of intervals: a closed form, or percentiles of resampled rounds."""
 
     CLOSED_FORM = "closed"
     RESAMPLES = "resamples"
@@ -67,7 +67,7 @@ def default_intervals(method: Method, unit: Unit) -> Intervals:
 
 
 def unit_for(*, judges: bool, items: bool) -> Unit:
-    """What hangs together in votes of which judges, items or both are known."""
+    """Return the clusters of votes of which judges, items or both are known."""
     if judges and items:
         return Unit.TWO_WAY
     if judges:
@@ -77,7 +77,7 @@ def unit_for(*, judges: bool, items: bool) -> Unit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """How to rate; the fields are those of `leaderboard.rate`."""
+    """Rules of a rating; the fields are those of `leaderboard.rate`."""
 
     method: Method
     unit: Unit

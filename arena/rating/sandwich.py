@@ -1,4 +1,4 @@
-"""How sure ratings are when votes hang together by expert and by scenario, in closed form.
+"""Closed-form standard errors of ratings whose votes are clustered by expert and by scenario.
 
 Every vote pulls at its two contestants by how much it surprises. The pulls of a cluster are added
 up before they are squared, so that what its votes have in common counts (the sandwich,
@@ -110,7 +110,7 @@ class Pulls:
         return np.asarray(ELO_PER_LOGIT**2 * self.back @ squares @ self.back.T)
 
 
-def design_of(votes: Comparisons, weight: FloatArray, columns: FloatArray) -> Any:
+def design_matrix(votes: Comparisons, weight: FloatArray, columns: FloatArray) -> Any:
     """(R, C + Q) sparse: a weight (R,) for the first, its opposite for the second, then columns.
 
     Args:
@@ -130,7 +130,7 @@ def design_of(votes: Comparisons, weight: FloatArray, columns: FloatArray) -> An
 def pulls_of_model(
     votes: Comparisons, met: Meetings, games: FloatArray, answer: FloatArray
 ) -> Pulls:
-    """Those of Bradley-Terry or Davidson's model at an answer (K,) of `models.fit`."""
+    """Return the pulls of Bradley-Terry or Davidson's model at an answer (K,) of `models.fit`."""
     size = len(votes.names)
     expected, tied = chances(size, answer, votes.first, votes.second)
     surprise = votes.score - expected
@@ -138,7 +138,7 @@ def pulls_of_model(
     by_ties = ((votes.score == TIE) - tied)[:, None] if has_ties else np.empty((len(votes), 0))
     return Pulls(
         votes=votes,
-        slopes=design_of(votes, surprise, by_ties),
+        slopes=design_matrix(votes, surprise, by_ties),
         information=expected - 0.25 * tied - expected**2,
         back=inverse_curvature(met, games, answer)[:size],
     )
@@ -158,7 +158,7 @@ def without_negative_parts(matrix: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Component:
-    """What clusters of one kind add to the covariance of the ratings.
+    """Contribution of clusters of one kind to the covariance of the ratings.
 
     Attributes:
         covariance: (C, C) moderated.
@@ -177,7 +177,7 @@ class Component:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
-    """How sure ratings are.
+    """Standard errors and covariance of ratings.
 
     Attributes:
         covariance: (C, C) in squared points, around the mean of the reference.
@@ -218,7 +218,7 @@ def _restrict(value: _Arrays, members: IntArray) -> _Arrays:
     return replace(value, **arrays)
 
 
-def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> Spread:
+def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> Spread:
     """The spread of ratings by votes that hang together as the unit says.
 
     Args:
@@ -231,7 +231,7 @@ def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> S
     if reference is None:
         reference = np.ones(len(pulls.votes.names), dtype=np.bool_)
     pulls = pulls.relative_to(reference)
-    kinds = clusters_of(pulls.votes, unit)
+    kinds = number_clusters(pulls.votes, unit)
     base = pulls.by_row()
     single = base.diagonal()
     if len(kinds) > 1:
@@ -270,13 +270,13 @@ def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> Fl
     return np.asarray(variance**2 / np.maximum(of_parts, 1e-300))
 
 
-def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
+def number_clusters(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
     """The number of clusters of each kind that the unit names, from two on, and (R,) whose."""
     kinds = [np.unique(getattr(votes, kind), return_inverse=True) for kind in unit.kinds]
     return [(len(codes), of_row) for codes, of_row in kinds if len(codes) > 1]
 
 
-def left_of_effect(uneven: FloatArray, cubes: FloatArray) -> FloatArray:
+def remaining_share(uneven: FloatArray, cubes: FloatArray) -> FloatArray:
     """Return the share of the variance of cluster effects that the fit leaves in the pulls.
 
     Args:
@@ -294,7 +294,7 @@ def _component(
     of_row: IntArray,
     reference: BoolArray,
 ) -> Component:
-    """What clusters of one kind add; docs/rating.md derives it.
+    """Return the contribution of clusters of one kind; docs/rating.md derives it.
 
     Args:
         pulls: What each row pulls at its contestants.
@@ -306,8 +306,8 @@ def _component(
     """
     raw = pulls.by_cluster(of_row, clusters)
     uneven, cubes = pulls.concentration(of_row, clusters)
-    left_of_votes, left_of_effects = 1.0 - uneven, left_of_effect(uneven, cubes)
-    effects = _centred(uneven, reference)
+    left_of_votes, left_of_effects = 1.0 - uneven, remaining_share(uneven, cubes)
+    effects = _centre(uneven, reference)
     surplus = raw.diagonal() - base.diagonal() * left_of_votes
     room = effects.diagonal() * left_of_effects
     # Single votes, as cells contain the effect: weights by these would prefer where it is small.
@@ -338,7 +338,7 @@ def _component(
 
 
 def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:
-    """How many clusters what all have in common counts for: few where contestants differ.
+    """Return the prior's weight in clusters: few where contestants differ.
 
     The spread of own squares (C,) around the common ones (C,), less what chance alone gives with
     so many degrees of freedom (C,), as moments of a scaled F distribution.
@@ -352,7 +352,7 @@ def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> 
     return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
 
 
-def _centred(values: FloatArray, reference: BoolArray) -> FloatArray:
+def _centre(values: FloatArray, reference: BoolArray) -> FloatArray:
     """(C, C) covariance of independent numbers with these variances (C,), around a mean."""
     number = reference.sum()
     of_mean = np.where(reference, values, 0.0)

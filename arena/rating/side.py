@@ -1,4 +1,4 @@
-"""What the left side is worth, beside what the contestants are worth.
+"""Value of the left side, beside the contestants' own.
 
 The model: the logarithm of the odds that the left one wins is the difference of the strengths plus
 the advantage of the left. A tie is half a win for both.
@@ -13,7 +13,7 @@ from scipy.special import expit
 
 from arena.rating.comparisons import TIE, Comparisons, Estimate, FloatArray, share, t_quantile
 from arena.rating.models import ELO_PER_LOGIT
-from arena.rating.sandwich import design_of
+from arena.rating.sandwich import design_matrix
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-10
@@ -33,7 +33,7 @@ UNDETERMINED = "unknown: the votes do not determine everybody’s rating"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SideBias:
-    """What the left side is worth.
+    """Advantage of the left side.
 
     Attributes:
         advantage: In Elo points with the interval clustered by expert; zero is no bias.
@@ -118,7 +118,7 @@ def _fit_advantage(votes: Comparisons) -> tuple[float, FloatArray, FloatArray] |
 
     By maximum likelihood, to 1e-10; None where the votes determine no finite answer.
     """
-    design = design_of(votes, np.ones(len(votes)), np.ones((len(votes), 1)))
+    design = design_matrix(votes, np.ones(len(votes)), np.ones((len(votes), 1)))
     parameters = np.zeros(design.shape[1])
     longest = np.inf
     for _ in range(_MOST_STEPS):

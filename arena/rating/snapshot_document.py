@@ -1,4 +1,4 @@
-"""What a snapshot keeps beside its standings: typed values and their one codec.
+"""Content of a snapshot beside its standings: typed values and their one codec.
 
 The names of the fields are the keys of the stored JSON document; `since` marks those that came
 with a later version of it. None and empty mean that the votes do not determine a value, that
@@ -29,14 +29,14 @@ def read_text(stored: Any) -> str:
         ValueError: It is neither.
     """
     if isinstance(stored, dict):
-        values = {name: _joined(value) for name, value in stored["values"].items()}
+        values = {name: _join(value) for name, value in stored["values"].items()}
         return str(stored["text"] % values)
     if not isinstance(stored, str):
         raise ValueError(f"a sentence or plain text is allowed, not {stored!r}")
     return stored
 
 
-def _joined(value: Any) -> Any:
+def _join(value: Any) -> Any:
     """A value in words: names by commas, groups of names by semicolons."""
     if not isinstance(value, list):
         return value
@@ -63,7 +63,7 @@ _WHERE_SET = {"since": VERSION + 1}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardRemarks:
-    """What the rating says beside its lines; contestants by slug.
+    """Remarks of a rating beside its lines; contestants by slug.
 
     Attributes:
         reasons: Why ratings or intervals are missing; None where only the status says so.
@@ -93,7 +93,7 @@ class BoardRemarks:
 
     @property
     def settled_ties(self) -> int | None:
-        """How many such ties count, each for two contestants; None where nobody counted them."""
+        """Number of such ties, each for two contestants; None if it was not counted."""
         return None if self.settled is None else sum(self.settled.values()) // 2
 
     def answer(self, lines: Sequence[Line], slugs: Sequence[str], votes: int) -> str:
@@ -135,7 +135,7 @@ class PanelRater(Rater):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StrengthCheck:
-    """What it changes to count a slight preference as three quarters of a win.
+    """Effect of counting a slight preference as three quarters of a win.
 
     Attributes:
         slight, clear: How many votes say so.
@@ -231,7 +231,7 @@ class TypeRating:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisplacementSummary:
-    """How far a contestant's shown augmentations are from the references, over `n` objects.
+    """Distance of a contestant's shown augmentations from the references, over `n` objects.
 
     Attributes:
         at_t0_m, final_m: Means of objects of changes that move, of which median and mean are
@@ -251,7 +251,7 @@ class DisplacementSummary:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioCost:
-    """What a contestant takes for one scenario on average; None is unknown."""
+    """Average use of a contestant for one scenario; None is unknown."""
 
     slug: str
     model: str

@@ -64,11 +64,11 @@ def _compare(
         order = ", then ".join(names[place] for place in places)
         return f"The order {order_is} {order}{'' if is_few else ': all are told apart'}{counted}"
     if len(best) > 1:
-        clauses = [f"{_named(names, best, len(places))} can’t be told apart{counted}"]
+        clauses = [f"{_join_names(names, best, len(places))} can’t be told apart{counted}"]
     else:
         below = [place for place in places if (best[0], place) in apart]
         all_others = f"{_ALL[len(below)]} others" if len(below) < len(_ALL) else "all others"
-        worse = all_others if 1 < len(below) == len(places) - 1 else _named(names, below)
+        worse = all_others if 1 < len(below) == len(places) - 1 else _join_names(names, below)
         clauses = [f"{names[best[0]]} {one_is} better than {worse}{counted}"]
     before = list(best)
     for tier in rest:
@@ -80,16 +80,16 @@ def _compare(
             verb = one_is if len(members) == 1 else many_are
             if list(betters) != best or len(best) > 1:
                 whom = _better_ones(names, betters, before)
-                clauses.append(f"{_named(names, members)} {verb} worse than {whom}")
+                clauses.append(f"{_join_names(names, members)} {verb} worse than {whom}")
             elif len(members) > 1:
-                clauses.append(f"{_named(names, members)} can’t be told apart")
+                clauses.append(f"{_join_names(names, members)} can’t be told apart")
         before += tier
     more = ["the table has the rest"] if len(clauses) > MOST_CLAUSES else []
     return "; ".join(clauses[:MOST_CLAUSES] + more)
 
 
 def _tiers(places: Sequence[int], apart: Pairs) -> list[list[int]]:
-    """Those whom nobody is above, then those whom nobody of the rest is above, and so on."""
+    """Return tiers: those with nobody above, then those with nobody of the rest above, ..."""
     left, tiers = list(places), []
     while left:
         tier = [place for place in left if not any((other, place) in apart for other in left)]
@@ -98,7 +98,7 @@ def _tiers(places: Sequence[int], apart: Pairs) -> list[list[int]]:
     return tiers
 
 
-def _named(names: Sequence[str], places: Sequence[int], total: int = 0) -> str:
+def _join_names(names: Sequence[str], places: Sequence[int], total: int = 0) -> str:
     if len(places) > MOST_NAMED:
         of = "The" if len(places) == total else f"{len(places)} of the" if total else ""
         number = total or len(places)
@@ -110,4 +110,4 @@ def _named(names: Sequence[str], places: Sequence[int], total: int = 0) -> str:
 def _better_ones(names: Sequence[str], betters: Sequence[int], before: Sequence[int]) -> str:
     if 1 < len(betters) == len(before) < len(_ALL):
         return _ALL[len(betters)]
-    return _named(names, betters)
+    return _join_names(names, betters)

@@ -110,7 +110,7 @@ class SnapshotDocument(RowDocument[Snapshot]):
 
 
 class SnapshotBody(RequestBody):
-    """How to rate; what is missing is the default."""
+    """Rules of a rating; a missing field is the default."""
 
     request = RatingRequest
 

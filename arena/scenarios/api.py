@@ -22,7 +22,7 @@ from arena.api.views import (
     WarnedDocument,
     keep_and_send,
     operation,
-    page_of,
+    page_serializer,
 )
 from arena.jobs.exports.sweeps import sweep_sheet
 from arena.scenarios.queries import OWN, submissions_for
@@ -31,10 +31,10 @@ from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMomen
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.inputs import read_request
 from augment.services.judging.sweeps import LARGEST_FAMILY, SweepRequest, add_family, plan_sweep
-from augment.services.judging.thresholds import SweepResult, result_of
+from augment.services.judging.thresholds import SweepResult, sweep_result
 from augment.services.scenarios import uploads
 from augment.services.scenarios.benchmarks import find_benchmark
-from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
@@ -53,7 +53,7 @@ from augment.tasks import (
 
 
 class ScenarioQuery(PageQuery):
-    """Which scenarios."""
+    """Filter of a list of scenarios."""
 
     set = serializers.ChoiceField(
         choices=(*Scenario.SETS, OWN),
@@ -124,7 +124,7 @@ class ScenariosView(ApiView):
 
     readers = writers = STAFF
 
-    @operation(page_of(ScenarioDocument), query=ScenarioQuery, name="listScenarios")
+    @operation(page_serializer(ScenarioDocument), query=ScenarioQuery, name="listScenarios")
     def get(self, given: Given) -> Response:
         """Scenarios by slug.
 
@@ -169,7 +169,7 @@ class UploadBody(StrictSerializer):
 
 
 class MomentBody(StrictSerializer):
-    """Which moment of a recording; those that there are stand in its `tracks`."""
+    """Moment of a recording, within one of its `tracks`."""
 
     item = TextField(max_length=200, required=False, default="", allow_blank=True)
     frame = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME)
@@ -212,7 +212,7 @@ class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
 
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
-        return notes_of((row.report or {}).get("notes", ()))
+        return note_sentences((row.report or {}).get("notes", ()))
 
 
 class FilesView(ApiView):
@@ -336,7 +336,7 @@ class SweepsView(ApiView):
         asked = read_request(SweepRequest, given)
         planned = plan_sweep(scenario=_scenario(code), request=asked, actor=self.user)
         sweep, warnings = keep_and_send(lambda: planned, enqueue_sweep)
-        return result_of(sweep), warnings
+        return sweep_result(sweep), warnings
 
 
 class SweepView(ApiView):
@@ -351,11 +351,11 @@ class SweepView(ApiView):
         Scores by value and planner, where the planner fails, and what was kept.
         """
         rows = Sweep.objects.select_related("scenario", "hardest")
-        return result_of(get_object_or_404(rows, code=code))
+        return sweep_result(get_object_or_404(rows, code=code))
 
 
 class FamilyBody(StrictSerializer):
-    """How many scenarios are drawn."""
+    """Number of scenarios to draw."""
 
     count = WholeNumberField(min_value=1, max_value=LARGEST_FAMILY)
     seed = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME, required=False, default=0)

@@ -9,7 +9,7 @@ from arena.jobs.exports.files import WARNING
 from arena.models import BenchmarkFile
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import BaseScene, Benchmark
-from augment.services.judging.scenario_export import Source, list_warnings, source_of
+from augment.services.judging.scenario_export import Source, list_warnings, scene_source
 from augment.services.scenarios.benchmarks import benchmark_set, list_remarks, write_folder
 
 
@@ -25,7 +25,7 @@ def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
         Conflict: The benchmark's scenarios have changed.
         OSError: It can't be written; nothing is left of it.
     """
-    files, warnings, _ = _files_of(row)
+    files, warnings, _ = _make_files(row)
     with new_folder(out) as folder:
         for name, content in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -33,11 +33,11 @@ def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:
     return warnings
 
 
-def _files_of(row: Benchmark) -> tuple[dict[str, bytes], tuple[str, ...], list[Source]]:
+def _make_files(row: Benchmark) -> tuple[dict[str, bytes], tuple[str, ...], list[Source]]:
     """Return the files, with what has to be said as one of them, and where scenes come from."""
     files = write_folder(benchmark_set(row))
     scenes = BaseScene.objects.filter(scenarios__benchmark_items__benchmark=row)
-    sources = [source_of(scene) for scene in scenes.defer("document", "recording").distinct()]
+    sources = [scene_source(scene) for scene in scenes.defer("document", "recording").distinct()]
     if warnings := (*list_remarks(row), *list_warnings(sources)):
         files[WARNING] = ("\n".join(warnings) + "\n").encode()
     return files, warnings, sources
@@ -51,7 +51,7 @@ class BenchmarkFiles(FileWork[BenchmarkFile]):
 
     def make(self, row: BenchmarkFile, folder: Path) -> MadeFile:
         """Return the folder as a zip."""
-        files, warnings, sources = _files_of(row.benchmark)
+        files, warnings, sources = _make_files(row.benchmark)
         marked = any(source.is_non_commercial for source in sources)
         return MadeFile(
             name=f"{row.benchmark.slug}-{row.benchmark.version}{'-non-commercial' * marked}.zip",

@@ -10,7 +10,7 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db.models import Case, Count, Q, QuerySet, When
 
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
 from augment.services.scenarios.benchmarks import Split, Stratum, public_origins
 from augment.services.scenarios.scenes import type_choices
@@ -30,7 +30,7 @@ OWN = "own"
 """The scenarios that are in no set of the catalogue."""
 
 
-def scenarios_of(chosen: str = "", *, is_retired: bool = False) -> QuerySet[Scenario]:
+def list_scenarios(chosen: str = "", *, is_retired: bool = False) -> QuerySet[Scenario]:
     """Return scenarios by type and slug, without the documents of their scenes.
 
     Args:
@@ -45,8 +45,8 @@ def scenarios_of(chosen: str = "", *, is_retired: bool = False) -> QuerySet[Scen
 
 
 def by_type(chosen: str = "") -> list[TypeGroup]:
-    """Return what forms offer of a set, in the order of the types."""
-    return group_by_type(list(scenarios_of(chosen)))
+    """Return the choices of a set, in the order of the types."""
+    return group_by_type(list(list_scenarios(chosen)))
 
 
 def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
@@ -60,7 +60,7 @@ def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
 
 def set_choices(chosen: str) -> list[dict[str, Any]]:
     """Return all scenarios first (named by the empty text), then the sets that there are."""
-    rows = scenarios_of().filter(paraphrase_of=None).order_by()
+    rows = list_scenarios().filter(paraphrase_of=None).order_by()
     numbers = Counter(name or OWN for name in rows.values_list("catalogue_set", flat=True))
     present = {"": sum(numbers.values())} | {
         name: numbers[name] for name in (*Scenario.SETS, OWN) if numbers.get(name)
@@ -86,7 +86,7 @@ def reference_pictures(scenarios: Sequence[Scenario]) -> dict[int, uuid.UUID]:
     return dict(rows.order_by("created_at", "pk").values_list("scenario_id", "code"))
 
 
-def augmentations_of(scenario: Scenario) -> list[Augmentation]:
+def list_augmentations(scenario: Scenario) -> list[Augmentation]:
     """Return every augmentation of a scenario with a picture, the youngest job first."""
     rows = scenario.augmentations.filter(state__in=Augmentation.SHOWABLE).exclude(image="")
     return list(
@@ -172,7 +172,7 @@ def list_benchmarks() -> QuerySet[Benchmark]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StratumCount:
-    """How many tasks of one stratum, or of all, are in each split."""
+    """Number of tasks in each split, of one stratum or of all."""
 
     label: str
     practice: int
@@ -204,8 +204,8 @@ _AWAITED = Q(state=Submission.State.CHECKED, decision=Submission.Decision.NONE)
 
 
 def submissions_for(user: User, *, with_report: bool = False) -> QuerySet[Submission]:
-    """Return what an account may see: entrants their own, staff all, awaited ones first."""
-    role = role_of(user)
+    """Return the submissions that an account may see: its own, all for staff; awaited first."""
+    role = top_role(user)
     rows = Submission.objects.select_related("benchmark", "uploaded_by__person", "contestant")
     rows = rows if with_report else rows.defer("report")
     if role in ("admin", "researcher"):

@@ -64,5 +64,5 @@ urlpatterns: list[URLPattern] = [
     path("augmentations/<uuid:code>/follow-up/", augmentations.follow_up, name="follow-up"),
     path("augmentations/<uuid:code>/correct/", editor.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", augmentations.transcript, name="transcript"),
-    path("asked/<slug:digest>.png", augmentations.asked_image, name="asked-image"),
+    path("asked/<slug:digest>.png", augmentations.show_asked_image, name="asked-image"),
 ]

@@ -29,7 +29,7 @@ MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Web:
-    """Where the pages are served, by how many processes."""
+    """Address of the pages, and number of processes that serve them."""
 
     host: str = "127.0.0.1"
     port: int = 8000

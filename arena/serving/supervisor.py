@@ -41,7 +41,7 @@ class ChildFailed(ArenaError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """What to run and how to see that it works.
+    """Command of a process, and the sign that it works.
 
     Attributes:
         name: The word before each of its lines.
@@ -99,7 +99,7 @@ class Child:
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs."""
+        """Exit code, None while it runs."""
         return self.process.poll()
 
     def stop(self, is_hurried: Callable[[], bool]) -> None:
@@ -158,7 +158,7 @@ class Supervisor:
 
     @property
     def is_stopping(self) -> bool:
-        """Whether a stop was requested."""
+        """True if a stop was requested."""
         return self._stops_asked > 0
 
     def ask_to_stop(self) -> None:

@@ -93,7 +93,7 @@ class Connection(HTTPChannel):  # type: ignore[misc]
 
     @property
     def is_idle(self) -> bool:
-        """Whether nothing is to be done for it before more of a request comes in."""
+        """True if nothing can be done for it before more of a request comes in."""
         return not self.requests and not self.total_outbufs_len
 
 

@@ -1,4 +1,4 @@
-"""Who may open which page, and what becomes of an act that a service refuses."""
+"""Access to pages, and the response to an act that a service refuses."""
 
 from collections.abc import Callable
 from functools import partial, wraps
@@ -15,7 +15,7 @@ from django.urls import NoReverseMatch
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import StillUnderWay
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from arena.site.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import AugmentError
 
@@ -51,7 +51,7 @@ def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
         def guarded(
             request: HttpRequest, /, *args: P.args, **kwargs: P.kwargs
         ) -> HttpResponseBase:
-            if role_of(request.user) not in roles:
+            if top_role(request.user) not in roles:
                 raise PermissionDenied
             return _answer_once(request, partial(view, request, *args, **kwargs))
 
@@ -140,7 +140,7 @@ def _lead_to(page: str, code: object) -> HttpResponse:
         return redirect(page)
 
 
-def user_of(request: HttpRequest) -> User:
+def get_user(request: HttpRequest) -> User:
     """Return who is signed in, for a view that others can't reach."""
     return cast(User, request.user)
 

@@ -133,7 +133,7 @@ def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> 
 
 
 def wait_for_workers(*, waits: bool) -> dict[str, Any]:
-    """Return what the template of a page needs that shows itself anew for as long as it waits."""
+    """Return the context of a page that shows itself anew for as long as it waits."""
     return {"is_live": waits, "workforce": workforce() if waits else None}
 
 

@@ -54,7 +54,7 @@ def load_scenarios(actor: User | None = None) -> None:
     load_catalogue(actor=actor)
 
 
-def scenarios_of(per_type: int | None, which: str = "paper") -> list[str]:
+def list_slugs(per_type: int | None, which: str = "paper") -> list[str]:
     """Slugs of a set of the catalogue: the first so many of each type, all where None is given."""
     kinds: dict[str, list[str]] = {}
     authored = Scenario.objects.filter(catalogue_set=which, paraphrase_of=None)
@@ -95,7 +95,7 @@ def launch_job(actor: User | None = None, scenarios: Sequence[str] = ()) -> Gene
     """Launch the demo's job, all contestants on the scenarios, by default a few of each type."""
     if job := GenerationJob.objects.filter(name=JOB).first():
         return job
-    chosen = scenarios or scenarios_of(A_FEW) or resolve_scenarios([ALL])
+    chosen = scenarios or list_slugs(A_FEW) or resolve_scenarios([ALL])
     request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=chosen)
     return launch(request, actor)
 
@@ -130,7 +130,7 @@ def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Stud
 def study_asked(
     name: str, scenarios: Sequence[str], contestants: Sequence[str] = RATED
 ) -> dict[str, Any]:
-    """Return what the demo's studies have in common."""
+    """Return the fields that the demo's studies share."""
     return {
         "name": name,
         "contestants": contestants,

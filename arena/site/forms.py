@@ -11,7 +11,7 @@ from django import forms
 from arena.scenarios.queries import TypeGroup
 from augment.errors import Conflict
 from augment.models import Contestant
-from augment.services.inputs import Input, InputKind, inputs_of
+from augment.services.inputs import Input, InputKind, to_inputs
 from augment.services.running.budget import Caps
 
 LONGEST_LINES = 60_000
@@ -153,9 +153,9 @@ class RequestForm(forms.Form):
 
 
 class CapsForm(RequestForm):
-    """What a job may use at most; an empty field is no cap, or one that stays."""
+    """Caps of a job; an empty field is no cap, or an unchanged one."""
 
-    inputs = inputs_of(Caps)
+    inputs = to_inputs(Caps)
 
 
 def read_json(text: str | bytes, *, otherwise: str) -> Any:

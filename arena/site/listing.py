@@ -22,12 +22,12 @@ def page_asked(request: HttpRequest, name: str = "page") -> int:
 
 
 def search_asked(request: HttpRequest) -> str:
-    """Return what somebody looks for; empty for everything."""
+    """Return the search term; empty for everything."""
     return request.GET.get("q", "").replace("\0", "").strip()[:LONGEST_SEARCH]
 
 
 def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:
-    """Return what a filter is set to; empty for what there is not."""
+    """Return the chosen value of a filter; empty for an unknown one."""
     given = request.GET.get(name, "")
     return given if given in allowed else ""
 
@@ -65,7 +65,7 @@ class Listing:
         return bool(self.search or any(choice.chosen for choice in self.choices))
 
     def chosen(self, name: str) -> str:
-        """Return what a filter is set to."""
+        """Return the value of a filter."""
         return next((choice.chosen for choice in self.choices if choice.name == name), "")
 
     def narrow(self, rows: QuerySet[Row], *columns: str, by: Sequence[str]) -> QuerySet[Row]:
@@ -89,7 +89,7 @@ def read_listing(
     *,
     keep: Sequence[str] = (),
 ) -> Listing:
-    """Return what the address asks a list for.
+    """Return the list's page, search and filters from the address.
 
     Args:
         request: With the address.

@@ -17,13 +17,13 @@ from prometheus_client.registry import Collector
 from arena.jobs import queries
 from arena.models import Study
 from arena.people.pages import keep_language
-from arena.people.queries import Language, Theme, role_of
+from arena.people.queries import Language, Theme, top_role
 from arena.people.services import keep_preference
 from arena.results.queries.access import ResultsAccess, results_access
 from arena.scenarios.queries import count_waiting, submissions_for
 from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site import demo
-from arena.site.access import ADMIN, act_for, page_for, user_of
+from arena.site.access import ADMIN, act_for, get_user, page_for
 from arena.site.acts import send_later
 from arena.site.language import use_english
 from arena.site.listing import read_listing, read_page
@@ -43,7 +43,7 @@ ACTS_AT_ONCE = 15
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
     """Show the page of the role that somebody has."""
-    match role_of(request.user):
+    match top_role(request.user):
         case "expert":
             return _expert(request)
         case "entrant":
@@ -60,8 +60,8 @@ def home(request: HttpRequest) -> HttpResponse:
 
 
 def _expert(request: HttpRequest) -> HttpResponse:
-    expert = user_of(request)
-    lines = studies.progress_of(studies.listed_studies(expert), expert)
+    expert = get_user(request)
+    lines = studies.count_progress(studies.list_studies(expert), expert)
     closed = [line for line in lines if line.study.state == Study.State.CLOSED]
     is_open = [line for line in lines if line.study.state == Study.State.OPEN]
     context = {
@@ -79,7 +79,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
 
 
 def _entrant(request: HttpRequest) -> HttpResponse:
-    own = submissions_for(user_of(request))
+    own = submissions_for(get_user(request))
     benchmarks = Benchmark.objects.filter(retired_at=None)
     return render(request, "home/entrant.html", {"own": own[:5], "benchmarks": benchmarks})
 
@@ -99,7 +99,7 @@ def _admin(request: HttpRequest) -> HttpResponse:
 
 
 def _studies_by_state() -> dict[str, list[studies.StudyProgress]]:
-    lines = studies.progress_of(studies.listed_studies())
+    lines = studies.count_progress(studies.list_studies())
     states = {"running": Study.State.OPEN, "closed": Study.State.CLOSED}
     return {
         name: [line for line in lines if line.study.state == state]
@@ -114,7 +114,7 @@ def use_demo(request: HttpRequest, name: str) -> HttpResponse | None:
         raise Http404
     with transaction.atomic():
         # Held, so that a second click waits and finds what the first one made.
-        actor = User.objects.select_for_update().get(pk=user_of(request).pk)
+        actor = User.objects.select_for_update().get(pk=get_user(request).pk)
         made = demo.ACTS[name](actor)
         if isinstance(made, GenerationJob):
             send_later(request, enqueue_job, made.pk)
@@ -130,7 +130,7 @@ def choose(request: HttpRequest, what: str) -> HttpResponse:
     """
     chosen, answer = request.POST.get(what, ""), _back(request)
     if chosen in set(Theme if what == "theme" else Language):
-        keep_preference(user_of(request), **{what: chosen})
+        keep_preference(get_user(request), **{what: chosen})
         if what == "language":
             keep_language(answer, Language(chosen))
     return answer
@@ -196,7 +196,7 @@ def readyz(request: HttpRequest) -> HttpResponse:
 @require_safe
 def metrics(request: HttpRequest) -> HttpResponse:
     """Numbers in Prometheus's format, for an admin or who has the token of the settings."""
-    if role_of(request.user) != ADMIN and not opens_metrics(request.headers.get("Authorization")):
+    if top_role(request.user) != ADMIN and not opens_metrics(request.headers.get("Authorization")):
         return HttpResponse(
             "Send the token of ARENA_METRICS_TOKEN.\n",
             status=401,

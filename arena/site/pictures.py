@@ -1,10 +1,10 @@
-"""How a picture goes out: private, and saying nothing about its file."""
+"""Responses with pictures: private, without their file's name."""
 
 from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest, JsonResponse
 from django.http.response import HttpResponseBase
 
-from augment.services.scenarios.pictures import WIDTHS_PX, film_document, thumbnail_of
+from augment.services.scenarios.pictures import WIDTHS_PX, film_document, shrink
 
 _KEPT = "private, max-age=31536000, immutable"
 
@@ -26,7 +26,7 @@ def picture_response(name: str) -> FileResponse:
     return response
 
 
-def shown_response(request: HttpRequest, name: str) -> HttpResponseBase:
+def send_picture(request: HttpRequest, name: str) -> HttpResponseBase:
     """The stored PNG of that name; its film where the address says `?film`, and what that needs.
 
     `?film=ground` is the picture that the film plays over.
@@ -47,8 +47,8 @@ def shown_response(request: HttpRequest, name: str) -> HttpResponseBase:
     )
 
 
-def sized_picture_response(request: HttpRequest, name: str) -> HttpResponseBase:
-    """What `shown_response` answers, or the PNG made smaller where the address says `?width=`.
+def resize_picture(request: HttpRequest, name: str) -> HttpResponseBase:
+    """What `send_picture` answers, or the PNG made smaller where the address says `?width=`.
 
     For pages of staff, who may know which pictures were made together.
 
@@ -57,7 +57,7 @@ def sized_picture_response(request: HttpRequest, name: str) -> HttpResponseBase:
     """
     width = request.GET.get("width", "")
     if not width:
-        return shown_response(request, name)
+        return send_picture(request, name)
     if width not in map(str, WIDTHS_PX):
         raise Http404
-    return picture_response(thumbnail_of(name, int(width)))
+    return picture_response(shrink(name, int(width)))

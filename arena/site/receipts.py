@@ -1,4 +1,4 @@
-"""What is sent again counts once: a POST with a key is answered once, and then as before.
+"""Receipts of POSTs: one with a key is carried out once, and answered the same way again.
 
 The key is the token of a form as it was shown, or a program's `Idempotency-Key`. A receipt stands
 before the request is carried out; who comes meanwhile waits for the answer of the first.

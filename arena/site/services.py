@@ -14,7 +14,7 @@ from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
 from arena.studies.services.experts import Complaint
 from arena.studies.services.opening import check_questions, check_seed
-from arena.studies.services.planning import rules_of
+from arena.studies.services.planning import frozen_rules
 from arena.voting.services.casting import Decision
 from augment.errors import AugmentError
 from augment.models import FAILED, Augmentation, GenerationJob, Work
@@ -39,7 +39,7 @@ def check_row(row: models.Model) -> None:
             check_seed(row.seed)
             check_questions(row.questions)
             if row.rules:  # those of imported votes have none
-                rules_of(row)
+                frozen_rules(row)
         case Matchup():
             for name in ("original_image", "left_image", "right_image"):
                 check_picture_name(name, getattr(row, name))

@@ -10,7 +10,7 @@ from arena.results.pages import boards, judges
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
 from arena.results.pages.comparison import comparison_page
-from arena.results.pages.shared import shared_file, shared_page
+from arena.results.pages.shared import send_shared, show_shared
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
 from arena.studies.pages import experts, setup, studies
@@ -64,7 +64,7 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path(f"{STUDY}/vote/", voting.vote_page, name="vote"),
     path(f"{STUDY}/vote/practice/", voting.practice_page, name="vote-practice"),
-    path(f"{STUDY}/vote/skipped/", voting.skipped_page, name="vote-skipped"),
+    path(f"{STUDY}/vote/skipped/", voting.list_skipped_pairs, name="vote-skipped"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),
     path("d/<uuid:code>", voting.replay, name="replay"),
     path(f"{STUDY}/results/", results.results_page, name="results"),
@@ -73,7 +73,7 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/results/votes.csv", results_votes.votes_file, name="results-votes-file"),
     path(
         f"{STUDY}/results/shown/<uuid:matchup>/<slug:side>.png",
-        results_votes.shown_picture,
+        results_votes.show_vote_picture,
         name="shown-picture",
     ),
     path(f"{STUDY}/results/compare/", comparison_page, name="results-compare"),
@@ -87,8 +87,8 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/rating/<slug:name>.<slug:form>", results.rating_file, name="results-export"),
     path(f"{STUDY}/rating/<uuid:rating>/share/", results.share, name="results-share"),
     path(f"{STUDY}/rating/<uuid:rating>/unshare/", results.unshare, name="results-unshare"),
-    path("shared/<str:token>/", shared_page, name="shared-results"),
-    path("shared/<str:token>/table.<slug:form>", shared_file, name="shared-file"),
+    path("shared/<str:token>/", show_shared, name="shared-results"),
+    path("shared/<str:token>/table.<slug:form>", send_shared, name="shared-file"),
     path("boards/", boards.boards_page, name="boards"),
     path("boards/<uuid:code>/", boards.board_page, name="board"),
     path("boards/<uuid:code>/export.zip", boards.board_export, name="board-export"),
@@ -97,12 +97,8 @@ urlpatterns: list[URLPattern] = [
     path("boards/<uuid:code>/share/", boards.share, {"is_shared": True}, name="board-share"),
     path("boards/<uuid:code>/unshare/", boards.share, {"is_shared": False}, name="board-unshare"),
     path("boards/<uuid:code>/<int:number>.<slug:form>", boards.board_file, name="board-file"),
-    path(f"{SHARED_BOARD}/", boards.shared_board, name="shared-board"),
-    path(
-        f"{SHARED_BOARD}/<int:number>.<slug:form>",
-        boards.shared_board_file,
-        name="shared-board-file",
-    ),
+    path(f"{SHARED_BOARD}/", boards.show_board, name="shared-board"),
+    path(f"{SHARED_BOARD}/<int:number>.<slug:form>", boards.send_table, name="shared-board-file"),
     path(f"{STUDY}/rate/", results.rate_study, name="study-rate"),
     path(f"{STUDY}/rate/<uuid:rating>/", results.compute_again, name="rating-again"),
 ]

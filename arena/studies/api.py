@@ -9,10 +9,10 @@ from rest_framework.response import Response
 
 from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
-from arena.api.views import ApiView, Given, PageQuery, operation, page_of
+from arena.api.views import ApiView, Given, PageQuery, operation, page_serializer
 from arena.models import Study
-from arena.people.queries import role_of
-from arena.studies.queries import StudyProgress, listed_studies, progress_of
+from arena.people.queries import top_role
+from arena.studies.queries import StudyProgress, count_progress, list_studies
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 
@@ -26,7 +26,7 @@ class StudyBody(StrictSerializer):
 
 
 class StudyQuery(PageQuery):
-    """Which studies."""
+    """Filter of a list of studies."""
 
     state = serializers.ChoiceField(choices=Study.State.values, required=False)
 
@@ -84,18 +84,18 @@ class StudiesView(ApiView):
 
     readers, writers = (*STAFF, *EXPERTS), ADMINS
 
-    @operation(page_of(StudyDocument), query=StudyQuery, name="listStudies")
+    @operation(page_serializer(StudyDocument), query=StudyQuery, name="listStudies")
     def get(self, given: Given) -> Response:
         """Studies, the youngest first.
 
         An expert gets their own with their own progress, staff all with everybody's.
         """
-        expert = None if role_of(self.user) in STAFF else self.user
+        expert = None if top_role(self.user) in STAFF else self.user
         return self.answer_page(
-            listed_studies(expert),
+            list_studies(expert),
             given,
             StudyDocument,
-            lines=lambda page: progress_of(page, expert),
+            lines=lambda page: count_progress(page, expert),
         )
 
     @operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
@@ -141,5 +141,5 @@ def get_study(code: uuid.UUID) -> Study:
 
 
 def _progress(study: Study) -> StudyProgress:
-    (line,) = progress_of([study])
+    (line,) = count_progress([study])
     return line

@@ -8,9 +8,9 @@ from django.contrib.auth.models import User
 
 from arena.models import Question, Study
 from arena.site.forms import ChoiceForm, form_field, offer
-from arena.studies.queries import finished_scenarios, scenario_sources
+from arena.studies.queries import list_finished, scenario_sources
 from arena.studies.services.drafts import SWITCHES
-from arena.studies.services.outlook import StudyEstimate, estimate_of
+from arena.studies.services.outlook import StudyEstimate, estimate_plan
 from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
 from augment.models import GenerationJob
 from augment.services.inputs import InputKind
@@ -44,7 +44,7 @@ class StudyForm(ChoiceForm):
         self.fields["experts"].error_messages["required"] = "Choose at least one expert."
 
     def rules(self) -> list[forms.BoundField]:
-        """Return what is entered under *Advanced*, switches last; for the template."""
+        """Return the fields under *Advanced*, switches last; for the template."""
         kinds = (InputKind.TEXT, InputKind.NAMES)
         names = [one.name for one in PLAN_INPUTS if one.kind not in kinds]
         names.remove("votes_per_expert")
@@ -62,7 +62,7 @@ class StudyForm(ChoiceForm):
         if singles or not chosen:
             return singles
         self.source_job = chosen[0].partition("job:")[2]
-        return finished_scenarios(self.cleaned_data.get("contestants", ()), chosen[0])
+        return list_finished(self.cleaned_data.get("contestants", ()), chosen[0])
 
     def clean_questions(self) -> list[str]:
         """Return the primary one, which may be ticked besides, and the others."""
@@ -84,12 +84,12 @@ class StudyForm(ChoiceForm):
         )
 
     def estimate(self) -> StudyEstimate | None:
-        """Return what is entered so far as an estimate; None while something is missing."""
+        """Return the estimate from the fields filled so far; None if one is missing."""
         self.is_valid()
-        return estimate_of(self.cleaned_data)
+        return estimate_plan(self.cleaned_data)
 
     def study_plan(self) -> StudyPlan:
-        """Return what is to be opened, once the form is valid; an empty number is 0."""
+        """Return the plan of a valid form; an empty number is 0."""
         entered: dict[str, Any] = {
             one.name: 0.0 if value is None else value
             for one in PLAN_INPUTS
@@ -103,7 +103,7 @@ class StudyForm(ChoiceForm):
 
 
 class HandOverForm(forms.Form):
-    """Whose remaining pairs go to whom."""
+    """Two experts, the second of whom takes over the first one's remaining pairs."""
 
     giver = forms.ChoiceField(error_messages={"required": "Choose whose pairs are handed over."})
     takers = forms.MultipleChoiceField(error_messages={"required": "Choose who takes over."})
@@ -115,7 +115,7 @@ class HandOverForm(forms.Form):
 
 
 class AuthorForm(forms.Form):
-    """Which expert of a study made which of its contestants."""
+    """Expert who made a contestant of the study."""
 
     expert = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))
     contestant = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))

@@ -68,7 +68,7 @@ def expert_named(study: Study, username: str) -> User:
     return expert
 
 
-def listed_studies(expert: User | None = None) -> QuerySet[Study]:
+def list_studies(expert: User | None = None) -> QuerySet[Study]:
     """Return every study, or those of one expert, without the columns that no list needs."""
     studies = Study.objects.all() if expert is None else Study.objects.filter(experts=expert)
     return studies.select_related("vote_file").defer("rules", "preregistration")
@@ -76,12 +76,12 @@ def listed_studies(expert: User | None = None) -> QuerySet[Study]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyProgress(VotingProgress):
-    """How many matchups of a study have a vote."""
+    """Number of a study's matchups with a vote."""
 
     study: Study
 
 
-def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[StudyProgress]:
+def count_progress(studies: Iterable[Study], expert: User | None = None) -> list[StudyProgress]:
     """Count some studies in their order, over all experts or for one; two queries."""
     studies = list(studies)
     matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
@@ -104,15 +104,15 @@ def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[St
     ]
 
 
-def reports_of(study: Study) -> QuerySet[Report]:
-    """Return what experts reported, the youngest first."""
+def list_reports(study: Study) -> QuerySet[Report]:
+    """Return the reports of experts, the youngest first."""
     reports = Report.objects.filter(matchup__study=study).order_by("-at", "-pk")
     return reports.select_related("expert__person", "matchup__scenario").defer(
         "matchup__scenario__reference"
     )
 
 
-def authorships_of(study: Study) -> list[Authorship]:
+def list_authorships(study: Study) -> list[Authorship]:
     """Return every mark of a study with its people and contestants, by pseudonym."""
     rows = study.authorships.select_related("expert__person", "contestant", "marked_by__person")
     return sorted(
@@ -120,7 +120,7 @@ def authorships_of(study: Study) -> list[Authorship]:
     )
 
 
-def authors_of(study: Study) -> frozenset[tuple[str, str]]:
+def author_pairs(study: Study) -> frozenset[tuple[str, str]]:
     """Return an expert's code with a contestant's slug for every mark of a study."""
     rows = study.authorships.order_by().values_list("expert__person__code", "contestant__slug")
     return frozenset((str(code), slug) for code, slug in rows)
@@ -132,14 +132,14 @@ FINISHED = "finished"
 """The source of a study's scenarios that most take: whatever is there."""
 
 
-def offered_contestants() -> QuerySet[Contestant]:
+def list_offered() -> QuerySet[Contestant]:
     """Return whom a study can be of."""
     return Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
 
 
 def latest_contestants() -> list[str]:
     """Return the offered contestants of the latest job that has pictures of any."""
-    made = _pictured().filter(contestant__in=offered_contestants())
+    made = _with_pictures().filter(contestant__in=list_offered())
     latest = made.order_by("-job__created_at").values("job")[:1]
     return sorted(set(made.filter(job=latest).values_list("contestant__slug", flat=True)))
 
@@ -156,9 +156,9 @@ def scenario_sources(jobs: Iterable[GenerationJob]) -> dict[str, str]:
     return {FINISHED: "All that are finished", **sets, **own, **splits, **of_jobs}
 
 
-def finished_scenarios(contestants: Collection[str], source: str) -> list[str]:
+def list_finished(contestants: Collection[str], source: str) -> list[str]:
     """Return the scenarios of a source of which each of the contestants has a picture."""
-    rows = _pictured().filter(contestant__slug__in=contestants)
+    rows = _with_pictures().filter(contestant__slug__in=contestants)
     kind, _, name = source.partition(":")
     if kind == "job":
         rows = rows.filter(job__code=name)
@@ -174,7 +174,7 @@ def finished_scenarios(contestants: Collection[str], source: str) -> list[str]:
     return [slug for slug, _ in finished]
 
 
-def _pictured() -> QuerySet[Augmentation]:
+def _with_pictures() -> QuerySet[Augmentation]:
     return Augmentation.objects.filter(state__in=Augmentation.SHOWABLE).exclude(image="")
 
 
@@ -187,12 +187,12 @@ def find_drafts(search: str = "") -> QuerySet[StudyDraft]:
     return drafts.filter(entered__name__icontains=search) if search else drafts
 
 
-def missing_of(draft: StudyDraft) -> list[str]:
+def find_missing(draft: StudyDraft) -> list[str]:
     """Return the names that the draft chooses and nobody could choose now."""
     jobs = GenerationJob.objects.only("code", "name")
     scenarios = Scenario.objects.values_list("slug", flat=True)
     choices = {
-        "contestants": set(offered_contestants().values_list("slug", flat=True)),
+        "contestants": set(list_offered().values_list("slug", flat=True)),
         "experts": {user.username for user in experts()},
         "scenarios": {*scenarios, *scenario_sources(jobs)},
         "jobs": {str(job.code) for job in jobs},
@@ -258,7 +258,7 @@ Voters = QuerySet[Any]
 """Of EnrolledVoter, with what is counted about each."""
 
 
-def enrolled_voters(study: Study) -> Voters:
+def list_voters(study: Study) -> Voters:
     """Return everybody who ever took a place in a study; one query.
 
     Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well),
@@ -286,7 +286,7 @@ def enrolled_voters(study: Study) -> Voters:
 
 def find_unfinished(study: Study) -> Voters:
     """Return who has a place and pairs without an answer."""
-    return enrolled_voters(study).filter(dropped_at=None, answered__lt=F("planned"))
+    return list_voters(study).filter(dropped_at=None, answered__lt=F("planned"))
 
 
 def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
@@ -302,7 +302,7 @@ def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
 def state_of(enrolment: Enrolment) -> dict[str, int]:
     """Count places, and what became of them."""
     is_in = Q(dropped_at=None)
-    state: dict[str, int] = enrolled_voters(enrolment.study).aggregate(
+    state: dict[str, int] = list_voters(enrolment.study).aggregate(
         taken=Count("pk", filter=is_in),
         done=Count("pk", filter=Q(is_done=True)),
         dropped=Count("pk", filter=~is_in),

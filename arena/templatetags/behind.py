@@ -51,7 +51,7 @@ def behind(
 
 @register.simple_tag
 def details_of(event: Event, names: Mapping[str, str] | None = None) -> str:
-    """Return what an event changed, as it was and as it is.
+    """Return an event's changes, with old and new values.
 
     Args:
         event: Of the log.

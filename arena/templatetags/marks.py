@@ -40,7 +40,7 @@ _ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """How a state looks: the tone's class, the icon's template, the word."""
+    """Look of a state: the tone's class, the icon's template, the word."""
 
     tone: str
     icon: str
@@ -55,7 +55,7 @@ def mark(row: Augmentation | GenerationJob | Study) -> Mark:
 
 @register.filter
 def has_film(picture: str) -> bool:
-    """Whether the picture of that name has a film."""
+    """Return whether the picture of that name has a film."""
     return bool(film_name(picture))
 
 
@@ -141,7 +141,7 @@ V = TypeVar("V")
 
 @register.filter
 def at(table: Mapping[K, V], key: K) -> V | None:
-    """What the table holds under a key, None if nothing."""
+    """Return the table's value under a key, None if there is none."""
     return table.get(key)
 
 

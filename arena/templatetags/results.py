@@ -62,7 +62,7 @@ _LABELS: dict[str, dict[str, str]] = {
 
 
 def label_of(kind: str, word: str) -> str:
-    """What a word is called; one that is not known is called by itself."""
+    """Return the label of a word; an unknown one is its own label."""
     return _LABELS[kind].get(word, word)
 
 
@@ -90,7 +90,7 @@ def counted(number: int, forms: str) -> str:
 
 @register.filter
 def aid_labels(aids: str) -> str:
-    """What an expert looked with."""
+    """Return the labels of the aids that an expert used."""
     return ", ".join(str(AID_LABELS.get(name, name)) for name in aids.split())
 
 

@@ -9,7 +9,7 @@ from django.urls import reverse
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from arena.people.queries import profile_of
+from arena.people.queries import frame_profile
 
 register = template.Library()
 
@@ -44,7 +44,7 @@ def shell(context: Context) -> dict[str, Any]:
     """Return profile and navigation of whoever made the request."""
     request: HttpRequest | None = context.get("request")
     user = getattr(request, "user", None)
-    profile = profile_of(user) if user is not None else None
+    profile = frame_profile(user) if user is not None else None
     if request is None or profile is None or profile.role is None:
         return {"profile": profile, "links": []}
     match = request.resolver_match

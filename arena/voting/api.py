@@ -1,4 +1,4 @@
-"""What an expert does: pairs, their pictures, votes, reports and preferences."""
+"""Operations of an expert: pairs, their pictures, votes, reports and preferences."""
 
 from typing import Any
 
@@ -37,7 +37,7 @@ AHEAD, MOST = 4, 12
 
 
 class MatchupsQuery(StrictSerializer):
-    """Which study, and how many pairs at most."""
+    """Study, and largest number of pairs."""
 
     study = serializers.UUIDField()
     n = serializers.IntegerField(min_value=1, max_value=MOST, default=AHEAD)
@@ -128,7 +128,7 @@ class SavedDocument(serializers.Serializer[Any]):
 
 
 class PreferencesBody(StrictSerializer):
-    """What changes; missing fields stay."""
+    """Changed preferences; missing fields stay."""
 
     def get_fields(self) -> dict[str, Field]:
         """Return a field for every switch."""

@@ -14,13 +14,13 @@ from django.views.decorators.cache import never_cache
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Study, Vote
-from arena.site.access import ADMIN, EXPERT, form_for, page_for, user_of
-from arena.site.pictures import shown_response
+from arena.site.access import ADMIN, EXPERT, form_for, get_user, page_for
+from arena.site.pictures import send_picture
 from arena.studies.services.experts import answer_practice, is_due, practice_pairs, skip_practice
 from arena.voting.queries.ballots import own_votes
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import drives_of_pair, picture_shown
-from arena.voting.screen import over_context, vote_context
+from arena.voting.screen import no_pair_context, vote_context
 
 View = Callable[..., HttpResponseBase]
 
@@ -42,38 +42,38 @@ def strangers_find_nothing(view: View) -> View:
 @never_cache
 def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next pair, or with `change` one that was decided; votes go to the API."""
-    expert, study = user_of(request), _study_of(request, code)
+    expert, study = get_user(request), _find_study(request, code)
     if study.state != Study.State.OPEN:
-        return render(request, "vote/closed.html", over_context(study, expert))
+        return render(request, "vote/closed.html", no_pair_context(study, expert))
     if is_due(study, expert):
         return redirect("vote-practice", code=study.code)
     context = vote_context(study, expert, change=request.GET.get("change", ""))
     if context is None:
-        return render(request, "vote/done.html", over_context(study, expert))
+        return render(request, "vote/done.html", no_pair_context(study, expert))
     return render(request, "vote/vote.html", context)
 
 
 @page_for(EXPERT)
 @never_cache
-def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+def list_skipped_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The pairs that the expert skipped: each can be looked at again and voted on."""
-    expert, study = user_of(request), _study_of(request, code)
+    expert, study = get_user(request), _find_study(request, code)
     skips = own_votes(study, expert).filter(outcome=Vote.Outcome.SKIP)
-    return render(request, "vote/skipped.html", over_context(study, expert) | {"skips": skips})
+    return render(request, "vote/skipped.html", no_pair_context(study, expert) | {"skips": skips})
 
 
 @page_for(EXPERT, ADMIN)
 @strangers_find_nothing
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     """One side of a matchup or its film, by a token that says nothing."""
-    return shown_response(request, picture_shown(user=user_of(request), token=token))
+    return send_picture(request, picture_shown(user=get_user(request), token=token))
 
 
 @page_for(EXPERT, ADMIN)
 @strangers_find_nothing
 def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """How a planner drove both scenes of a pair, for the script that plays it."""
-    drives = drives_of_pair(user=user_of(request), code=code)
+    """Return a planner's drives of both scenes of a pair, for the script that plays them."""
+    drives = drives_of_pair(user=get_user(request), code=code)
     if drives is None:
         raise Http404
     return JsonResponse(drives, headers={"Cache-Control": "private, no-store"})
@@ -83,7 +83,7 @@ def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @never_cache
 def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next pair to practise on, or with `pair` what was right of one that was answered."""
-    expert, study = user_of(request), _study_of(request, code)
+    expert, study = get_user(request), _find_study(request, code)
     if request.method == "POST":
         return _practise(request, study)
     pairs = practice_pairs(study, expert)
@@ -92,7 +92,7 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     pair = answered or next((pair for pair in pairs if not pair.answer), None)
     if study.state != Study.State.OPEN or pair is None:
         return redirect("vote", code=code)
-    context = over_context(study, expert) | {
+    context = no_pair_context(study, expert) | {
         "pair": pair,
         "pairs": len(pairs),
         "preferences": {**voting_switches(expert), "keys": KEYS},
@@ -103,7 +103,7 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _practise(request: HttpRequest, study: Study) -> HttpResponse:
-    expert, given = user_of(request), request.POST
+    expert, given = get_user(request), request.POST
     page = reverse("vote-practice", args=[study.code])
     # Practice asks which picture is right; neither is as wrong as equal.
     answer = "equal" if given.get("outcome") == "both_miss" else given.get("outcome")
@@ -122,5 +122,5 @@ def _practise(request: HttpRequest, study: Study) -> HttpResponse:
     return redirect(f"{page}?pair={pair.position}")
 
 
-def _study_of(request: HttpRequest, code: uuid.UUID) -> Study:
-    return get_object_or_404(user_of(request).studies, code=code)
+def _find_study(request: HttpRequest, code: uuid.UUID) -> Study:
+    return get_object_or_404(get_user(request).studies, code=code)

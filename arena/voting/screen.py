@@ -1,4 +1,4 @@
-"""What the voting page shows and what its script is given."""
+"""Content of the voting page, and the data of its script."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
-from arena.studies.queries import enrolled_voters
+from arena.studies.queries import list_voters
 from arena.studies.services.experts import SIDES
 from arena.voting.queries.ballots import own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
@@ -44,7 +44,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             the next pair.
     """
     pairs = [as_shown(matchup) for matchup in upcoming(study=study, expert=expert, n=AHEAD)]
-    context = over_context(study, expert) | _asked(study)
+    context = no_pair_context(study, expert) | _describe_questions(study)
     changed = _vote_of_key(study, expert, change)
     if not pairs and changed is None:
         return None
@@ -83,7 +83,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "change": changed,
             "allow_both_miss": study.allow_both_miss,
             "rings": has["rings"],
-            "today": _seen_today(study, expert),
+            "today": _times_today(study, expert),
             "ask_strength": study.ask_strength,
             "preferences": {**switches, "keys": keys},
             "saved": progress.voted,
@@ -92,20 +92,20 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     }
 
 
-def over_context(study: Study, expert: User) -> dict[str, Any]:
-    """Return what the pages without a pair show."""
+def no_pair_context(study: Study, expert: User) -> dict[str, Any]:
+    """Return the context of the pages without a pair."""
     is_open = study.state == Study.State.OPEN
     undoable = UNDOABLE * len(study.questions)
     return {
         "study": study,
         "progress": voting_progress(study=study, expert=expert),
         "last": list(own_votes(study, expert).reverse()[:undoable]) if is_open else [],
-        "enrolled": enrolled_voters(study).filter(expert=expert).first(),
+        "enrolled": list_voters(study).filter(expert=expert).first(),
     }
 
 
 def _has(study: Study) -> dict[str, bool]:
-    """Which of the keys there are that not every study has: nothing tells of the others."""
+    """Return whether the study has each optional key: nothing tells of absent ones."""
     is_filmed = study.matchups.filter(left_image__contains="-film/").exists()
     return {
         **dict.fromkeys(("play", "back", "on", "rate"), is_filmed),
@@ -115,8 +115,8 @@ def _has(study: Study) -> dict[str, bool]:
     }
 
 
-def _asked(study: Study) -> dict[str, Any]:
-    """What is asked about each pair, as a voter reads it."""
+def _describe_questions(study: Study) -> dict[str, Any]:
+    """Return the questions about each pair, as a voter reads them."""
     questions = {key: str(Question(key).label) for key in study.questions}
     by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
     return {
@@ -127,8 +127,8 @@ def _asked(study: Study) -> dict[str, Any]:
     }
 
 
-def _seen_today(study: Study, expert: User) -> list[int | None]:
-    """How long each pair was on the screen that the expert decided today, in ms."""
+def _times_today(study: Study, expert: User) -> list[int | None]:
+    """Return the time on screen in ms of each pair that the expert decided today."""
     votes = own_votes(study, expert).filter(at__date=timezone.localdate())
     ends = votes.filter(Q(question=study.questions[-1]) | Q(outcome=Vote.Outcome.SKIP))
     return list(ends.values_list("ms_visible", flat=True))

@@ -36,7 +36,7 @@ _NO_VEHICLES = (wish.Body.BICYCLE, wish.Body.BARRIER, wish.Body.CONSTRUCTION_SIG
 
 
 class Direction(IntEnum):
-    """Which way it faces against the ego, to 45 degrees."""
+    """Heading relative to the ego, to 45 degrees."""
 
     SAME = 0
     OPPOSITE = 1
@@ -66,19 +66,19 @@ class Code:
         return 0.0 if self.speed_bin is None else (self.speed_bin + 0.5) * SPEED_BIN_MPS
 
 
-def code_of(agent: TrafficAgent) -> Code:
+def quantise(agent: TrafficAgent) -> Code:
     """Return what is left of a vehicle."""
-    ahead, left, bins = _cells_of(np.array([[agent.x_m, agent.y_m]]))
+    ahead, left, bins = _find_cells(np.array([[agent.x_m, agent.y_m]]))
     return Code(
         is_ahead=bool(ahead[0]),
         is_left=bool(left[0]),
         distance_bin=int(bins[0]),
-        direction=_direction_of(agent.heading_rad),
+        direction=_direction(agent.heading_rad),
         speed_bin=int(agent.speed_mps / SPEED_BIN_MPS) if agent.speed_mps > 0.0 else None,
     )
 
 
-def _cells_of(
+def _find_cells(
     points_m: NDArray[np.float64],
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Return which points (P, 2) are ahead, which to the left, and their bins up to 72 m, (P,)."""
@@ -86,7 +86,7 @@ def _cells_of(
     return points_m[:, 0] > 0.0, points_m[:, 1] > _LEFT_FROM_M, away_m // BIN_M
 
 
-def _direction_of(heading_rad: float) -> Direction:
+def _direction(heading_rad: float) -> Direction:
     turn_rad = difference(heading_rad, 0.0)
     if abs(turn_rad) < math.radians(45.0):
         return Direction.SAME
@@ -121,7 +121,7 @@ def place(scene: Scene, intent: wish.Intent | None, *, seed: int = 0) -> rule_pl
     added: list[TrafficAgent] = []
     notes = []
     for agent in right.changed:
-        drawn = places.draw(code_of(agent), [*standing, *added], rng)
+        drawn = places.draw(quantise(agent), [*standing, *added], rng)
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
@@ -179,11 +179,11 @@ class _Places:
         Until some place is left, its side is given up, its direction, both, all but the bin, and
         in the end the bin, of which the nearest with a lane counts.
         """
-        ahead, left, bins = _cells_of(self._points)
+        ahead, left, bins = _find_cells(self._points)
         gaps = np.abs(bins - code.distance_bin)
         same_end = (gaps == 0) & (ahead == code.is_ahead)
         in_quadrant = same_end & (left == code.is_left)
-        facing = np.array([_direction_of(rad) is code.direction for rad in self._headings])
+        facing = np.array([_direction(rad) is code.direction for rad in self._headings])
         choices = (in_quadrant & facing, same_end & facing, in_quadrant, same_end)
         return next(
             (np.flatnonzero(choice) for choice in choices if choice.any()),

@@ -1,4 +1,4 @@
-"""What the rule placer makes of the motion that is asked for: its numbers, places and doors."""
+"""Rule placer for motions: numbers, places and doors of the requested motion."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def give_motion(
         CannotPlace: The scene has not what it needs.
     """
     numbers = presets.PresetNumbers(start=_trigger(wish.start, ground.lanes, rng))
-    for name in presets.numbers_of(wish.preset):
+    for name in presets.preset_numbers(wish.preset):
         if (amount := getattr(wish, name)) is not None:
             numbers = replace(numbers, **{name: round(amount.drawn(rng), 2)})
     mover = presets.with_preset(wish.preset, ground.scene, agent, numbers)

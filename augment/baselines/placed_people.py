@@ -168,7 +168,7 @@ def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> lis
 
 
 def _worker(request: ConesRequest, ground: PlacingGround, places: list[Place]) -> Place:
-    """Where the worker stands: as said, else where people stand at such a shape."""
+    """Return the worker's place: the requested one, else the usual one at such a shape."""
     (first_s, first_d), (last_s, last_d) = places[0], places[-1]
     if request.shape is Shape.RING:
         return sum(s for s, _ in places) / len(places), 0.0

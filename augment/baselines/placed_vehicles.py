@@ -61,13 +61,13 @@ _ASIDE_RAD = tuple(math.radians(sign * 8.0 * step) for step in range(6) for sign
 _COST_OF_TURN = 0.5
 
 
-def _type_of(body: Body) -> AgentType:
+def _agent_type(body: Body) -> AgentType:
     return AgentType.__members__.get(body.name, AgentType.VEHICLE)
 
 
 def _size_m(body: Body) -> tuple[float, float]:
     """Return length and width."""
-    return _SIZES_M.get(body) or LENGTH_WIDTH_M[_type_of(body)]
+    return _SIZES_M.get(body) or LENGTH_WIDTH_M[_agent_type(body)]
 
 
 def place_vehicles(
@@ -83,7 +83,7 @@ def place_vehicles(
         assert wish is not None
         speed_mps = request.speed_mps or 0.0
         pose, lane_id = find_arm(ground, wish.side, speed_mps, nearer_m=distance_m)
-        one = build_agent(_type_of(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
+        one = build_agent(_agent_type(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
         return (give_motion(wish, ground, one, rng),)
     apart_m = _size_m(body)[0] + BUMPER_GAP_M
     if request.spacing is not None:
@@ -96,7 +96,7 @@ def place_vehicles(
         place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
         on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
         agent = build_agent(
-            _type_of(body),
+            _agent_type(body),
             place.pose.turned(turn_rad),
             place.lane_id if on_lane else None,
             _size_m(body),
@@ -109,7 +109,7 @@ def place_vehicles(
 def _offset_m(
     request: VehicleRequest, ground: PlacingGround, place: LanePosition, rng: np.random.Generator
 ) -> float:
-    """How far left of the lane's own direction (right is negative) the box stands."""
+    """Return the box's offset to the left of the lane's direction (right is negative), in m."""
     lateral = request.spot.lateral
     if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
         return 0.0
@@ -156,10 +156,10 @@ def place_crash(
             at the distance asked for they would stand in each other.
     """
     if request.others:
-        poses = _chained(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
+        poses = _chain_poses(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
     else:
         poses = _in_a_row(request, ground, distance_m, _LOOSER[arrangement])
-    kind = _type_of(request.body)
+    kind = _agent_type(request.body)
     size_m = _size_m(request.body)
     return tuple(build_agent(kind, pose, ground.lane_at(pose), size_m) for pose in poses)
 
@@ -186,7 +186,7 @@ def _in_a_row(
     return poses
 
 
-def _chained(
+def _chain_poses(
     request: CrashRequest,
     ground: PlacingGround,
     distance_m: float,
@@ -248,7 +248,7 @@ def _choices(
             return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
         pose = pose_at(_touching_m(body, before, pose_at) if gap_m is None else gap_m)
-        shared = max(_shared(body, pose, one) for one in poses)
+        shared = max(_shared_area(body, pose, one) for one in poses)
         off_lane = 0.0 if other.turn_deg is None else abs(wrap(heading_rad - lane_rad))
         cost = abs(aside_rad) + 10.0 * shared + _COST_OF_TURN * min(off_lane, math.pi - off_lane)
         if shared <= _MOST_SHARED:
@@ -260,11 +260,11 @@ def _touching_m(body: Body, before: Pose, pose_at: Callable[[float], Pose]) -> f
     low_m, high_m = 0.0, 2.0 * math.hypot(*_size_m(body))
     while high_m - low_m > 0.01:
         middle_m = (low_m + high_m) / 2.0
-        touches = _shared(body, before, pose_at(middle_m)) > 0.0
+        touches = _shared_area(body, before, pose_at(middle_m)) > 0.0
         low_m, high_m = (middle_m, high_m) if touches else (low_m, middle_m)
     return high_m + _CRASH_GAP_M
 
 
-def _shared(body: Body, one: Pose, other: Pose) -> float:
+def _shared_area(body: Body, one: Pose, other: Pose) -> float:
     """Return the share of a box that two of that kind have in common."""
     return overlap(_box(body, one), _box(body, other)).share_of_first

@@ -43,7 +43,7 @@ _Agents = tuple[TrafficAgent, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """What was placed.
+    """Objects that were placed.
 
     Attributes:
         notes: What stands where, for a page.
@@ -86,19 +86,19 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
     named: dict[str, _Agents] = {}
     for asked, added in zip(intent.requests, resolved.requests, strict=True):
-        car = _car_of(asked, lanes, named) if isinstance(asked, intents.DoorRequest) else None
+        car = _make_car(asked, lanes, named) if isinstance(asked, intents.DoorRequest) else None
         agents, sentence = fitting.fit(added, car)
         named[asked.name] = agents
         fitting.added += agents
         sentences.append(sentence)
     if intent.beyond:
         sentences.append(f"Not placed, for no field holds it: {', '.join(intent.beyond)}.")
-    changes = replace(changes, added=_numbered(fitting.added, scene))
+    changes = replace(changes, added=_number_agents(fitting.added, scene))
     return Placement(modification=changes, notes=" ".join(sentences))
 
 
 def list_open(request: intents.Request) -> list[str]:
-    """Return what a request leaves open without which nothing can be placed, a sentence each."""
+    """Return one sentence for each missing value without which nothing can be placed."""
     if isinstance(request, intents.DoorRequest):
         return []
     who, field, what = _NEEDS[type(request)]
@@ -178,7 +178,7 @@ class _Fitting:
     ) -> _Agents:
         wish: MotionWish | None = getattr(request, "motion", None)
         if of is not None and wish is not None:
-            return (_rounded(give_motion(wish, self._place, of, rng)),)
+            return (_round(give_motion(wish, self._place, of, rng)),)
         match request:
             case intents.VehicleRequest():
                 agents = place_vehicles(request, self._place, distance_m, rng)
@@ -190,7 +190,7 @@ class _Fitting:
                 agents = place_crash(request, self._place, distance_m, rng, arrangement)
             case intents.DoorRequest():
                 raise AssertionError("a door is of somebody")
-        return tuple(map(_rounded, agents))
+        return tuple(map(_round, agents))
 
     def _judge(
         self, request: intents.Request, distance_m: float, agents: _Agents
@@ -204,7 +204,7 @@ class _Fitting:
                 name = "the ego" if other is self._scene.ego else other.id or "what was added"
                 where = f"{abs(distance_m):.1f} m from the ego it" if distance_m else "It"
                 return f"{where} would stand in {name}.", 0
-        everyone = _numbered((*self.added, *agents), self._scene)
+        everyone = _number_agents((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
         if before:
@@ -226,7 +226,7 @@ def _as_request(move: intents.Move, agent: TrafficAgent) -> intents.Request:
     )
 
 
-def _car_of(
+def _make_car(
     request: intents.DoorRequest, lanes: LanesAcross, named: Mapping[str, _Agents]
 ) -> TrafficAgent:
     if request.spot.landmark is not None:
@@ -234,7 +234,7 @@ def _car_of(
     return named[request.spot.anchor or ""][0]
 
 
-def _numbered(agents: _Agents, scene: Scene) -> _Agents:
+def _number_agents(agents: _Agents, scene: Scene) -> _Agents:
     """Return the agents with the ids that follow the highest AgentN of the scene."""
     names = [agent.id.removeprefix("Agent") for agent in scene.everyone]
     first = max((int(name) for name in names if name.isdecimal()), default=0) + 1
@@ -250,7 +250,7 @@ def _shifts(wanted: intents.Length) -> list[float]:
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
 
 
-def _rounded(agent: TrafficAgent) -> TrafficAgent:
+def _round(agent: TrafficAgent) -> TrafficAgent:
     """Keep millimetres, and no digits that the arithmetic alone made up."""
     x_m, y_m, *end = (
         round(value, 3) + 0.0  # + 0.0 makes -0.0 a plain zero

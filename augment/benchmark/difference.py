@@ -52,7 +52,7 @@ class SourceView:
 def find_difference(
     before: Scene, after: Scene, view: SourceView | None = None
 ) -> tuple[Modification, tuple[str, ...]]:
-    """Return what turns a scene into another, and notes on what was assumed.
+    """Return the modification that turns one scene into the other, and notes on assumptions.
 
     Args:
         before: The source.
@@ -80,7 +80,7 @@ def find_difference(
             added.append(replace(agent, id=next(fresh)) if is_taken else agent)
         else:
             rounding = _EXACT if is_own else 1.0
-            state = _changed_state(here[name], view.agents[name], agent, rounding)
+            state = _merge_state(here[name], view.agents[name], agent, rounding)
             if state is not here[name]:
                 moved.append(replace(agent, id=name) if is_own else state)
     return Modification(
@@ -98,7 +98,7 @@ def number_added(scene: Scene, modification: Modification) -> Modification:
     fresh = _free_ids({agent.id for agent in scene.everyone})
     names = {agent.id: next(fresh) for agent in modification.added}
     added, moved = (
-        tuple(_renamed(agent, names) for agent in agents)
+        tuple(_rename(agent, names) for agent in agents)
         for agents in (modification.added, modification.moved)
     )
     return replace(modification, added=added, moved=moved)
@@ -107,7 +107,7 @@ def number_added(scene: Scene, modification: Modification) -> Modification:
 # Private
 
 
-def _renamed(agent: TrafficAgent, names: Mapping[str, str]) -> TrafficAgent:
+def _rename(agent: TrafficAgent, names: Mapping[str, str]) -> TrafficAgent:
     """The agent by its new name, and so whom its motion waits for."""
     motion = agent.motion
     if motion is not None and isinstance(motion.start, AtPlace):
@@ -125,7 +125,7 @@ def _align(before: Scene, after: Scene, view: SourceView) -> tuple[list[TrafficA
         seen = origins[0].pose.pose_to_local(after.origin.pose)
         away_m = float(np.hypot(seen.x_m, seen.y_m))
         if away_m > NEAR_M or abs(seen.heading_rad) > NEAR_RAD:
-            agents = [_seen_from(agent, seen) for agent in agents]
+            agents = [_view_from(agent, seen) for agent in agents]
             notes.append(
                 f"Its ego stands {away_m:.2f} m from the source's; all others were brought into "
                 "the source's frame, and the ego stays."
@@ -141,7 +141,7 @@ def _is_zero(pose: frames.Pose) -> bool:
     return max(abs(pose.x_m), abs(pose.y_m)) <= NEAR_M and abs(pose.heading_rad) <= NEAR_RAD
 
 
-def _seen_from(agent: TrafficAgent, seen: frames.Pose) -> TrafficAgent:
+def _view_from(agent: TrafficAgent, seen: frames.Pose) -> TrafficAgent:
     """An agent told from the pose, in the frame that the pose is told in."""
 
     def placed(*points: Point) -> tuple[Point, ...]:
@@ -190,7 +190,7 @@ def _pair(view: SourceView, agents: list[TrafficAgent]) -> tuple[dict[str, str],
 
 
 def _is_like(one: TrafficAgent, other: TrafficAgent) -> bool:
-    """Whether class and box are those of one agent."""
+    """Return whether class and box are those of one agent."""
     sizes_m = (one.length_m - other.length_m, one.width_m - other.width_m)
     is_same_size = max(map(abs, sizes_m)) <= SAME_BOX_M
     return is_same_size and CLASS_OF[one.type] is CLASS_OF[other.type]
@@ -223,12 +223,12 @@ def _difference(
     rest: list[TrafficAgent],
     values: Callable[[TrafficAgent], tuple[float, float]],
 ) -> FloatArray:
-    """Of two values of each agent, (2, S, C)."""
+    """Return the difference of two values of each agent, (2, S, C)."""
     ours, theirs = (np.array([values(one) for one in some]) for some in (left, rest))
     return np.asarray((ours[:, None] - theirs[None]).transpose(2, 0, 1))
 
 
-def _changed_state(
+def _merge_state(
     source: TrafficAgent, shown: TrafficAgent, agent: TrafficAgent, rounding: float
 ) -> TrafficAgent:
     """The source's agent with what differs from how its format shows it, itself for nothing."""

@@ -100,9 +100,9 @@ def checksum(benchmark: BenchmarkSet) -> str:
 
     Files of other tools' formats are made of that and count no further.
     """
-    digest = hashlib.sha256(_canonical(_CODEC.dump(_manifest_of(benchmark))))
+    digest = hashlib.sha256(_canonical(_CODEC.dump(_make_manifest(benchmark))))
     for task in benchmark.tasks:
-        for kind, document in _documents_of(task).items():
+        for kind, document in _task_documents(task).items():
             digest.update(_canonical([task.name, kind, document]))
     return digest.hexdigest()
 
@@ -116,11 +116,11 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     named: dict[str, dict[str, tuple[str, ...]]] = {}
     for task in benchmark.tasks:
-        documents = _documents_of(task)
-        files |= {_file_of(kind, task.name): _text(one) for kind, one in documents.items()}
-        named[task.name] = {kind: (_file_of(kind, task.name),) for kind in documents}
+        documents = _task_documents(task)
+        files |= {_file_name(kind, task.name): _text(one) for kind, one in documents.items()}
+        named[task.name] = {kind: (_file_name(kind, task.name),) for kind in documents}
     losses: list[dict[str, Any]] = []
-    cells = [replace(cell_of(task), made_on=benchmark.made_on) for task in benchmark.tasks]
+    cells = [replace(task_cell(task), made_on=benchmark.made_on) for task in benchmark.tasks]
     for form in FORMATS:
         written = writer_named(form)(cells)
         files |= {f"{form}/{name}": content for name, content in written.files.items()}
@@ -130,7 +130,7 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
         for is_refused, those in ((False, written.losses), (True, written.refused)):
             kind = {"format": form, "is_refused": is_refused}
             losses += [kind | asdict(loss) for loss in those]
-    manifest = _manifest_of(benchmark)
+    manifest = _make_manifest(benchmark)
     lines = tuple(replace(line, files=named[line.name]) for line in manifest.tasks)
     manifest = replace(manifest, checksum=checksum(benchmark), tasks=lines)
     files[MANIFEST] = _text(_CODEC.to_document(manifest), indent=1)
@@ -174,7 +174,7 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         raise InvalidDocument(WHAT, [(f"{at}: files", f"{text} if there is one")])
     documents: dict[str, Any] = {}
     for kind in given:
-        name = _file_of(kind, line.name)
+        name = _file_name(kind, line.name)
         if line.files[kind] != (name,):
             raise InvalidDocument(WHAT, [(f"{at}: files.{kind}", f"expected {name!r} alone")])
         documents[kind] = _read(folder, name, _PARSERS[kind])
@@ -188,7 +188,7 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         scene=documents[SCENE],
         recording=documents.get(RECORDING),
         reference=documents.get(REFERENCE),
-        **_said_of(line),
+        **_describe_task(line),
     )
 
 
@@ -200,7 +200,7 @@ _PARSERS: dict[str, Any] = {
 
 
 def _read(folder: Path, name: str, parse: Callable[[object], Read]) -> Read:
-    """Return what a plain file holds that lies in the folder itself."""
+    """Return the content of a plain file in the folder itself."""
     file = folder / name
     is_inside = file.parent.resolve() == folder.resolve() / Path(name).parent
     if not is_inside or file.is_symlink() or not file.is_file():
@@ -218,11 +218,11 @@ def _read(folder: Path, name: str, parse: Callable[[object], Read]) -> Read:
 # What both share
 
 
-def _file_of(kind: str, name: str) -> str:
+def _file_name(kind: str, name: str) -> str:
     return f"{kind}s/{name}.json"
 
 
-def _documents_of(task: BenchmarkTask) -> dict[str, Any]:
+def _task_documents(task: BenchmarkTask) -> dict[str, Any]:
     """Return the own documents of a task that are handed out, by their kinds."""
     documents = {SCENE: codec.scene_to_document(task.scene)}
     if task.recording is not None:
@@ -235,7 +235,7 @@ def _documents_of(task: BenchmarkTask) -> dict[str, Any]:
     return documents
 
 
-def _manifest_of(benchmark: BenchmarkSet) -> _Manifest:
+def _make_manifest(benchmark: BenchmarkSet) -> _Manifest:
     """Return `benchmark.json` without the names of files and without the checksum."""
     return _Manifest(
         name=benchmark.name,
@@ -244,19 +244,19 @@ def _manifest_of(benchmark: BenchmarkSet) -> _Manifest:
         made_on=benchmark.made_on,
         checksum="",
         tasks=tuple(
-            _TaskLine(provenance=task.scene.provenance, files={}, **_said_of(task))
+            _TaskLine(provenance=task.scene.provenance, files={}, **_describe_task(task))
             for task in benchmark.tasks
         ),
     )
 
 
-def _said_of(one: BenchmarkTask | _TaskLine) -> dict[str, Any]:
-    """Return what a task and its line in `benchmark.json` have in common."""
+def _describe_task(one: BenchmarkTask | _TaskLine) -> dict[str, Any]:
+    """Return the fields that a task shares with its line in `benchmark.json`."""
     names = ("name", "instruction", "type", "language", "split", "stratum", "keeps_traffic")
     return {name: getattr(one, name) for name in (*names, "paraphrase_of")}
 
 
-def cell_of(task: BenchmarkTask) -> Cell:
+def task_cell(task: BenchmarkTask) -> Cell:
     """Return the scene of a task as writers take it, before anybody changes it."""
     return Cell(
         name=task.name,

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from augment.benchmark.difference import SourceView
-from augment.benchmark.folder import cell_of
+from augment.benchmark.folder import task_cell
 from augment.benchmark.submitted_file import FileContent
 from augment.benchmark.values import BenchmarkTask
 from augment.formats.commonroad.writer import names_in
-from augment.formats.readers import reader_of
+from augment.formats.readers import find_reader
 from augment.formats.roads import RADIUS_M
 from augment.formats.writers import writer_named
 
@@ -46,14 +46,14 @@ def show_source(task: BenchmarkTask, format_name: str) -> ShownSource:
     suffix = _SUFFIXES.get(format_name)
     if suffix is None:
         return ShownSource(view=plain)
-    written = writer_named(format_name)([cell_of(task)]).files
+    written = writer_named(format_name)([task_cell(task)]).files
     blocks = [one for name, one in written.items() if name.endswith(f"{task.name}{suffix}")]
     if not blocks:  # the scene can't be said in the format
         return ShownSource(view=plain)
     with tempfile.TemporaryDirectory(prefix="arena-source-") as folder:
         file = Path(folder) / f"{task.name}{suffix}"
         file.write_bytes(blocks[0])
-        found = reader_of(format_name).read(file, item=None, frame=None, name=scene.name)
+        found = find_reader(format_name).read(file, item=None, frame=None, name=scene.name)
     ids = {agent.id: agent.id for agent in scene.agents}
     if format_name == COMMONROAD:
         ids = names_in(blocks[0].decode())
@@ -65,7 +65,7 @@ def show_source(task: BenchmarkTask, format_name: str) -> ShownSource:
 
 
 def file_names(format_name: str, names: Mapping[str, str]) -> Mapping[str, str]:
-    """Return what a file calls its agents, as it stands in the file."""
+    """Return the file's own names of its agents."""
     if format_name != COMMONROAD:
         return names
     return {agent: str(int(number)) for agent, number in names.items()}

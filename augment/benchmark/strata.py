@@ -1,4 +1,4 @@
-"""How much an instruction asks for, and which tasks of a set are handed out with their reference.
+"""Difficulty strata of instructions, and the split of a set's tasks.
 
 In: what is known of each task. Out: its stratum, its split. The size of a task is the number of
 statements that its intent makes, or of objects that its reference changes, whichever is more.
@@ -39,12 +39,12 @@ def choose_strata(sizes: Mapping[str, int | None]) -> dict[str, Stratum]:
     by_size = sorted(feasible, key=lambda name: (-feasible[name], name))
     lifted = set(by_size[: len(sizes) - len(feasible)])
     return {
-        name: Stratum.HARD if size is None or name in lifted else _stratum_of(size)
+        name: Stratum.HARD if size is None or name in lifted else _stratum(size)
         for name, size in sizes.items()
     }
 
 
-def _stratum_of(size: int) -> Stratum:
+def _stratum(size: int) -> Stratum:
     if size < MEDIUM_FROM:
         return Stratum.EASY
     return Stratum.MEDIUM if size < HARD_FROM else Stratum.HARD

@@ -50,7 +50,7 @@ Key = tuple[str, int]
 
 
 def check_submission(benchmark: BenchmarkSet, path: Path, *, checksum: str) -> SubmissionReport:
-    """Return what became of every task and sample of a submission.
+    """Return the result of every task and sample of a submission.
 
     Only tasks of the practice split are scored, whoever computes it.
 
@@ -106,7 +106,7 @@ def _sort_files(
 
 
 def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileContent]:
-    """What each file says; a process reads them in order, and the next where it ended.
+    """Return each file's content; a process reads in order, the next one goes on after it.
 
     Raises:
         InvalidDocument: Too many end their process, or they hold too many agents together.
@@ -165,7 +165,7 @@ class _Checker:
     sources: dict[tuple[str, str], ShownSource] = field(default_factory=dict)
 
     def check(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
-        """What became of a task and sample, with its displacement."""
+        """Return the result of a task and sample, with its displacement."""
         entry = self._read(task, sample, files)
         if task.split is not Split.PRACTICE or task.reference is None:
             return entry

@@ -44,7 +44,7 @@ _MOST_SAID = 2_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileContent:
-    """What one file says.
+    """Content of one file.
 
     Attributes:
         problem: Why it can't be read, empty where it can.
@@ -70,7 +70,7 @@ CONTENT = Codec("file", TypeAdapter(FileContent))
 
 
 def read_file(path: Path) -> FileContent:
-    """Return what a file or a format's folder says.
+    """Return the content of a file or of a format's folder.
 
     Raises:
         InvalidDocument: It is in no format that is read, or breaks its own.
@@ -120,7 +120,7 @@ def _read_scene(reader: Reader, path: Path) -> FileContent:
 
 
 def _tell(path: Path) -> dict[str, Any]:
-    """What a file says as plain JSON, which can be read again."""
+    """Return a file's content as plain JSON, which can be read again."""
     try:
         found = read_file(path)
         notes = tuple(escape_controls(note) for note in found.notes)

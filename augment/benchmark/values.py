@@ -1,4 +1,4 @@
-"""What a benchmark set and a submission are, as values."""
+"""Values of a benchmark set and of a submission."""
 
 from dataclasses import dataclass, replace
 from datetime import date
@@ -16,14 +16,14 @@ MOST_SAMPLES = 20
 
 
 class Split(StrEnum):
-    """Whether the reference of a task is handed out with it."""
+    """Split of a task: practice comes with its reference, test without."""
 
     PRACTICE = "practice"
     TEST = "test"
 
 
 class Stratum(StrEnum):
-    """How much an instruction asks for; `strata.py` says where the limits lie."""
+    """Difficulty of an instruction; `strata.py` has the limits."""
 
     EASY = "easy"
     MEDIUM = "medium"
@@ -60,7 +60,7 @@ class BenchmarkTask:
 
     @property
     def replayed(self) -> Recording | None:
-        """What was recorded, of the ego alone where the recorded traffic does not stay."""
+        """Recording, of the ego alone where the recorded traffic does not stay."""
         if self.recording is None or self.keeps_traffic:
             return self.recording
         return replace(self.recording, tracks=())
@@ -92,7 +92,7 @@ _Name = Annotated[Text, Field(min_length=1, max_length=100, pattern=r"\S")]
 
 
 class EntryStatus(StrEnum):
-    """What became of one task in a submission; all but READ count as a miss."""
+    """Result of one task in a submission; all but READ count as a miss."""
 
     READ = "read"
     REFUSED = "refused"
@@ -102,7 +102,7 @@ class EntryStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SubmissionCard:
-    """Who submits what: `card.json` of a submission.
+    """Authors and models of a submission: its `card.json`.
 
     Attributes:
         models: Names of language or other models that were used, empty for none.

@@ -1,11 +1,11 @@
-"""How crashed vehicles lie to each other, against what is said, and which of them is which."""
+"""Crashed vehicles: assignment to the sentence, and their poses relative to each other."""
 
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, permutations
 
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.parties import CRASH_M, USUAL, Asked, Bounds, Party, apart_m, hold
+from augment.checks.parties import CRASH_M, USUAL, Bounds, Case, Party, apart_m, hold
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
@@ -70,7 +70,7 @@ def _misfit(order: Sequence[TrafficAgent], request: CrashRequest, route: EgoRout
     return misfit
 
 
-def asked_crash(asked: Asked) -> Iterator[Finding]:
+def check_crash(asked: Case) -> Iterator[Finding]:
     """Angles (heading) and gaps (position) between neighbours, and a first one that lies across.
 
     Nothing is found where the number of vehicles is wrong or where they lie on each other, which
@@ -90,7 +90,7 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
 
 
 def _neighbours(
-    asked: Asked, one: TrafficAgent, other: TrafficAgent, said: CrashedCar
+    asked: Case, one: TrafficAgent, other: TrafficAgent, said: CrashedCar
 ) -> Iterator[Finding]:
     """As far apart as said, else near enough to have run into each other; turned as said."""
     wanted = Bounds(0.0, max(CRASH_M, one.length_m, other.length_m), 0.0)
@@ -110,7 +110,7 @@ def _neighbours(
     )
 
 
-def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterator[Finding]:
+def _facing(asked: Case, request: CrashRequest, first: TrafficAgent) -> Iterator[Finding]:
     band = asked.lanes.band(request.spot.lane or LaneChoice.OWN, asked.ahead_m(first))
     if band is None or request.facing in (None, Facing.WITH_LANE):
         return

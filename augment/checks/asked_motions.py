@@ -1,4 +1,4 @@
-"""What agents are made to do after t0 against the motion that was asked for."""
+"""Motions of agents after t0 against the motion that was asked for."""
 
 import math
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ import numpy as np
 
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import find_mark
-from augment.checks.parties import MARK_M, Asked, Bounds, apart_m, hold, motion_bounds
+from augment.checks.parties import MARK_M, Bounds, Case, apart_m, hold, motion_bounds
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene import planned_motion as planned
@@ -31,8 +31,8 @@ _DOOR = Bounds(0.6, 1.2, 0.3)
 """How far a door opens, in metres."""
 
 
-def asked_course(asked: Asked) -> Iterator[Finding]:
-    """Whether who is to move begins when it should and does what it should, by its numbers."""
+def check_course(asked: Case) -> Iterator[Finding]:
+    """Check the requested motion: its start, its course and its numbers."""
     before = {agent.id: agent for agent in asked.route.scene.agents}
     for party in asked.parties:
         wish: MotionWish | None = getattr(party.request, "motion", None)
@@ -48,7 +48,7 @@ def asked_course(asked: Asked) -> Iterator[Finding]:
                 continue
             if wish.start is not None:
                 yield from _start(asked, agent, agent.motion, wish.start)
-            states = _carried_out(asked, agent, agent.motion)
+            states = _carry_out(asked, agent, agent.motion)
             if not len(states):
                 words = "{agents[0]} has left the map before its motion begins."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
@@ -61,7 +61,7 @@ def asked_course(asked: Asked) -> Iterator[Finding]:
 
 
 def _start(
-    asked: Asked, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
+    asked: Case, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
 ) -> Iterator[Finding]:
     start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
     if wish.after_s is not None and isinstance(start, AtTime):
@@ -87,7 +87,7 @@ def _start(
     yield find(kind, False, [agent], words)
 
 
-def _carried_out(asked: Asked, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
+def _carry_out(asked: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
     """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
     begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
     alone = replace(agent, motion=replace(motion, start=begins))
@@ -100,9 +100,9 @@ def _carried_out(asked: Asked, agent: TrafficAgent, motion: PlannedMotion) -> Fl
 
 
 def _course(
-    asked: Asked, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+    asked: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
-    """Where it gets to."""
+    """Check the place that the motion reaches."""
     places = [asked.route.locate(x, y) for x, y in states[:, :2].tolist()]
     first, last = places[0], places[-1]
     match wish.preset:
@@ -137,7 +137,7 @@ def _course(
 
 
 def _numbers(
-    asked: Asked, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+    asked: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
     assert agent.motion is not None
     profile = [(0.0, agent.speed_mps), *agent.motion.speeds]

@@ -8,7 +8,7 @@ from statistics import median
 from augment.checks.asked_crash import in_order
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
-from augment.checks.parties import CRASH_M, WORKER_M, Asked, Bounds, Party, apart_m, hold
+from augment.checks.parties import CRASH_M, WORKER_M, Bounds, Case, Party, apart_m, hold
 from augment.scene import intent as wish
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Point, TrafficAgent
 
@@ -21,7 +21,7 @@ _TAPER_M = 1.0
 _CONE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1]
 
 
-def asked_distance(asked: Asked) -> Iterator[Finding]:
+def check_distance(asked: Case) -> Iterator[Finding]:
     """One finding a request: wrong beyond the tolerance.
 
     A crash counts by its first vehicle, cones by the first, a ring by its middle, pedestrians
@@ -52,8 +52,8 @@ def _is_ring(party: Party) -> bool:
     return isinstance(party.request, wish.ConesRequest) and party.request.shape is wish.Shape.RING
 
 
-def _measure_ahead(asked: Asked, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
-    """Who tells the distance of a party, and its distance ahead of the ego."""
+def _measure_ahead(asked: Case, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
+    """Return the agent that defines a party's distance, and its distance ahead of the ego in m."""
     request = party.request
     sign = -1.0 if request.spot.relation is wish.Relation.BEHIND else 1.0
     agents = [*party.placed, *party.spare]
@@ -74,7 +74,7 @@ def _measure_ahead(asked: Asked, party: Party, wanted: Bounds) -> tuple[TrafficA
 
 
 def _to_next_m(party: Party) -> float:
-    """How much further the next one stands where one is missing."""
+    """Return the extra distance of the next one if one is missing, in m."""
     if party.missing and isinstance(party.request, wish.CrashRequest):
         return CRASH_M
     if party.missing and isinstance(party.request, wish.ConesRequest) and party.request.spacing:
@@ -82,8 +82,8 @@ def _to_next_m(party: Party) -> float:
     return 0.0
 
 
-def _meets_route(asked: Asked, agent: TrafficAgent) -> Point | None:
-    """Where a walk is level with the middle of the ego's route, None if it never gets there."""
+def _meets_route(asked: Case, agent: TrafficAgent) -> Point | None:
+    """Return the point where a walk crosses the middle of the ego's route, None without one."""
     if agent.walk_to_m is None:
         return None
     start, end = asked.left_m(agent), asked.route.locate(*agent.walk_to_m).left_m
@@ -94,7 +94,7 @@ def _meets_route(asked: Asked, agent: TrafficAgent) -> Point | None:
     return agent.x_m + share * (x_m - agent.x_m), agent.y_m + share * (y_m - agent.y_m)
 
 
-def asked_across(asked: Asked) -> Iterator[Finding]:
+def check_across(asked: Case) -> Iterator[Finding]:
     """Vehicles by their offset, crashes and cones by the lane that they are in."""
     for party in asked.parties:
         request, lane = party.request, party.request.spot.lane
@@ -106,7 +106,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
             continue
         if isinstance(request, wish.VehicleRequest):
             for agent in party.placed:
-                wanted = _wanted(asked, request.spot.lateral, band, agent.width_m / 2.0)
+                wanted = _bounds(asked, request.spot.lateral, band, agent.width_m / 2.0)
                 left_m = asked.left_m(agent) - band.left_m
                 yield _across([agent], left_m, wanted)
         elif isinstance(request, wish.ConesRequest):
@@ -118,7 +118,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
                 first = in_order(party, request, asked.route)[0]
             others = [agent for agent in party.everyone if agent is not first]
             left_m = asked.left_m(first) - band.left_m
-            yield _across([first, *others], left_m, _wanted(asked, None, band, 0.0))
+            yield _across([first, *others], left_m, _bounds(asked, None, band, 0.0))
 
 
 def _across(
@@ -135,8 +135,8 @@ def _across(
     )
 
 
-def _wanted(asked: Asked, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
-    """Where across its lane something belongs, left positive; anywhere in it by default."""
+def _bounds(asked: Case, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
+    """Return the requested place across its lane, left positive; anywhere in it by default."""
     sign, half_lane_m = asked.lanes.side_sign(lateral), band.width_m / 2.0
     if lateral is None:
         return Bounds(-half_lane_m, half_lane_m, asked.tolerances.edge_m)
@@ -159,15 +159,13 @@ def _wanted(asked: Asked, lateral: wish.Lateral | None, band: Band, half_box_m: 
     return Bounds(low_m, high_m, asked.tolerances.across_m)
 
 
-def _cones(
-    asked: Asked, party: Party, request: wish.ConesRequest, band: Band
-) -> Iterator[Finding]:
+def _cones(asked: Case, party: Party, request: wish.ConesRequest, band: Band) -> Iterator[Finding]:
     """A line by its side of the lane, all other shapes by their middle and their first cone."""
     cones = sorted(party.placed, key=asked.ahead_m)
     lefts = [asked.left_m(cone) - band.left_m for cone in cones]
     sign, middle_m = asked.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
     is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
-    wanted = _wanted(asked, None, band, 0.0)
+    wanted = _bounds(asked, None, band, 0.0)
     if is_line:
         edge_m = sign * band.width_m / 2.0
         # A cone at a boundary stands inside of it or outside: half a cone to either side.
@@ -186,7 +184,7 @@ def _cones(
         yield find(FindingKind.ASKED_SIDE, begins_m * start > 0.0, cones, words)
 
 
-def asked_spacing(asked: Asked) -> Iterator[Finding]:
+def check_spacing(asked: Case) -> Iterator[Finding]:
     """The median gap between neighbours in a row, and from a worker to the cones."""
     for party in asked.parties:
         request = party.request
@@ -205,7 +203,7 @@ def asked_spacing(asked: Asked) -> Iterator[Finding]:
                 )
 
 
-def _in_row(asked: Asked, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
+def _in_row(asked: Case, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
     """From centre to centre, straight or along the ego's lane: whichever is nearer to the wish."""
     things = party.agents
     if spacing is None or not party.is_exact or len(things) < 2:

@@ -7,7 +7,7 @@ from itertools import combinations
 from augment.checks.bodies import end_of_walk, name_type
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import STOPPED_BELOW_MPS
-from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, Bounds, apart_m, hold
+from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Bounds, Case, apart_m, hold
 from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Body, CrashRequest, Facing, Side, VehicleRequest, WalkRequest
@@ -20,8 +20,8 @@ _NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN})
 _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}
 
 
-def asked_count(asked: Asked) -> Iterator[Finding]:
-    """What is missing, and what nobody asked for."""
+def check_count(asked: Case) -> Iterator[Finding]:
+    """Find missing objects and objects that nobody asked for."""
     for party in asked.parties:
         for role, number in party.missing:
             words = f"Asked for and not there: {role}, {number} of them."
@@ -31,15 +31,15 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
         yield find(FindingKind.ASKED_COUNT, False, [agent], words)
 
 
-def asked_type(asked: Asked) -> Iterator[Finding]:
-    """What stands in for something of another type."""
+def check_type(asked: Case) -> Iterator[Finding]:
+    """Find objects of another type than the requested one."""
     for party in asked.parties:
         for agent, role in party.mistyped:
             words = f"{{agents[0]}} is {name_type(agent.type)}; a {role} is asked for."
             yield find(FindingKind.ASKED_TYPE, False, [agent], words)
 
 
-def asked_motion(asked: Asked) -> Iterator[Finding]:
+def check_motion(asked: Case) -> Iterator[Finding]:
     """The speed of vehicles: those that are to stand do, the others drive as fast as said."""
     for party in asked.parties:
         wanted_mps = 0.0 if isinstance(party.request, CrashRequest) else None
@@ -54,7 +54,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
             yield hold(kind, [agent], what, agent.speed_mps, wanted, unit="m/s")
 
 
-def asked_changes(asked: Asked) -> Iterator[Finding]:
+def check_changes(asked: Case) -> Iterator[Finding]:
     """Agents of the scene that are to be moved or removed and were not, or the reverse.
 
     What is done about a wish that can't be met is not asked for either.
@@ -76,8 +76,8 @@ def asked_changes(asked: Asked) -> Iterator[Finding]:
         yield find(FindingKind.UNASKED, False, touched, words)
 
 
-def asked_heading(asked: Asked) -> Iterator[Finding]:
-    """Vehicles against their lane; those that have crashed are told by `asked_crash`.
+def check_heading(asked: Case) -> Iterator[Finding]:
+    """Vehicles against their lane; those that have crashed are told by `check_crash`.
 
     As its lane leads where nothing is said: what else would say so stands in the sentence.
     """
@@ -112,7 +112,7 @@ def unwrap_deg(turn_rad: float, near_deg: float) -> float:
     return near_deg + math.degrees(difference(turn_rad, math.radians(near_deg)))
 
 
-def asked_walk(asked: Asked) -> Iterator[Finding]:
+def check_walk(asked: Case) -> Iterator[Finding]:
     """Side (a fault of logic), direction (of heading), crossing (of logic): the first one wrong.
 
     Of walks that cross as asked also where they end along the lane, and the gaps of a file.
@@ -138,7 +138,7 @@ def asked_walk(asked: Asked) -> Iterator[Finding]:
             yield from _in_file(asked, party.agents, request)
 
 
-def _crossing(asked: Asked, agent: TrafficAgent, side: Side | None) -> Finding:
+def _crossing(asked: Case, agent: TrafficAgent, side: Side | None) -> Finding:
     """The first thing that is wrong about a walk; where the side is open it is its own."""
     place, end = asked.route.locate_agent(agent), end_of_walk(agent)
     if side is None:
@@ -160,9 +160,9 @@ def _crossing(asked: Asked, agent: TrafficAgent, side: Side | None) -> Finding:
 
 
 def _in_file(
-    asked: Asked, walkers: Sequence[TrafficAgent], request: WalkRequest
+    asked: Case, walkers: Sequence[TrafficAgent], request: WalkRequest
 ) -> Iterator[Finding]:
-    """How far behind the first one, who is furthest across, each of the others walks."""
+    """Check each walker's distance behind the first one, who is furthest across."""
     if not request.behind or request.start is None:
         return
     sign = request.start.sign

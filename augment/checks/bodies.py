@@ -1,4 +1,4 @@
-"""Whether boxes share ground, sizes and speeds are usual, and walks are free."""
+"""Checks of bodies: shared ground, unusual sizes and speeds, blocked walks."""
 
 import math
 from collections.abc import Iterator

@@ -80,7 +80,7 @@ def describe_change(
     lanes = LanesAcross.of(ground, scene.options.goal or TurnType.STRAIGHT)
     touched = {*change.removed, *(agent.id for agent in change.moved)}
     picks = {
-        agent.id: None if lanes is None else _pick_of(agent, lanes)
+        agent.id: None if lanes is None else _find_pick(agent, lanes)
         for agent in scene.agents
         if agent.id in touched
     }
@@ -114,8 +114,8 @@ def describe_change(
     return sentence, full if faults[0] <= faults[1] else looser
 
 
-def type_of_change(change: Modification, scene: Scene) -> ScenarioType | MotionPreset:
-    """Return what somebody is made to do, else the one of five types that it looks most like."""
+def classify_change(change: Modification, scene: Scene) -> ScenarioType | MotionPreset:
+    """Return the planned motion's preset, else the most similar of the five types."""
     for motion, _ in _wishes(change, scene).values():
         return motion.preset
     kinds = {agent.type for agent in change.added}
@@ -162,7 +162,7 @@ def _place_at(point: Point, lanes: LanesAcross) -> _Place:
     )
 
 
-def _place_of(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
+def _find_place(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
     return _place_at((agent.x_m, agent.y_m), lanes)
 
 
@@ -187,16 +187,16 @@ def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iter
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
         if agent.type in _BODIES:
-            request = _vehicle(agent, lanes, _motion_of(agent, wishes))
+            request = _vehicle(agent, lanes, _find_motion(agent, wishes))
             yield replace(request, name=agent.id) if agent.id in anchors else request
     for agent in people:
-        motion = _motion_of(agent, wishes)
+        motion = _find_motion(agent, wishes)
         if agent.walk_to_m is not None or motion is not None:
             yield replace(_walk(agent, lanes), motion=motion)
     for motion, car in doors:
         spot = wish.Spot(anchor=car.id)
         if car.id not in anchors:
-            spot = wish.Spot(landmark=_pick_of(car, lanes))
+            spot = wish.Spot(landmark=_find_pick(car, lanes))
         if spot != wish.Spot():
             yield wish.DoorRequest(spot=spot, motion=motion)
 
@@ -210,7 +210,7 @@ def _moves(
     before = {agent.id: agent for agent in lanes.route.scene.agents}
     for agent in change.moved:
         who = picks[agent.id]
-        motion = _motion_of(agent, wishes)
+        motion = _find_motion(agent, wishes)
         if who is not None and motion is not None and _stays(agent, before[agent.id]):
             yield wish.Move(who=who, motion=motion)
         elif who is not None:
@@ -225,18 +225,18 @@ def _moves(
             )
 
 
-def _motion_of(agent: TrafficAgent, wishes: _Wishes) -> wish.MotionWish | None:
+def _find_motion(agent: TrafficAgent, wishes: _Wishes) -> wish.MotionWish | None:
     return wishes[agent.id][0] if agent.id in wishes else None
 
 
 def _stays(agent: TrafficAgent, before: TrafficAgent) -> bool:
-    """Whether it only moves otherwise; whoever is to start late stands until then."""
+    """Return whether only its motion changes; one that starts late stands until then."""
     is_as_fast = agent.type is AgentType.PEDESTRIAN or agent.speed_mps == before.speed_mps
     return is_as_fast and math.dist(agent.pose.beside(0.0), before.pose.beside(0.0)) < _BESIDE_M
 
 
-def _pick_of(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
-    """How a sentence calls a road user of the scene; None for one that it can't tell."""
+def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
+    """Return the sentence's name of a road user of the scene; None if it has none."""
     kind = {
         AgentType.VEHICLE: wish.Sight.PARKED if is_stopped(agent) else wish.Sight.MOVING,
         AgentType.BUS: wish.Sight.BUS,
@@ -270,12 +270,12 @@ def _boundary(left_m: float) -> wish.LateralTarget:
 def _vehicle(
     agent: TrafficAgent, lanes: LanesAcross, motion: wish.MotionWish | None = None
 ) -> wish.VehicleRequest:
-    place, body = _place_of(agent, lanes), _BODIES.get(agent.type, wish.Body.VEHICLE)
+    place, body = _find_place(agent, lanes), _BODIES.get(agent.type, wish.Body.VEHICLE)
     if motion is not None and motion.preset is MotionPreset.RED_LIGHT:
         from_left = lanes.route.locate_agent(agent).left_m > 0.0
         comes = replace(motion, side=wish.Side.LEFT if from_left else wish.Side.RIGHT)
         return wish.VehicleRequest(body=body, speed_mps=agent.speed_mps, count=1, motion=comes)
-    facing, turn_deg = (None, 0.0) if agent.type in _FRONTLESS else _turned(agent, place)
+    facing, turn_deg = (None, 0.0) if agent.type in _FRONTLESS else _facing(agent, place)
     lateral = None
     if abs(place.left_m) >= _BESIDE_M:
         outside = place.lane is None
@@ -295,8 +295,8 @@ def _vehicle(
     )
 
 
-def _turned(agent: TrafficAgent, place: _Place) -> tuple[wish.Facing, float]:
-    """Where something looks against its lane, and how many degrees besides."""
+def _facing(agent: TrafficAgent, place: _Place) -> tuple[wish.Facing, float]:
+    """Return the facing against the lane, and the remaining angle in degrees."""
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     is_against = abs(turn_deg) > 90.0
     off_deg = round((turn_deg - 180.0 * is_against + 180.0) % 360.0 - 180.0)
@@ -308,7 +308,7 @@ def _walk(agent: TrafficAgent, lanes: LanesAcross) -> wish.WalkRequest:
     start = lanes.route.locate(agent.x_m, agent.y_m)
     end = lanes.route.locate(*(end_of_walk(agent) or (0.0, 0.0)))
     return wish.WalkRequest(
-        spot=replace(_spot(_place_of(agent, lanes)), lane=None),
+        spot=replace(_spot(_find_place(agent, lanes)), lane=None),
         start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
         count=1,
         speed_mps=agent.speed_mps or None,
@@ -327,7 +327,7 @@ def _cones(
     shape = wish.Shape.TAPER if abs(aside_m) >= _TAPER_M else wish.Shape.LINE
     if located[-1].ahead_m - located[0].ahead_m < _ROW_M:
         shape = wish.Shape.ROW
-    first = _place_of(cones[0], lanes)
+    first = _find_place(cones[0], lanes)
     lateral, spacing = None, None
     if shape is wish.Shape.LINE:
         centre_m = 0.0 if first.band is None else first.band.width_m / 4.0
@@ -405,7 +405,7 @@ def _sentence(
 
 
 def _then(agent: TrafficAgent, wishes: _Wishes) -> str:
-    motion = _motion_of(agent, wishes)
+    motion = _find_motion(agent, wishes)
     return f", {', '.join(list_motion_facts(motion))}" if motion else ""
 
 
@@ -430,7 +430,7 @@ def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | 
     if agent.type in (AgentType.VEHICLE, AgentType.BUS) and not drives:
         what = f"{'crashed' if kind is ScenarioType.ACCIDENT_SITE else 'parked'} {what}"
     pace = f", driving at {agent.speed_mps:.1f} m/s" if drives else ""
-    base_rad = 0.0 if lanes is None else _place_of(agent, lanes).tangent_rad
+    base_rad = 0.0 if lanes is None else _find_place(agent, lanes).tangent_rad
     base = "the ego's direction" if lanes is None else "the lane's direction"
     degrees = math.degrees(difference(agent.heading_rad, base_rad))
     turn = f"turned {abs(degrees):.0f} degrees to the {_side(degrees)} of {base}"

@@ -17,7 +17,7 @@ from augment.scene.planned_motion import (
     PointPath,
     Trigger,
 )
-from augment.scene.presets import PresetNumbers, numbers_of, with_preset
+from augment.scene.presets import PresetNumbers, preset_numbers, with_preset
 
 _ORDER = (MotionPreset.EMERGENCY_STOP, *MotionPreset)
 """An emergency stop is hard braking at a moment that it finds out itself."""
@@ -66,14 +66,14 @@ def _numbers(preset: MotionPreset, agent: TrafficAgent, motion: PlannedMotion) -
     if isinstance(motion.path, LanePath) and own_mps + to_mps > 0.0:
         values["duration_s"] = 2.0 * motion.path.change_m / (own_mps + to_mps)
     start = None if preset is MotionPreset.EMERGENCY_STOP else motion.start
-    found = {name: values.get(name) or None for name in numbers_of(preset)}
+    found = {name: values.get(name) or None for name in preset_numbers(preset)}
     return PresetNumbers(start=start, **found)
 
 
 def _wish(preset: MotionPreset, numbers: PresetNumbers, agent: TrafficAgent) -> MotionWish:
     amounts: dict[str, Any] = {
         name: Amount(low=round(value, 1), high=round(value, 1))
-        for name in numbers_of(preset)
+        for name in preset_numbers(preset)
         if (value := getattr(numbers, name)) is not None
     }
     return MotionWish(preset=preset, start=_start(numbers.start), **amounts)

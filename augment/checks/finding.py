@@ -16,7 +16,7 @@ class FaultClass(StrEnum):
 
 
 class FindingKind(StrEnum):
-    """What was measured; those that begin with `asked` are held against the instruction."""
+    """Measured quantity; those that begin with `asked` are held against the instruction."""
 
     LANE = "lane"
     LANE_NAMED = "lane_named"
@@ -66,7 +66,7 @@ _FAULTS = {
 
 
 class Severity(StrEnum):
-    """How much a finding speaks against the modification."""
+    """Severity of a finding for the modification."""
 
     FACT = "fact"  # a measurement, whatever was asked for
     DOUBTFUL = "doubtful"  # a fault unless the instruction asks for it
@@ -95,7 +95,7 @@ class Finding:
 
     @property
     def is_fault(self) -> bool:
-        """Whether it speaks against the modification: it is wrong or doubtful."""
+        """True if it is evidence against the modification: wrong or doubtful."""
         return self.severity is not Severity.FACT
 
     @property

@@ -1,4 +1,4 @@
-"""What the checks know about a scene before anybody changes it, and after.
+"""Ground and motion of a scene before and after a change, as the checks need them.
 
 Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
 """
@@ -25,7 +25,7 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
-from augment.scene.motion import Motion, Movement, motion_of, with_movers_alone
+from augment.scene.motion import Motion, Movement, find_motion, with_movers_alone
 from augment.scene.recording import Recording
 
 SEAM_M = 0.3
@@ -169,11 +169,11 @@ class Ground:
 
     @cached_property
     def recording(self) -> Recording | None:
-        """What was recorded after t0 of the ego and the traffic that stays."""
+        """Recording after t0 of the ego and of the traffic that stays."""
         return self.read_recording()
 
     def motion_after(self, modification: Modification, *, of_all: bool = True) -> Motion:
-        """Return what everybody does after a change, who was recorded later included.
+        """Return everybody's motion after a change, including agents recorded later.
 
         Args:
             modification: The change.
@@ -185,7 +185,7 @@ class Ground:
         after = apply(self.scene, modification)
         if not of_all:
             after = with_movers_alone(after, {agent.id for agent in modification.changed})
-        return motion_of(
+        return find_motion(
             after, recording=self.recording, replaced=modification.replaced, with_later=of_all
         )
 
@@ -194,7 +194,7 @@ class Ground:
 
     @cached_property
     def road(self) -> Surface:
-        """What vehicles may stand on."""
+        """Surface on which vehicles may stand."""
         return Surface(self.graph.lanes.values(), self._areas(*_ROAD))
 
     @cached_property
@@ -204,12 +204,12 @@ class Ground:
 
     @cached_property
     def carparks(self) -> Surface:
-        """Where vehicles stand in any direction."""
+        """Surface on which vehicles stand in any direction."""
         return Surface(areas=self._areas(AreaKind.CARPARK))
 
     @cached_property
     def walkways(self) -> Surface:
-        """Where people walk beside the road; empty where the map does not say."""
+        """Surface beside the road for pedestrians; empty if the map has none."""
         return Surface(areas=self._areas(AreaKind.WALKWAY))
 
     @cached_property
@@ -249,7 +249,7 @@ class ChangedScene:
 
     @cached_property
     def motion(self) -> Motion:
-        """What everybody does after the change."""
+        """Everybody's motion after the change."""
         return self.ground.motion_after(self.modification)
 
     @cached_property

@@ -1,6 +1,6 @@
-"""Whether motions can be carried out as they are meant, before the ego comes; no intent needed.
+"""Feasibility of motions as planned, before the ego comes; no intent needed.
 
-Everybody is where `motion_of` has them: the ego as it was recorded, or at the speed of t0.
+Everybody is where `find_motion` has them: the ego as it was recorded, or at the speed of t0.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ STRAY_STEPS = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
-    """What a kind manages before it looks wrong; m/s^2, and the radius of its centre's path."""
+    """Limits of a class's motion; m/s^2, and the radius in m of its centre's path."""
 
     speeding_up: float
     braking: float
@@ -146,7 +146,7 @@ def motion_limits(situation: ChangedScene) -> Iterator[Finding]:
 
 
 def motion_off_road(situation: ChangedScene) -> Iterator[Finding]:
-    """Where motions leave the ground of their kind, by `off_road`'s limits; the worst place.
+    """Find motions that leave the ground of their class, by `off_road`'s limits; worst place.
 
     Only what is worse than at t0. Who leaves the map does so nose first, which is no fault.
     """

@@ -1,4 +1,4 @@
-"""Who answers which part of an instruction, and how far off it may be.
+"""Assignment of agents to the parts of an instruction, and tolerances.
 
 There is one set of tolerances for every scenario and contestant; docs/method.md says where each
 number comes from.
@@ -19,7 +19,7 @@ from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """Of each kind of statement, in its unit.
+    """Tolerance of each kind of statement, in its unit.
 
     Attributes:
         distance_m, distance_share: Along the lane, whichever is more; 3 m at 60 m.
@@ -82,7 +82,7 @@ LONG_VEHICLE_M = 7.0
 
 
 class Role(StrEnum):
-    """What an agent is in its request, in the words of a sentence."""
+    """Role of an agent in its request, in the words of a sentence."""
 
     VEHICLE = "vehicle"
     CAR = "car"
@@ -143,13 +143,13 @@ class Party:
 
     @property
     def placed(self) -> tuple[TrafficAgent, ...]:
-        """Those who tell where the party stands: all but the workers."""
+        """Agents that define the party's place: all but the workers."""
         stand_ins = (agent for agent, role in self.mistyped if role is not Role.WORKER)
         return (*self.agents, *stand_ins)
 
     @property
     def is_exact(self) -> bool:
-        """Whether nobody is missing, spare or of another type."""
+        """True if nobody is missing, spare or of another type."""
         return not (self.missing or self.spare or self.mistyped)
 
 
@@ -165,7 +165,7 @@ def match_to_requests(
     """
     roles = [_roles(request, added) for request in intent.requests]
     places = [(number, role) for number, some in enumerate(roles) for role in some]
-    spots = [middle_of(request.spot, lanes) for request in intent.requests]
+    spots = [spot_middle(request.spot, lanes) for request in intent.requests]
     near = sorted(
         (math.dist(spots[number], (agent.x_m, agent.y_m)), place, index)
         for place, (number, _) in enumerate(places)
@@ -199,7 +199,7 @@ def match_to_requests(
 
 
 def _roles(request: wish.Request, added: Sequence[TrafficAgent]) -> list[Role]:
-    """Whom a request needs; where its count is open, as many as there are, and at least one."""
+    """Return the roles of a request; an open count is the number there is, at least one."""
     kinds = {wish.WalkRequest: Role.WALKER, wish.DoorRequest: Role.DOOR}
     role = kinds.get(type(request), Role.CONE)
     if isinstance(request, wish.VehicleRequest | wish.CrashRequest):
@@ -211,7 +211,7 @@ def _roles(request: wish.Request, added: Sequence[TrafficAgent]) -> list[Role]:
     return [role] * (count * both) + [Role.WORKER] * request.has_worker
 
 
-def middle_of(spot: wish.Spot, lanes: LanesAcross) -> Point:
+def spot_middle(spot: wish.Spot, lanes: LanesAcross) -> Point:
     """Return the point that a spot names: the middle of its range, on the middle of its lane.
 
     What is open is taken as the ego's own place and lane: it only says who is nearest.
@@ -223,7 +223,7 @@ def middle_of(spot: wish.Spot, lanes: LanesAcross) -> Point:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Asked:
+class Case:
     """One modification, held against one intent.
 
     Attributes:
@@ -263,7 +263,7 @@ class Asked:
         return Bounds(wanted.low_m, wanted.high_m, max(self.tolerances.spacing_m, share_m))
 
 
-AskedCheck = Callable[[Asked], Iterator[Finding]]
+AskedCheck = Callable[[Case], Iterator[Finding]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +289,7 @@ class Bounds:
 
 
 def motion_bounds(name: str, low: float, high: float) -> Bounds:
-    """Return what a number of a motion may be that is to be in a range."""
+    """Return the bounds of a motion's number that has to be in a range."""
     allowed, share = MOTION[name]
     return Bounds(low, high, max(allowed, share * high))
 
@@ -303,7 +303,7 @@ def hold(
     *,
     unit: str = "m",
 ) -> Finding:
-    """Return what comes of holding a number against what is asked for.
+    """Return the finding of a number held against the requested one.
 
     Args:
         kind: Of the finding.

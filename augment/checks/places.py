@@ -1,4 +1,4 @@
-"""Where changed agents are, on which ground, and where they look; no intent is asked for."""
+"""Places of changed agents, their ground and heading; no intent is needed."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -135,7 +135,7 @@ def walk_heading(situation: ChangedScene) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stray:
-    """How far a box is off the ground of its kind.
+    """Distance of a box from the ground of its class.
 
     Attributes:
         over: How many of the kind's limits are passed: 1 is a fact, 2 doubtful, 3 wrong.
@@ -149,7 +149,7 @@ class Stray:
 
     @property
     def severity(self) -> Severity:
-        """How much it speaks against who passes a limit."""
+        """Severity beyond a limit."""
         return (Severity.FACT, Severity.DOUBTFUL, Severity.WRONG)[self.over - 1]
 
 

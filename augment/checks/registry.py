@@ -11,16 +11,16 @@ Adding a check is adding one function to `CHECKS`, which never ask what was want
 from collections.abc import Iterable
 from dataclasses import replace
 
-from augment.checks.asked_crash import asked_crash
-from augment.checks.asked_motions import asked_course
-from augment.checks.asked_places import asked_across, asked_distance, asked_spacing
+from augment.checks.asked_crash import check_crash
+from augment.checks.asked_motions import check_course
+from augment.checks.asked_places import check_across, check_distance, check_spacing
 from augment.checks.asked_things import (
-    asked_changes,
-    asked_count,
-    asked_heading,
-    asked_motion,
-    asked_type,
-    asked_walk,
+    check_changes,
+    check_count,
+    check_heading,
+    check_motion,
+    check_type,
+    check_walk,
 )
 from augment.checks.bodies import overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
@@ -33,7 +33,7 @@ from augment.checks.motions import (
     motion_start,
     motion_trigger,
 )
-from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
+from augment.checks.parties import USUAL, AskedCheck, Case, Party, Tolerances, match_to_requests
 from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, VehicleRequest
@@ -43,8 +43,8 @@ CHECKS: tuple[Check, ...] = (
     *(motion_trigger, motion_start, motion_limits, motion_off_road, motion_blocked),
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
-    *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),
-    *(asked_walk, asked_motion, asked_spacing, asked_changes, asked_course),
+    *(check_count, check_type, check_distance, check_across, check_heading, check_crash),
+    *(check_walk, check_motion, check_spacing, check_changes, check_course),
 )
 _OF_PLACE = frozenset(
     {
@@ -72,7 +72,7 @@ def check_against_intent(
     intent: Intent | None,
     tolerances: Tolerances = USUAL,
 ) -> tuple[Finding, ...]:
-    """Return what was measured, what was asked for first, then agent by agent.
+    """Return the findings of all checks, those on the instruction first, then agent by agent.
 
     Args:
         ground: Of the scene before the change.
@@ -88,18 +88,18 @@ def check_against_intent(
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
         return alone
-    asked = _asked(ground, modification, intent, lanes, tolerances)
+    asked = _assign_parties(ground, modification, intent, lanes, tolerances)
     held = [finding for check in ASKED_CHECKS for finding in check(asked)]
-    return (*held, *_settled(alone, held, asked))
+    return (*held, *_drop_answered(alone, held, asked))
 
 
-def _asked(
+def _assign_parties(
     ground: Ground,
     modification: Modification,
     intent: Intent,
     lanes: LanesAcross,
     tolerances: Tolerances,
-) -> Asked:
+) -> Case:
     """The modification with who answers what; a move is a request for one vehicle elsewhere."""
     counted = resolve_spots(intent, lanes)
     parties, surplus = match_to_requests(counted, modification.added, lanes)
@@ -109,7 +109,7 @@ def _asked(
         if name in moved:
             parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
-    return Asked(
+    return Case(
         ground=ground,
         modification=modification,
         lanes=lanes,
@@ -122,7 +122,9 @@ def _asked(
     )
 
 
-def _settled(alone: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:
+def _drop_answered(
+    alone: Iterable[Finding], held: Iterable[Finding], asked: Case
+) -> Iterable[Finding]:
     """The findings of the checks that ask for nothing, now that it is known what was asked for.
 
     What is doubtful "unless the instruction asks for it" is a fact where it does: a heading

@@ -48,7 +48,7 @@ def is_unreadable(rng: random.Random) -> bool:
 def too_far(scene: Scene, right: Modification) -> Modification:
     """Return the right modification, 8 m too far along the lanes."""
     route = EgoRoute.of(scene)
-    return right if route is None else replace(right, added=_shifted(right.added, route, 8.0))
+    return right if route is None else replace(right, added=_shift(right.added, route, 8.0))
 
 
 def bend(
@@ -68,7 +68,7 @@ def bend(
     route = EgoRoute.of(scene)
     if route is None or not right.changed:
         return right, "none"
-    shaky = _shifted(right.changed, route, rng.uniform(-1.5, 1.5))
+    shaky = _shift(right.changed, route, rng.uniform(-1.5, 1.5))
     outcomes = {
         name: mistake(shaky, route, rng)
         for name, mistake in MISTAKES.items()
@@ -89,7 +89,7 @@ def straight_line(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents
     """Lay the distance out straight ahead of the ego instead of along the lane."""
     places = [route.locate_agent(agent) for agent in agents]
     return tuple(
-        put(agent, place.ahead_m, place.left_m)
+        move_to(agent, place.ahead_m, place.left_m)
         for agent, place in zip(agents, places, strict=True)
     )
 
@@ -106,7 +106,7 @@ def neighbour_lane(agents: Agents, route: EgoRoute, rng: random.Random) -> Agent
     """Put everything one lane beside where it belongs."""
     nearest = route.graph.nearest(agents[0].x_m, agents[0].y_m)
     width_m = route.graph.lanes[nearest[0]].width_m if nearest else 3.5
-    return _shifted(agents, route, 0.0, rng.choice([-1.0, 1.0]) * width_m)
+    return _shift(agents, route, 0.0, rng.choice([-1.0, 1.0]) * width_m)
 
 
 def wrong_side(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
@@ -116,7 +116,7 @@ def wrong_side(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
         nearest = route.graph.nearest(agent.x_m, agent.y_m)
         if nearest is not None and abs(nearest[1].d_m) <= 2.0:
             line = route.graph.lanes[nearest[0]].centerline
-            agent = put(agent, *line.position(nearest[1].s_m, -nearest[1].d_m))
+            agent = move_to(agent, *line.position(nearest[1].s_m, -nearest[1].d_m))
         bent.append(agent)
     return tuple(bent)
 
@@ -124,14 +124,14 @@ def wrong_side(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
 def distance(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
     """Put everything 5 to 12 m too near or too far."""
     far = rng.choice([-1.0, 1.0])
-    return _shifted(agents, route, far * rng.uniform(5.0, 12.0))
+    return _shift(agents, route, far * rng.uniform(5.0, 12.0))
 
 
 def heap(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
     """Put all vehicles on top of the first."""
     cars = [agent for agent in agents if agent.type in (AgentType.VEHICLE, AgentType.BUS)]
     heaped = [
-        put(agent, cars[0].x_m + 0.2 * number, cars[0].y_m)
+        move_to(agent, cars[0].x_m + 0.2 * number, cars[0].y_m)
         for number, agent in enumerate(agents)
         if agent in cars
     ]
@@ -207,7 +207,7 @@ def wrong_way(
         (x_m, y_m), aside_m = path.points_m[-1], rng.choice([-3.5, 3.5])
         way_rad = math.atan2(y_m - agent.y_m, x_m - agent.x_m)
         step_m = (-aside_m * math.sin(way_rad), aside_m * math.cos(way_rad))
-        return replace(motion, path=_shifted_path(path, step_m))
+        return replace(motion, path=_shift_path(path, step_m))
     for number, (before, after) in enumerate(pairwise(path.lane_ids if path else ()), start=1):
         assert isinstance(path, LanePath)
         following = route.graph.successors(before)
@@ -239,7 +239,7 @@ def _moving_otherwise(
     )
 
 
-def _shifted_path(path: PointPath, step_m: tuple[float, float]) -> PointPath:
+def _shift_path(path: PointPath, step_m: tuple[float, float]) -> PointPath:
     points_m = tuple((x_m + step_m[0], y_m + step_m[1]) for x_m, y_m in path.points_m)
     return replace(path, points_m=points_m)
 
@@ -254,7 +254,7 @@ def _with(right: Modification, agents: Agents) -> Modification:
     )
 
 
-def _shifted(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.0) -> Agents:
+def _shift(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.0) -> Agents:
     """Move everybody along and across the lane ahead, turned as it turns."""
     moved = []
     for agent in agents:
@@ -262,11 +262,11 @@ def _shifted(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.
         ahead_m = place.ahead_m + along_m
         turn = route.heading_at(ahead_m) - place.tangent_rad
         x_m, y_m = route.position(ahead_m, place.left_m + left_m)
-        moved.append(put(agent, x_m, y_m, wrap(agent.heading_rad + turn)))
+        moved.append(move_to(agent, x_m, y_m, wrap(agent.heading_rad + turn)))
     return tuple(moved)
 
 
-def put(
+def move_to(
     agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float | None = None
 ) -> TrafficAgent:
     """Put the agent in another place; its walk and the points of its motion go along."""
@@ -274,7 +274,7 @@ def put(
     if walk is not None:
         walk = (walk[0] + step_m[0], walk[1] + step_m[1])
     if motion is not None and isinstance(motion.path, PointPath):
-        motion = replace(motion, path=_shifted_path(motion.path, step_m))
+        motion = replace(motion, path=_shift_path(motion.path, step_m))
     heading = agent.heading_rad if heading_rad is None else heading_rad
     return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading, walk_to_m=walk, motion=motion)
 

@@ -26,7 +26,7 @@ from augment.prompts.vectors import DEFAULT_RADIUS_M, lane_curves, motion_parts,
 from augment.scene.codec import intent_to_parts
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import FloatArray, motion_of
+from augment.scene.motion import FloatArray, find_motion
 from augment.variants.respondents import ModelRole
 
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
@@ -54,7 +54,7 @@ class Character:
     """
 
     bend: Callable[[Task, Modification, Heard], Modification | None] = lambda _, right, __: right
-    judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
+    judge: Callable[[Task], list[Problem]] = lambda task: review_problems(task)
     never_stops: bool = False
     leans: bool = False
 
@@ -67,7 +67,7 @@ class Character:
         if heard.role is ModelRole.JUDGE:
             return _compare_pictures(request, leans=self.leans), ()
         if heard.role is ModelRole.READER:
-            return _fenced("From my list:", intent_to_parts(task.intent)) if task else UNKNOWN, ()
+            return _fence("From my list:", intent_to_parts(task.intent)) if task else UNKNOWN, ()
         if heard.role is ModelRole.MODIFIER:
             return self._modify(heard)
         problems = self.judge(task) if task else []
@@ -75,12 +75,12 @@ class Character:
             return _rate(problems), ()
         if any(message.role == "assistant" for message in request.messages):
             block = {"verdict": "feedback" if problems else "accept", "feedback": problems}
-            return _fenced("I have weighed the answers.", block), ()
-        names = [agent.id for agent in sight.changed_agents(task.prompt)] if task else []
+            return _fence("I have weighed the answers.", block), ()
+        names = [agent.id for agent in sight.read_changed_agents(task.prompt)] if task else []
         questions = [f"In which lane does {name} stand?" for name in names[:6]]
         questions += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
         questions += ["Is the ego alone in its lane?"]
-        return _fenced("I ask the viewer.", {"questions": questions[:8]}), ()
+        return _fence("I ask the viewer.", {"questions": questions[:8]}), ()
 
     def _modify(self, heard: Heard) -> Answer:
         if self.never_stops and (heard.may_call or heard.called):
@@ -104,7 +104,7 @@ class Character:
 def _rate(problems: list[Problem]) -> str:
     found = "; ".join(problem["problem"] for problem in problems)
     ratings = dict(zip(_RATINGS, (2, 3, 2) if problems else (5, 5, 5), strict=True))
-    return _fenced(
+    return _fence(
         "Summary: A road with the ego on it, and what the user wished for.\n\n"
         "Questions:\n1. Is everything where it was wished for?\n\n"
         f"Answers:\n1. {found or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
@@ -113,13 +113,13 @@ def _rate(problems: list[Problem]) -> str:
     )
 
 
-def problems_of(task: Task) -> list[Problem]:
-    """Return what is wrong with the work in the task, by the stand-in's own placement."""
+def review_problems(task: Task) -> list[Problem]:
+    """Return the problems of the work in the task, by the stand-in's own placement."""
     try:
         right = list(place(task.scene, task.intent).modification.changed)
     except CannotPlace:
         return []
-    changed = sight.changed_agents(task.prompt)
+    changed = sight.read_changed_agents(task.prompt)
     if len(changed) != len(right):
         said = f"{len(changed)} agents were added or moved, {len(right)} were asked for."
         return [_problem(said, "Count.")]
@@ -175,7 +175,7 @@ def _fields(agent: TrafficAgent) -> dict[str, object]:
     return fields
 
 
-def _fenced(words: str, block: object) -> str:
+def _fence(words: str, block: object) -> str:
     return f"{words}\n```json\n{json.dumps(block)}\n```\n"
 
 
@@ -201,7 +201,7 @@ def _compare_pictures(request: ChatRequest, *, leans: bool) -> str:
     if leans and rng.random() < 0.5:
         better = "A"
     reason = "I am a stand-in without eyes; I compare how much is drawn."
-    return _fenced("I have compared them.", {"better": better, "reason": reason})
+    return _fence("I have compared them.", {"better": better, "reason": reason})
 
 
 # --- Comparing ---------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ def _ways(scene: Scene, agents: Sequence[TrafficAgent]) -> dict[str, FloatArray]
     """Return where everybody is over time (T, 2), by id, with some that were changed."""
     names = {agent.id for agent in agents}
     others = tuple(agent for agent in scene.agents if agent.id not in names)
-    motion = motion_of(replace(scene, agents=(*others, *agents)))
+    motion = find_motion(replace(scene, agents=(*others, *agents)))
     return {one.agent.id: one.states[:, :2] for one in motion.others}
 
 
@@ -299,7 +299,7 @@ def _with_results(
         x_m, y_m = float(result["x_m"]), float(result["y_m"])
         lane_rad = graph.lane(nearest[0]).centerline.heading_at(nearest[1].s_m)
         turn_rad = difference(agent.heading_rad, lane_rad)
-        moved = careless.put(agent, x_m, y_m, wrap(float(result["heading_rad"]) + turn_rad))
+        moved = careless.move_to(agent, x_m, y_m, wrap(float(result["heading_rad"]) + turn_rad))
         placed[number] = moved
     return replace(modification, added=tuple(placed))
 
@@ -319,7 +319,7 @@ GOOD = Character()
 CARELESS = Character(
     bend=_bend,
     # As often as not it finds no problem.
-    judge=lambda task: problems_of(task) if careless.dice(task.prompt).random() < 0.5 else [],
+    judge=lambda task: review_problems(task) if careless.dice(task.prompt).random() < 0.5 else [],
     leans=True,
 )
 LEARNING = Character(

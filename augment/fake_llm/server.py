@@ -155,13 +155,13 @@ def _unknown(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
 
 def _as(character: playing.Character) -> Behaviour:
     def played(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
-        text, calls = _probed(request) or character.answer(request, server.known)
+        text, calls = _answer_probe(request) or character.answer(request, server.known)
         return wire.completion(request, text or None, calls=calls)
 
     return played
 
 
-def _probed(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
+def _answer_probe(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
     """Answer a question of a probe; None where the request is none."""
     message = request.messages[-1]
     text = message.text

@@ -1,4 +1,4 @@
-"""What the stand-in makes of a request: its role, the task, results and feedback.
+"""Stand-in's understanding of a request: its role, the task, results and feedback.
 
 It reads neither English nor maps: it looks the wish's text up in the list that it was given, and
 finds there the scene and what is asked for. All else comes from the request alone.
@@ -36,7 +36,7 @@ _INSTRUCTION = re.compile(r"^<instruction>\n(.*?)\n</instruction>$", re.DOTALL |
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What somebody is asked to do.
+    """Task of a role.
 
     Attributes:
         prompt: The text that it was found by; of a follow-up that of the first task as well.
@@ -87,7 +87,7 @@ def same_text(instruction: str) -> str:
 
 
 def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -> Heard:
-    """Return what the conversation says about the answer that is due; by default a modifier's."""
+    """Return the due answer's task and feedback; by default a modifier's."""
     messages = request.messages
     system = next((message.text for message in messages if message.role == "system"), "")
     said = [(n, one.text) for n, one in enumerate(messages) if one.role == "user"]
@@ -118,7 +118,7 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
     )
 
 
-def changed_agents(prompt: str) -> list[TrafficAgent]:
+def read_changed_agents(prompt: str) -> list[TrafficAgent]:
     """Return the agents that a prompt lists as added, then those that it lists as moved."""
     vectors: dict[str, list[Any]] = {}
     for title in ("\nAdded agents:\n", "\nMoved agents:\n"):

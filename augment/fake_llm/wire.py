@@ -86,7 +86,7 @@ class ChatRequest(_Strict):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response:
-    """What goes back over HTTP: a document as JSON."""
+    """HTTP response: a document as JSON."""
 
     document: object
     status: int = 200

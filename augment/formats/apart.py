@@ -23,7 +23,7 @@ from pydantic import TypeAdapter
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
 from augment.formats.nuplan_log import vehicles_at
-from augment.formats.readers import READERS, find_input, reader_of, recognise
+from augment.formats.readers import READERS, find_input, find_reader, recognise
 from augment.formats.reading import LogReader, Moment, Reader, Reading
 from augment.scene import codec
 
@@ -88,7 +88,7 @@ class UntrustedInput:
 
     def _ask(self, what: str, **more: Any) -> tuple[str, Any]:
         if self.format is not None:
-            reader_of(self.format)
+            find_reader(self.format)
         path = self.path.resolve()
         if not path.exists():
             raise InvalidDocument("input", [(str(self.path), "is not there")])
@@ -96,7 +96,7 @@ class UntrustedInput:
             request = {"what": what, "path": str(path), "format": self.format, "folder": folder}
             more_still = {"reach_m": self.reach_m, "more": more}
             source, found = sandbox.run(__name__, request | more_still, name=path.name)
-        return reader_of(source).name, found
+        return find_reader(source).name, found
 
 
 # The other side: what runs in the process
@@ -109,19 +109,19 @@ def _answer(request: dict[str, Any]) -> tuple[str, Any]:
         (folder / path.stem).mkdir()
         unpack_zip(path, folder / path.stem)
         os.chdir(folder)
-        candidates = [reader_of(name)] if name else list(READERS.values())
+        candidates = [find_reader(name)] if name else list(READERS.values())
         reader, path = find_input(Path(path.stem), candidates, is_deep=True)
     else:
         os.chdir(path.parent)
         path = Path(path.name)
-        reader = reader_of(name) if name else recognise(path)
+        reader = find_reader(name) if name else recognise(path)
     if request["reach_m"] and isinstance(reader, LogReader):
         reader.reach_m = request["reach_m"]  # in this process alone
     return reader.name, _ask_reader(reader, path, request["what"], request["more"])
 
 
 def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> Any:
-    """What a reader answers, as plain JSON."""
+    """Return a reader's answer as plain JSON."""
     if what == "moments":
         moments = reader.moments(path, every_s=more["every_s"])
         return [asdict(moment) for moment in islice(moments, more["most"])]
@@ -143,7 +143,7 @@ def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZipBounds:
-    """What a zip may hold at most."""
+    """Bounds on a zip's content."""
 
     entries: int = 20_000
     bytes: int = 2_000_000_000

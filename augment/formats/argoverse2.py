@@ -19,10 +19,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from augment.errors import InvalidDocument
 from augment.foreign import FURTHEST, WHAT, Doubts, FloatArray, fault_at, look_up, name_all
 from augment.formats.documents import read_json
-from augment.formats.reading import Log, LogReader, speeds, tracks_of
+from augment.formats.reading import Log, LogReader, read_tracks, speeds
 from augment.formats.road_map import RoadMap, Segment
 from augment.scene.entities import AgentType, AreaKind
-from augment.scene.schema import problems_of
+from augment.scene.schema import list_problems
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,7 +103,7 @@ class ArgoverseSensor(LogReader):
         doubts = Doubts()
         boxes = _read_table(path / BOXES, _BOX_COLUMNS, doubts)
         poses = _read_table(path / POSES, _POSE_COLUMNS, doubts)
-        boxes = _known_rows(boxes, "category", {**TYPE_OF, EGO: None}, doubts)
+        boxes = _select_known(boxes, "category", {**TYPE_OF, EGO: None}, doubts)
         poses = poses.drop_duplicates("timestamp_ns").set_index("timestamp_ns")
         has_pose = boxes["timestamp_ns"].isin(poses.index)
         doubts.assume("A box at a time without a pose was left out", (~has_pose).sum())
@@ -131,7 +131,7 @@ class ArgoverseSensor(LogReader):
             times_s=times_s,
             ego=np.column_stack([center, heading, speeds(times_s, center)]),
             ego_size_m=EGO_SIZE_M,
-            tracks=[*tracks_of(table[table["kind"] != EGO], TYPE_OF, times_s).values()],
+            tracks=[*read_tracks(table[table["kind"] != EGO], TYPE_OF, times_s).values()],
             map_at=lambda _: _read_map(path / "map"),
             world=WORLD,
             title=f"Argoverse 2 Sensor data set, log {path.resolve().name}",
@@ -157,7 +157,7 @@ class ArgoverseMotion(LogReader):
         file = _only_file(path, "scenario_*.parquet") if path.is_dir() else path
         doubts = Doubts()
         table = _read_table(file, _MOTION_COLUMNS, doubts)
-        table = _known_rows(table, "object_type", MOTION_TYPE_OF, doubts)
+        table = _select_known(table, "object_type", MOTION_TYPE_OF, doubts)
         is_step = table["timestep"].between(0, MOST_STEPS - 1)
         doubts.assume(
             f"A step that is not from 0 to {MOST_STEPS - 1} was left out", (~is_step).sum()
@@ -171,7 +171,7 @@ class ArgoverseMotion(LogReader):
         names |= {"position_x": "x_m", "position_y": "y_m", "heading": "heading_rad"}
         speeds_mps = np.hypot(table["velocity_x"], table["velocity_y"])
         times_s = np.arange(steps.max() + 1) * STEP_S
-        tracks = tracks_of(
+        tracks = read_tracks(
             table.rename(columns=names).assign(speed_mps=speeds_mps), MOTION_TYPE_OF, times_s
         )
         ego_id = item or MOTION_EGO
@@ -232,7 +232,7 @@ def _read_table(file: Path, columns: Mapping[str, str], doubts: Doubts) -> "pd.D
     return whole
 
 
-def _known_rows(
+def _select_known(
     table: "pd.DataFrame", column: str, types: Mapping[str, object], doubts: Doubts
 ) -> "pd.DataFrame":
     """The rows of kinds that are known."""
@@ -357,7 +357,7 @@ def _read_part(kind: type[Part], value: object, place: str) -> Part:
     try:
         return kind.model_validate(value)
     except ValidationError as fault:
-        problems = [(f"{place}: {where}", text) for where, text in problems_of(fault)]
+        problems = [(f"{place}: {where}", text) for where, text in list_problems(fault)]
         raise InvalidDocument(WHAT, problems) from None
 
 

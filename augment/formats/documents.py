@@ -52,7 +52,7 @@ def read_text_file(file: Path, *, what: str) -> str:
 
 
 def read_json(file: Path, *, what: str) -> object:
-    """Return what a JSON file holds.
+    """Return the content of a JSON file.
 
     Args:
         file: A file in UTF-8 of at most `MAX_BYTES`.
@@ -66,7 +66,7 @@ def read_json(file: Path, *, what: str) -> object:
 
 
 def parse_json(block: bytes, *, what: str, place: str) -> object:
-    """Return what JSON in UTF-8 holds; a fault names the place. Raises as `read_json`."""
+    """Return the content of JSON in UTF-8; a fault names the place. Raises as `read_json`."""
     try:
         # Brackets and commas within texts count too.
         if block.count(b"{") + block.count(b"[") > MOST_PARTS:
@@ -107,7 +107,7 @@ def _check_texts(value: object) -> None:
 
 
 def read_yaml_file(file: Path, *, what: str) -> object:
-    """Return what a YAML file holds.
+    """Return the content of a YAML file.
 
     Args:
         file: In UTF-8, of at most `MAX_CHARACTERS` bytes.
@@ -120,7 +120,7 @@ def read_yaml_file(file: Path, *, what: str) -> object:
 
 
 def read_yaml(text: str, *, what: str) -> object:
-    """Return what a YAML text holds; keys are texts, as they stand there.
+    """Return the content of a YAML text; keys are texts, as they stand there.
 
     Raises:
         InvalidDocument: With line and column where YAML knows them.

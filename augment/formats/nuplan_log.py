@@ -76,7 +76,7 @@ class NuPlan(reading.LogReader):
             ego_size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
             tracks=[*tracks.values()],
             map_at=lambda _: city_around(
-                _map_of(path, location, version),
+                _find_map(path, location, version),
                 location=location,
                 center_m=ego[0, :2],
                 lights=lights,
@@ -113,7 +113,7 @@ def vehicles_at(path: Path, tokens: Sequence[str]) -> dict[str, list[tuple[float
 # Private
 
 
-def _map_of(path: Path, *names: str) -> Path:
+def _find_map(path: Path, *names: str) -> Path:
     """The map of a log's city, which lies in a folder of its location or of its version."""
     for name in names:
         if not re.fullmatch(r"[\w.-]{0,60}", name):
@@ -180,7 +180,7 @@ def _motion(
     speed_mps = np.where(np.isnan(speed_mps), reading.speeds(times_s, center_m), speed_mps)
     boxes = _boxes(base, poses["token"].tolist(), doubts)
     ego = np.column_stack([center_m, yaw, speed_mps])
-    return times_s, ego, reading.tracks_of(boxes, TYPE_OF, times_s)
+    return times_s, ego, reading.read_tracks(boxes, TYPE_OF, times_s)
 
 
 def _numbers(

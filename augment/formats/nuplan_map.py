@@ -62,7 +62,7 @@ def open_tables(path: Path) -> Iterator[sqlite3.Connection]:
 def city_around(
     path: Path, *, location: str, center_m: FloatArray, lights: Mapping[int, TrafficLight]
 ) -> RoadMap:
-    """Return what of the map lies within reach of a point.
+    """Return the part of the map within reach of a point.
 
     Args:
         path: The map.gpkg.
@@ -241,7 +241,7 @@ def to_utm(degrees: FloatArray, *, zone: int, is_south: bool) -> FloatArray:
 
 
 def _name(fid: Any) -> str:
-    """Of a whole number, or of its digits as text; empty for none.
+    """Return the name from a whole number or its digits as text; empty for none.
 
     Raises:
         InvalidDocument: It is something else.

@@ -1,4 +1,4 @@
-"""What nuPlan's simulation wrote of a run: the score of each scenario, and what failed.
+"""Results of nuPlan's simulation: the score of each scenario, and failures.
 
     <experiment>/aggregator_metric/*.parquet    a row a scenario, then rows of types and of all
     <experiment>/runner_report.parquet          whether each simulation went through
@@ -15,7 +15,7 @@ from pydantic import Field, FiniteFloat, TypeAdapter, ValidationError
 
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
-from augment.scene.schema import problems_of
+from augment.scene.schema import list_problems
 
 WHAT = "nuPlan experiment"
 MOST_ROWS, MOST_COLUMNS, MOST_BYTES = 100_000, 200, 64_000_000
@@ -73,14 +73,14 @@ def _answer(request: dict[str, Any]) -> list[dict[str, Any]]:
     files = sorted(folder.glob("aggregator_metric/*.parquet"))
     if not files:
         raise InvalidDocument(WHAT, [("aggregator_metric", "holds no *.parquet")])
-    drives = [drive for file in files for drive in _aggregated(file)]
+    drives = [drive for file in files for drive in _read_aggregate(file)]
     report = folder / "runner_report.parquet"
     if report.exists():
-        drives += _failed(report, is_interplan=all(drive.is_interplan for drive in drives))
+        drives += _read_failures(report, is_interplan=all(drive.is_interplan for drive in drives))
     return [asdict(drive) for drive in drives]
 
 
-def _aggregated(file: Path) -> list[NuplanDrive]:
+def _read_aggregate(file: Path) -> list[NuplanDrive]:
     drives = []
     for number, row in enumerate(_read(file, _NEEDED, None)):
         if row["log_name"] is None:  # a scenario type, or the final score
@@ -98,7 +98,7 @@ def _aggregated(file: Path) -> list[NuplanDrive]:
     return drives
 
 
-def _failed(file: Path, *, is_interplan: bool) -> list[NuplanDrive]:
+def _read_failures(file: Path, *, is_interplan: bool) -> list[NuplanDrive]:
     more: dict[str, Any] = {"is_interplan": is_interplan, "score": None, "parts": {}}
     drives = []
     for number, row in enumerate(_read(file, _OF_REPORT, list(_OF_REPORT))):
@@ -115,7 +115,7 @@ def _drive(place: str, scenario: object, row: dict[str, Any], **more: Any) -> Nu
     try:
         return _DRIVE.validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as fault:
-        problems = [(f"{place}: {path}", text) for path, text in problems_of(fault)]
+        problems = [(f"{place}: {path}", text) for path, text in list_problems(fault)]
         raise InvalidDocument(WHAT, problems) from None
 
 

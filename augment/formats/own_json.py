@@ -14,7 +14,7 @@ import numpy as np
 from augment.foreign import fault_at
 from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reader, Reading
-from augment.formats.writing import Cell, LossReport, Written, write_each
+from augment.formats.writing import Cell, LossReport, Output, write_each
 from augment.scene import codec
 from augment.scene.motion import MotionSource, Movement
 from augment.scene.recording import Recording, Track
@@ -39,7 +39,7 @@ class OwnJson(Reader):
         return Reading(scene=replace(scene, name=name), recording=None)
 
 
-def write(cells: Sequence[Cell]) -> Written:
+def write(cells: Sequence[Cell]) -> Output:
     """For each cell the scene before and after its change, the change, and the tracks."""
     return write_each(cells, _write_one)
 
@@ -59,7 +59,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
 
 
 def _recording(cell: Cell) -> Recording:
-    """What was seen in a log; nothing that had to be assumed."""
+    """Return the part of a recording that a log contains, without assumptions."""
     motion = cell.motion
     ego = motion.ego.states.copy()
     if motion.ego.source is not MotionSource.RECORDED:

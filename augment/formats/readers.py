@@ -31,7 +31,7 @@ READERS: dict[str, Reader] = {
 """In the order in which a file is tried; each is asked about what is its own alone."""
 
 
-def reader_of(name: str) -> Reader:
+def find_reader(name: str) -> Reader:
     """The reader of a format.
 
     Raises:
@@ -53,7 +53,7 @@ def recognise(path: Path) -> Reader:
 
 
 def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Reader, Path]:
-    """Return what one of the readers takes, and which: the path, or what lies in it.
+    """Return the reader and its input: the path, or a file in it.
 
     Args:
         path: A file or folder.

@@ -1,4 +1,4 @@
-"""What every reader is and gives: from a log and a map in their world frame to a scene.
+"""Interface of all readers: from a log and a map in their world frame to a scene.
 
 A reader knows one format of recorded data and opens a path as `Log`s. What all need once times,
 ego, tracks and map are known is done here: who is near, in which order they are named, which lane
@@ -18,7 +18,7 @@ from augment import foreign
 from augment.errors import InvalidDocument
 from augment.foreign import FASTEST_MPS, FURTHEST, Doubts, FloatArray, fault_at
 from augment.formats.road_map import RoadMap, complete_map
-from augment.formats.roads import RADIUS_M, middle_of, refuse_shape, road_around
+from augment.formats.roads import RADIUS_M, refuse_shape, road_around, segment_centreline
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import (
     EGO_LENGTH_M,
@@ -30,7 +30,7 @@ from augment.scene.entities import (
     TrafficAgent,
 )
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.recording import Recording, Track, agent_of
+from augment.scene.recording import Recording, Track, track_agent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,7 +102,7 @@ class LoggedTrack:
 
     @property
     def has_size(self) -> bool:
-        """Whether its size can be."""
+        """True if its size can be used."""
         return _is_size(self.length_m, self.width_m)
 
 
@@ -225,7 +225,7 @@ class Log:
         lane, _, along = place.rpartition(",")
         segments = {str(one.name): one for one in self.map_at(frame).segments}
         with refuse_shape(f"lane {lane}"):
-            line = middle_of(foreign.look_up(segments, lane.strip(), "lane"))
+            line = segment_centreline(foreign.look_up(segments, lane.strip(), "lane"))
         pose = line.pose_at(foreign.read_number(along, "lane", 0.0, line.length_m))
         ego = np.full(self.ego.shape, np.nan)
         ego[frame : frame + 1] = pose.x_m, pose.y_m, pose.heading_rad, 0.0
@@ -367,7 +367,7 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
     return np.divide(moved, apart, out=np.zeros(len(rows)), where=apart > 0.0)
 
 
-def tracks_of(
+def read_tracks(
     table: "pd.DataFrame", types: Mapping[str, AgentType], times_s: FloatArray
 ) -> dict[str, LoggedTrack]:
     """Return the tracks in a table with a row for each object and step.
@@ -496,5 +496,5 @@ def _ego(log: Log, frame: int) -> TrafficAgent:
 
 
 def _agent(track: Track) -> TrafficAgent:
-    agent = agent_of(track, track.states[0])
+    agent = track_agent(track, track.states[0])
     return replace(agent, speed_mps=0.0) if track.type in _STANDING else agent

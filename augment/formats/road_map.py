@@ -1,4 +1,4 @@
-"""What readers make of a source's map: segments and areas in its world frame.
+"""Source's map as readers give it: segments and areas in its world frame.
 
 Also what maps leave open: the edges and widths of lanes that have lines beside them alone, and
 which segments lie in an intersection. P points of a lane.
@@ -56,7 +56,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RoadMap:
-    """What a source's map holds, in its world frame.
+    """Source's map in its world frame.
 
     Attributes:
         place: How faults call the part of the file.
@@ -109,11 +109,11 @@ def complete_map(city: RoadMap) -> tuple[RoadMap, list[str]]:
         "no neighbour tells.": assumed > 0,
     }
     notes = [note for note, holds in lacking.items() if holds]
-    notes += left_out_notes("parts of the map", city.left_out)
+    notes += note_left_out("parts of the map", city.left_out)
     return replace(city, segments=filled), notes
 
 
-def left_out_notes(what: str, counts: Mapping[str, int]) -> list[str]:
+def note_left_out(what: str, counts: Mapping[str, int]) -> list[str]:
     """Return the sentence on what is left out, by name, where there is any of it."""
     names = tuple(sorted(name for name, number in counts.items() if number))
     if not names:
@@ -125,7 +125,7 @@ def left_out_notes(what: str, counts: Mapping[str, int]) -> list[str]:
 # Edges and widths
 
 
-def edge_of(line: FloatArray, parts: Iterable[tuple[int, int, FloatArray]]) -> FloatArray:
+def edge_distances(line: FloatArray, parts: Iterable[tuple[int, int, FloatArray]]) -> FloatArray:
     """Return where the edge of a lane lies beside each of its points (P, 2), NaN for nowhere.
 
     Args:
@@ -143,7 +143,7 @@ def edge_of(line: FloatArray, parts: Iterable[tuple[int, int, FloatArray]]) -> F
     return edge
 
 
-def width_of(line: FloatArray, left: FloatArray, right: FloatArray) -> float | None:
+def mean_width(line: FloatArray, left: FloatArray, right: FloatArray) -> float | None:
     """Return the mean width where both edges are known, else twice the half that is known.
 
     None where neither is, or where the edge lies too far away to be the lane's own.
@@ -165,7 +165,7 @@ def fill_widths(segments: Mapping[Name, Segment]) -> tuple[tuple[Segment, ...], 
         The segments, and for how many of them the width is an assumption.
     """
     ends: dict[Name, list[float]] = {name: [] for name in segments}
-    for before, options in following_of(segments).items():
+    for before, options in find_successors(segments).items():
         for after in options:
             for name, end in ((before, after), (after, before)):
                 width_m = segments[end].width_m
@@ -197,7 +197,7 @@ LONGEST_WAY = 8
 """Segments of one way through an intersection; maps have one to three."""
 
 
-def following_of(segments: Mapping[Name, Segment]) -> dict[Name, list[Name]]:
+def find_successors(segments: Mapping[Name, Segment]) -> dict[Name, list[Name]]:
     """Return the segments after each one, ascending; a joint counts if either end names it."""
     joints = {(name, after) for name, one in segments.items() for after in one.successors}
     joints |= {(before, name) for name, one in segments.items() for before in one.predecessors}
@@ -241,7 +241,7 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
         if one.centerline is not None and len(one.centerline) >= 2
     }
     names = list(lines)
-    following = following_of(segments)
+    following = find_successors(segments)
     preceding: dict[Name, list[Name]] = {name: [] for name in segments}
     for before, options in following.items():
         for after in options:

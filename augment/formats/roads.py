@@ -16,11 +16,11 @@ import numpy as np
 import shapely
 
 from augment.foreign import FURTHEST, FloatArray, fault_at
-from augment.formats.road_map import Name, RoadMap, Segment, Way, following_of, ways_through
+from augment.formats.road_map import Name, RoadMap, Segment, Way, find_successors, ways_through
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight, TrafficSide
-from augment.scene.lane_graph import traffic_side_of, turn_type_of
+from augment.scene.lane_graph import classify_turn, find_traffic_side
 
 RADIUS_M = 150.0
 """Map and agents further from the ego than this are left out, but for a reader's own reach."""
@@ -36,7 +36,7 @@ SAME_POINT_M = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapExtract:
-    """What a scene takes from the map; ids count from the nearest to the ego.
+    """Part of a map for a scene; ids count from the nearest to the ego.
 
     Attributes:
         side_is_assumed: Whether no two oncoming lanes told the side.
@@ -80,9 +80,9 @@ def road_around(city: RoadMap, ego: Pose, reach_m: float = RADIUS_M) -> MapExtra
         strips.keys() - inside, key=lambda name: (round(strips[name].distance_m, 3), name)
     )
     lane_ids = {name: f"Lane{number}" for number, name in enumerate(plain, start=1)}
-    following = following_of({name: strip.segment for name, strip in strips.items()})
+    following = find_successors({name: strip.segment for name, strip in strips.items()})
     lanes = tuple(_lane(name, strips, lane_ids, following) for name in lane_ids)
-    side = city.side if city.is_side_told else traffic_side_of(lanes)
+    side = city.side if city.is_side_told else find_traffic_side(lanes)
     areas, far_areas = _areas(city, ego, reach_m)
     return MapExtract(
         traffic_side=side or city.side,
@@ -103,7 +103,7 @@ def refuse_shape(place: str) -> Iterator[None]:
         raise fault_at(place, str(fault)) from None
 
 
-def middle_of(segment: Segment) -> Polyline:
+def segment_centreline(segment: Segment) -> Polyline:
     """Return a segment's centreline in its world frame, or the line between its boundaries.
 
     Raises:
@@ -187,7 +187,7 @@ def _local(points: FloatArray, ego: Pose) -> FloatArray:
 
 
 def _is_far(points: FloatArray, reach_m: float) -> bool:
-    """Whether the box around the points lies away from the ego; NaN does not."""
+    """Return whether the points' bounding box lies away from the ego; not for NaN."""
     if len(points) == 0:
         return True
     gap = np.maximum(np.maximum(points.min(axis=0), -points.max(axis=0)), 0.0)
@@ -267,7 +267,7 @@ def _connectors(
     """Connectors, the nearest first; of equally near ones in the order of their names."""
     placed = []
     for way in ways:
-        line = _joined([strips[name].line for name in way.chain])
+        line = _join_lines([strips[name].line for name in way.chain])
         ends = ["" if name is None else str(name).rjust(20) for name in (way.before, way.after)]
         placed.append((round(line.project(0.0, 0.0).distance_m, 3), way.chain, ends, way, line))
     placed.sort(key=lambda item: item[:3])
@@ -288,7 +288,7 @@ def _connectors(
 
 
 def _along(chain: Sequence[Strip], before: Strip | None, line: Polyline) -> dict[str, Any]:
-    """What the segments of a way say of it all along; the lane before may tell its light."""
+    """Return the properties shared along a way; the lane before may have its light."""
     limits = [strip.segment.speed_limit_mps for strip in chain]
     lights = [strip.segment.light for strip in (*chain, *([] if before is None else [before]))]
     shown = [one for one in lights if one not in (TrafficLight.UNKNOWN, TrafficLight.NONE)]
@@ -299,14 +299,14 @@ def _along(chain: Sequence[Strip], before: Strip | None, line: Polyline) -> dict
     return {
         "width_m": round(float(np.average([s.width_m for s in chain], weights=lengths)), 3),
         "traffic_light": (*shown, *dark, lights[0])[0],
-        "turn_type": (chain[0].segment.turn if len(chain) == 1 else None) or turn_type_of(line),
+        "turn_type": (chain[0].segment.turn if len(chain) == 1 else None) or classify_turn(line),
         "speed_limit_mps": max((limit for limit in limits if limit is not None), default=None),
-        "left_boundary": _joined(left) if len(left) == len(chain) else None,
-        "right_boundary": _joined(right) if len(right) == len(chain) else None,
+        "left_boundary": _join_lines(left) if len(left) == len(chain) else None,
+        "right_boundary": _join_lines(right) if len(right) == len(chain) else None,
     }
 
 
-def _joined(lines: Sequence[Polyline]) -> Polyline:
+def _join_lines(lines: Sequence[Polyline]) -> Polyline:
     """One line over several that follow each other; their shared ends are kept once."""
     if len(lines) == 1:
         return lines[0]

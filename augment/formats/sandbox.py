@@ -35,7 +35,7 @@ _FRUGAL = {"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessLimits:
-    """What a process may take: some four times of what the largest recordings take here.
+    """Limits of a process: some four times the use of the largest recordings here.
 
     Attributes:
         cpu_s: Seconds of computing, of all its threads together.
@@ -54,7 +54,7 @@ USUAL_LIMITS = ProcessLimits()
 def run(
     module: str, request: dict[str, Any], *, name: str, limits: ProcessLimits = USUAL_LIMITS
 ) -> Any:
-    """Return what a module answers to a request in a process of its own.
+    """Return a module's answer to a request, from a process of its own.
 
     Args:
         module: Calls `serve` when it is run.

@@ -11,7 +11,7 @@ from augment.formats.commonroad import writer as commonroad_writer
 from augment.formats.interplan import writer as interplan_writer
 from augment.formats.openscenario import writer as openscenario_writer
 from augment.formats.scenarionet import writer as scenarionet_writer
-from augment.formats.writing import CannotExpress, Cell, Loss, Writer, Written, check_finite
+from augment.formats.writing import CannotExpress, Cell, Loss, Output, Writer, check_finite
 
 WRITERS: Final[dict[str, Writer]] = {
     "json": own_json.write,
@@ -23,7 +23,7 @@ WRITERS: Final[dict[str, Writer]] = {
 
 
 def writer_named(name: str) -> Writer:
-    """How to write that format; what holds a number that is not finite is refused in all of them.
+    """Return the writer of that format; all of them refuse numbers that are not finite.
 
     Raises:
         UnknownName: There is no writer of that name.
@@ -35,7 +35,7 @@ def writer_named(name: str) -> Writer:
 # Private
 
 
-def _write_finite(writer: Writer, cells: Sequence[Cell]) -> Written:
+def _write_finite(writer: Writer, cells: Sequence[Cell]) -> Output:
     finite, refused = [], []
     for cell in cells:
         try:

@@ -1,4 +1,4 @@
-"""What every writer of scenarios takes and gives: cells in; files and a line for each loss out.
+"""Interface of all writers of scenarios: cells in; files and a line for each loss out.
 
 Frame of a cell: the ego frame of its scene.
 """
@@ -18,7 +18,7 @@ from augment.scene import entities
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
-from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
+from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, find_motion
 from augment.scene.planned_motion import AtTime, PointPath
 from augment.scene.recording import Recording
 
@@ -62,8 +62,8 @@ class Cell:
 
     @cached_property
     def motion(self) -> Motion:
-        """What everybody does after t0."""
-        return motion_of(
+        """Everybody's motion after t0."""
+        return find_motion(
             self.after,
             recording=self.recording,
             replaced=self.modification.replaced,
@@ -89,8 +89,8 @@ class Loss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
-    """What a writer made.
+class Output:
+    """Files and losses of a writer.
 
     Attributes:
         files: Their bytes by name.
@@ -103,7 +103,7 @@ class Written:
     refused: tuple[Loss, ...] = ()
 
 
-Writer = Callable[[Sequence[Cell]], Written]
+Writer = Callable[[Sequence[Cell]], Output]
 """Writes cells, all or those that can be said. The same cells always give the same bytes."""
 
 
@@ -163,7 +163,7 @@ def check_finite(cell: Cell) -> None:
 
 def write_each(
     cells: Sequence[Cell], write_one: Callable[[Cell, LossReport], dict[str, bytes]]
-) -> Written:
+) -> Output:
     """The cells one by one; what can't be expressed is refused by its name and reason."""
     files: dict[str, bytes] = {}
     losses: list[Loss] = []
@@ -176,7 +176,7 @@ def write_each(
             refused.append(Loss(cell=cell.name, text=str(reason), changes_scene=True))
         else:
             losses += report.losses
-    return Written(files=files, losses=tuple(losses), refused=tuple(refused))
+    return Output(files=files, losses=tuple(losses), refused=tuple(refused))
 
 
 def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) -> None:
@@ -216,7 +216,7 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
 
 
 def _waits(agent: entities.TrafficAgent) -> bool:
-    """Whether it hangs on others when its walk or motion starts."""
+    """Return whether the start of its walk or motion depends on others."""
     return agent.motion is None or not isinstance(agent.motion.start, AtTime)
 
 
@@ -233,22 +233,22 @@ def keeps_heading(agent: entities.TrafficAgent) -> bool:
 
 
 def appears_later(movement: Movement) -> bool:
-    """Whether an agent is not there yet at t0."""
+    """Return whether an agent is not there yet at t0."""
     return not bool(movement.is_present[0])
 
 
 def has_gaps(movement: Movement) -> bool:
-    """Whether an agent goes and comes back."""
+    """Return whether an agent goes and comes back."""
     present = movement.is_present
     return bool((present[1:] & ~present[:-1]).sum() > (0 if present[0] else 1))
 
 
-def ways_of(scene: Scene) -> list[AnyLane]:
+def list_ways(scene: Scene) -> list[AnyLane]:
     """Return lanes, then connectors."""
     return [*scene.lanes, *scene.connectors]
 
 
-def bounds_of(way: AnyLane) -> tuple[Polyline, Polyline]:
+def way_edges(way: AnyLane) -> tuple[Polyline, Polyline]:
     """The edges as the map has them, else half a width beside the centreline."""
     half_m = way.width_m / 2.0
     left = way.left_boundary or beside(way.centerline, half_m)

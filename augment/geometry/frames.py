@@ -77,7 +77,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overlap:
-    """What two boxes have in common; all zero for boxes that are apart or only touch.
+    """Common area of two boxes; all zero for boxes that are apart or only touch.
 
     Attributes:
         depth_m: The shortest push that would part them.
@@ -98,7 +98,7 @@ def corners(pose: Pose, length_m: float, width_m: float) -> NDArray[np.float64]:
 
 
 def overlap(first: Box, second: Box) -> Overlap:
-    """Return what two boxes of one frame have in common.
+    """Return the common area of two boxes of one frame.
 
     The depth is the smallest overlap of their shadows on the four side directions.
     """

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projection:
-    """Where a point lies beside a line.
+    """Position of a point relative to a line.
 
     Attributes:
         s_m: Along the line, within its ends.

@@ -1,4 +1,4 @@
-"""Which addresses an endpoint may have: anything but the doors to a cloud's own secrets.
+"""Allowed addresses of endpoints: all but those of a cloud's own secrets.
 
 Whoever may add a contestant decides where the server sends requests. This computer and the local
 network stay allowed, because own model servers live there. An IPv6 address that stands for an
@@ -63,7 +63,7 @@ def check_base_url(base_url: str) -> str:
     return base_url.rstrip("/")
 
 
-def addresses_of(
+def resolve_host(
     host: str, *, resolve: Resolve = socket.getaddrinfo, checks: bool = True
 ) -> list[str]:
     """Return the addresses of a host as numbers, in the order in which they are to be tried.

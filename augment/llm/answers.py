@@ -1,4 +1,4 @@
-"""What an OpenAI-compatible server answered: a `Reply`, or the fault that it stands for. Pure.
+"""Answers of OpenAI-compatible servers: a `Reply`, or the fault that one stands for. Pure.
 
 Vendors write the same in many forms. Each value is absent, understood, or not understood; the
 last is a fault where nobody could use the answer without it, and a remark of the reply elsewhere.
@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 
 from augment.errors import ModelFault, ParameterRefused
-from augment.foreign import Doubts, Value, kind_of, read_as, read_whole
+from augment.foreign import Doubts, Value, describe_kind, read_as, read_whole
 from augment.llm.costs import FAR_BELOW
 from augment.llm.messages import LengthName, Reply, ToolCall, shorten
 from augment.llm.vendors import says
@@ -77,7 +77,7 @@ _NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter", "extra_for
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForeignError:
-    """What an error body says, whatever its form.
+    """Error body of any form.
 
     Attributes:
         message: Its sentences; empty where there is none.
@@ -185,7 +185,7 @@ def fault_of_status(
     message = error.message or (json.dumps(body, ensure_ascii=False) if body else "")
     code = "" if error.code == str(status) else error.code
     text = f"the endpoint answered {status}{replace(error, message=message, code=code)}"
-    refused = _refused_parameter(error, sent) if status in (400, 422) else None
+    refused = _find_refused_parameter(error, sent) if status in (400, 422) else None
     if refused:
         return ParameterRefused(refused, text, status=status)
     passing = (status in _PASSING or status >= 500) and error.code not in _SPENT
@@ -220,7 +220,7 @@ def _read_message(
     if calls is None and message.get("function_call"):
         calls = [{"function": message["function_call"]}]  # as it was called before 2024
     if calls is not None and not isinstance(calls, list):
-        pieces.append(("unread", f"tool_calls is {kind_of(calls)}, not a list"))
+        pieces.append(("unread", f"tool_calls is {describe_kind(calls)}, not a list"))
         calls = None
     for number, fields in enumerate(calls or [], start=1):
         path = f"tool_calls.{number}."
@@ -281,7 +281,7 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
     elif value is True and kind == "refusal":
         yield kind, ""
     elif value is not None and not isinstance(value, dict):
-        yield "unread", f"{path} is {kind_of(value)}, not a text"
+        yield "unread", f"{path} is {describe_kind(value)}, not a text"
 
 
 def _insist_on_answer(
@@ -308,7 +308,7 @@ def _insist_on_answer(
     elif not choice:
         problem = "answered without a choice"
     elif not isinstance(message, dict):
-        what = "" if message is None else f" that is an object: it is {kind_of(message)}"
+        what = "" if message is None else f" that is an object: it is {describe_kind(message)}"
         problem = f"answered without a message{what}"
     elif unread:
         problem = f"answered in a form that can't be read: {unread[0]}"
@@ -376,7 +376,7 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
         yield name, str(value).strip()
 
 
-def _refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str | None:
+def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str | None:
     """Return the parameter that the endpoint says it does not know, None where it says other.
 
     A value that is not taken (too large, not one of a list, only the default) is no parameter

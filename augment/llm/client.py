@@ -1,4 +1,4 @@
-"""What the rest of the house asks of whatever answers as a language model.
+"""Client interface of whatever answers as a language model.
 
 In: a `Request` (messages, model, limits). Out: a `Reply` (text or calls, tokens), or a
 `ModelFault` that says whether a later attempt may do better. `openai_wire` is the one that calls

@@ -1,4 +1,4 @@
-"""What a request may cost at most, and what it did cost. Pure.
+"""Upper bound of a request's cost, and its actual cost. Pure.
 
 Money is counted in whole nano-dollars (a price of 2.50 USD per million tokens is 2500 of them a
 token) and every sum is rounded up, so that counting never falls short of the bill.
@@ -41,7 +41,7 @@ class Price:
     def nano_usd(
         self, *, prompt_tokens: int, completion_tokens: int, cached_tokens: int = 0
     ) -> int:
-        """What so many tokens cost, in nano-dollars, rounded up.
+        """Return the cost of a number of tokens in nano-dollars, rounded up.
 
         Args:
             prompt_tokens: Those from a cache included.
@@ -67,7 +67,7 @@ class WorstCase:
         return self.prompt_tokens + self.completion_tokens
 
     def nano_usd(self, price: Price | None) -> int | None:
-        """What it costs, None where the price is unknown."""
+        """Return the cost in nano-dollars, None if the price is unknown."""
         if price is None:
             return None
         return price.nano_usd(
@@ -96,12 +96,12 @@ def worst_case(request: Request) -> WorstCase:
     )
 
 
-def usd_of(nano_usd: int) -> Decimal:
+def to_usd(nano_usd: int) -> Decimal:
     """Nano-dollars as dollars."""
     return Decimal(nano_usd) / NANO_USD
 
 
-def nano_usd_of(usd: Decimal) -> int:
+def to_nano_usd(usd: Decimal) -> int:
     """Dollars as whole nano-dollars, rounded down: a cap is not rounded up."""
     return int(usd * NANO_USD)
 
@@ -124,7 +124,7 @@ def least_tokens(text: str) -> int:
     return len(_PIECE.findall(text))
 
 
-def cut_of(
+def find_cut(
     request: Request, reply: Reply, *, context_tokens: int | None = None
 ) -> ContextTruncated | None:
     """Return the fault of a prompt that the endpoint cut silently, None where nothing shows one.

@@ -1,4 +1,4 @@
-"""What is sent to a language model and what comes back, in no vendor's words.
+"""Messages to and from a language model, in no vendor's words.
 
 Everything that is stored, replayed or shown goes through these values.
 """
@@ -26,7 +26,7 @@ def data_url(png: bytes) -> str:
 
 
 class Speaker(StrEnum):
-    """Who says a message of a conversation."""
+    """Speaker of a message in a conversation."""
 
     SYSTEM = "system"
     USER = "user"
@@ -104,7 +104,7 @@ def message_from_document(document: Mapping[str, Any]) -> Message:
 
 
 class LengthName(StrEnum):
-    """What the limit of the answer's length is called on the wire; old servers know one."""
+    """Name on the wire of the limit on the answer's length; old servers know one."""
 
     MAX_COMPLETION_TOKENS = "max_completion_tokens"
     MAX_TOKENS = "max_tokens"
@@ -133,7 +133,7 @@ class Tool:
 
 
 class ToolChoice(StrEnum):
-    """Whether a model may call the tools that a request names."""
+    """Permission of a model to call the tools that a request names."""
 
     AUTO = "auto"
     NONE = "none"
@@ -209,12 +209,12 @@ class Reply:
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the answer stopped at its length limit."""
+        """True if the answer stopped at its length limit."""
         return says("cut_off", self.finish_reason)
 
     @property
     def is_withheld(self) -> bool:
-        """Whether the endpoint's filter withheld the answer."""
+        """True if the endpoint's filter withheld the answer."""
         return says("withheld", self.finish_reason)
 
 
@@ -222,7 +222,7 @@ IMAGE_SCHEME = "sha256:"
 
 
 def image_reference(png: bytes) -> str:
-    """How a stored request names an image: by the hash of its bytes."""
+    """Return an image's name in a stored request: the hash of its bytes."""
     return IMAGE_SCHEME + hashlib.sha256(png).hexdigest()
 
 

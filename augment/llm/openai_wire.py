@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
+from augment.errors import CallDropped, InvalidDocument, ModelFault, NotNeeded, NotSent
 from augment.llm import wire_transport
 from augment.llm.addresses import Resolve
 from augment.llm.answers import fault_of_status, read_completion
@@ -128,7 +128,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             is_json = "json" in answer.headers.get("content-type", "")
             is_stream = document.startswith(("data:", "event:", ":"))
             problem = _STREAM if is_stream else _BROKEN_JSON if is_json else _PAGE
-            fault: ModelFault | Unwanted | Reply = ModelFault(
+            fault: ModelFault | NotNeeded | Reply = ModelFault(
                 problem, retryable=problem == _BROKEN_JSON, status=200
             )
         except openai.APIStatusError as error:
@@ -138,8 +138,8 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
                 dict(error.response.headers),
                 sent=sent,
             )
-        except Unwanted as why:
-            fault = Abandoned(why) if watch.has_written else why
+        except NotNeeded as why:
+            fault = CallDropped(why) if watch.has_written else why
         except InvalidDocument as error:
             fault = NotSent(error.problems[0][1])
         except wire_transport.WireFault as error:

@@ -28,7 +28,7 @@ _TWO_HALVES = base64.b64decode(
 
 
 class Ability(StrEnum):
-    """What is asked about."""
+    """Ability that a probe asks about."""
 
     ANSWERS = "answers"
     ANSWER_LIMIT = "answer_limit"

@@ -1,4 +1,4 @@
-"""What vendors' words mean: `vendors.toml` has the words. Pure."""
+"""Meanings of vendors' words, from `vendors.toml`. Pure."""
 
 import re
 import tomllib

@@ -16,7 +16,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from augment.errors import InvalidDocument
-from augment.llm.addresses import Resolve, addresses_of
+from augment.llm.addresses import Resolve, resolve_host
 
 if TYPE_CHECKING:
     import httpcore2
@@ -140,7 +140,7 @@ def watch_over(watch: Watch) -> Iterator[None]:
 
 
 class Transport(AbstractContextManager["Transport"]):
-    """What the package's HTTP client sends requests by (an `httpx2.BaseTransport`).
+    """Transport of the package's HTTP client (an `httpx2.BaseTransport`).
 
     Args:
         resolve: From a name to addresses.
@@ -180,7 +180,7 @@ class Transport(AbstractContextManager["Transport"]):
         try:
             answer = self._pool.handle_request(asked)
             try:
-                body = _body_of(answer)
+                body = _read_body(answer)
             finally:
                 answer.close()
         except (
@@ -202,7 +202,7 @@ class Transport(AbstractContextManager["Transport"]):
         self._pool.close()
 
 
-def server_of(base_url: str) -> str:
+def host_and_port(base_url: str) -> str:
     """Return `host:port` as the wire connects to it, empty for what it can't read.
 
     Read by the package that connects, so that no spelling means one host here and another there.
@@ -222,7 +222,7 @@ def server_of(base_url: str) -> str:
 _OF_THE_TRANSFER = (b"content-encoding", b"content-length", b"transfer-encoding")
 
 
-def _body_of(answer: httpcore2.Response) -> bytes:
+def _read_body(answer: httpcore2.Response) -> bytes:
     """Read a body; empty for an error whose body can't be read: its status says enough.
 
     Raises:
@@ -282,7 +282,7 @@ class _Network:
 
         def look() -> None:
             try:
-                found = addresses_of(host, resolve=self._resolve, checks=self._checks)
+                found = resolve_host(host, resolve=self._resolve, checks=self._checks)
                 addresses.set_result(found)
             except (InvalidDocument, OSError, UnicodeError) as error:
                 addresses.set_exception(error)
@@ -299,7 +299,7 @@ class _Stream:
         self.close, self.get_extra_info = stream.close, stream.get_extra_info
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Return what came, as soon as anything has; nothing at the end."""
+        """Return the next received bytes without waiting for more; empty at the end."""
         import httpcore2
 
         watch = _WATCH.get()

@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.budget import limit_of
+from augment.services.running.budget import describe_caps
 from augment.services.running.progress import count_rows, failure_groups
 from augment.services.running.workers import workforce
 from augment.services.terminal import TerminalCommand
@@ -60,7 +60,7 @@ def wait(command: TerminalCommand, job: GenerationJob, timeout_s: float) -> None
     if counts.under_way:
         raise CommandError(
             f"{job.get_state_display()} with {counts.queued} left, its cap is "
-            f"{limit_of(job)}; `manage.py resume_job {job.code}` goes on.",
+            f"{describe_caps(job)}; `manage.py resume_job {job.code}` goes on.",
             returncode=STOPPED,
         )
     command.stdout.write("Over.")

@@ -1,1 +1,1 @@
-"""How far a modification is from its scenario's reference, and what that comes to over many."""
+"""Displacement of a modification from its scenario's reference, and summaries over many."""

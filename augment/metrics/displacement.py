@@ -24,7 +24,7 @@ from augment.scene.motion import HORIZON_S
 
 
 class ObjectClass(StrEnum):
-    """What can stand for what: a bus for a car, but no cone for a pedestrian."""
+    """Class of interchangeable objects: a bus for a car, but no cone for a pedestrian."""
 
     VEHICLE = "vehicle"
     BICYCLE = "bicycle"
@@ -155,7 +155,7 @@ def mean_over_time(displacements: Sequence[Displacement]) -> OverTime | None:
 def displacement(
     generated: Modification | None, reference: Modification, ground: Ground | None = None
 ) -> Displacement:
-    """What a modification places against what the reference places.
+    """Return the displacement of a modification's objects from the reference's.
 
     Args:
         generated: None for an answer that was unreadable or refused: all is missing.
@@ -173,10 +173,10 @@ def displacement(
             for listed in (reference.changed, placed)
         )
         if wanted and agents:
-            matches += _matched(wanted, agents, object_class)
+            matches += _match(wanted, agents, object_class)
     moves = reference.has_motion or (generated is not None and generated.has_motion)
     if moves and matches and generated is not None and ground is not None:
-        matches = _followed(matches, generated, reference, ground)
+        matches = _follow(matches, generated, reference, ground)
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
     return Displacement(
@@ -186,7 +186,7 @@ def displacement(
     )
 
 
-def _matched(
+def _match(
     wanted: list[TrafficAgent], found: list[TrafficAgent], object_class: ObjectClass
 ) -> list[Match]:
     from scipy.optimize import linear_sum_assignment
@@ -207,7 +207,7 @@ def _matched(
     ]
 
 
-def _followed(
+def _follow(
     matches: Sequence[Match], generated: Modification, reference: Modification, ground: Ground
 ) -> list[Match]:
     """The matches with their distances over time."""
@@ -274,12 +274,12 @@ def summarise(displacements: Sequence[Displacement]) -> Summary:
         n=len(errors_m),
         missing=sum(len(displacement.missing) for displacement in displacements),
         surplus=sum(len(displacement.surplus) for displacement in displacements),
-        box=box_of(errors_m) if errors_m else None,
+        box=summarize_box(errors_m) if errors_m else None,
         over_time=mean_over_time(displacements),
     )
 
 
-def box_of(values_m: Sequence[float]) -> BoxSummary:
+def summarize_box(values_m: Sequence[float]) -> BoxSummary:
     """Return the box of at least one value."""
     values = np.sort(np.asarray(values_m, dtype=float))
     q1, median, q3 = (float(one) for one in np.percentile(values, (25.0, 50.0, 75.0)))

@@ -1,4 +1,4 @@
-"""What a follow-up was to leave alone: how far it moved that from the answer before.
+"""Objects that a follow-up was to leave alone, and their distance from the answer before.
 
 An object is to be kept if both references have it alike, and if the answer before had placed it.
 Any frame, the same for all four changes.
@@ -30,7 +30,7 @@ class KeptObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptSummary:
-    """What some follow-ups were to keep, taken together.
+    """Summary of the objects that follow-ups were to keep.
 
     Attributes:
         to_keep: Objects that were to stay.
@@ -43,14 +43,14 @@ class KeptSummary:
     moved_mean_m: float | None
 
 
-def kept_objects(
+def find_kept_objects(
     before: Modification,
     after: Modification | None,
     *,
     reference_before: Modification,
     reference_after: Modification,
 ) -> tuple[KeptObject, ...]:
-    """Return what was to stay of an answer, and whether the next one has left it alone.
+    """Return the objects of an answer that were to stay, and whether the next one kept them.
 
     Args:
         before: The answer that the follow-up goes on from.

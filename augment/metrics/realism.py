@@ -1,4 +1,4 @@
-"""How likely what was placed is among what was recorded: a number from 0 to 1.
+"""Likelihood of placed objects among recorded ones: a number from 0 to 1.
 
 For each class of object and each feature a histogram is learned from recorded scenes, with one
 more in each bin than was seen. The score of a feature is the geometric mean, over what was
@@ -36,7 +36,7 @@ LEAST_RECORDED = 10
 
 
 class Feature(StrEnum):
-    """What is measured of an object, as a column is called."""
+    """Measured property of an object, as a column is called."""
 
     SPEED = "speed"
     HEADING = "heading"
@@ -61,7 +61,7 @@ road, negative off it."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedObject:
-    """What is measured of one object.
+    """Measured properties of one object.
 
     Attributes:
         bins: The number of its bin by feature; without what the map does not say.
@@ -79,7 +79,7 @@ RecordedCounts = Counter[tuple[ObjectClass, Feature, int]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Realism:
-    """How realistic one change is.
+    """Realism of one change.
 
     Attributes:
         scores: 0 to 1 by the names in `SCORES`; without what nothing says anything about.

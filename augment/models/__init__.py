@@ -5,7 +5,7 @@ a URL has a random `code`; primary keys stay inside.
 """
 
 from augment.models.benchmarks import Benchmark, BenchmarkItem
-from augment.models.budgets import Budgeted
+from augment.models.budgets import CappedWork
 from augment.models.contestants import (
     CallLease,
     Contestant,

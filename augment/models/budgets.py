@@ -1,14 +1,14 @@
-"""What every row has that asks language models within caps."""
+"""Caps of all rows that ask language models."""
 
 import uuid
 from decimal import Decimal
 
 from django.db import models
 
-from augment.llm.costs import usd_of
+from augment.llm.costs import to_usd
 
 
-class Budgeted(models.Model):
+class CappedWork(models.Model):
     """Work at language models, within caps on what it may use.
 
     Money is counted in whole nano-dollars, so that sums are exact on every database. Each call
@@ -34,21 +34,21 @@ class Budgeted(models.Model):
 
     @property
     def is_capped(self) -> bool:
-        """Whether there is any cap."""
+        """True if there is any cap."""
         caps = (self.cap_nano_usd, self.cap_calls, self.cap_tokens)
         return any(cap is not None for cap in caps)
 
     @property
     def cap_usd(self) -> Decimal | None:
         """The money cap, None without one."""
-        return None if self.cap_nano_usd is None else usd_of(self.cap_nano_usd)
+        return None if self.cap_nano_usd is None else to_usd(self.cap_nano_usd)
 
     @property
     def reserved_usd(self) -> Decimal:
         """The worst case of the calls in flight, as far as their prices are known."""
-        return usd_of(self.reserved_nano_usd)
+        return to_usd(self.reserved_nano_usd)
 
     @property
     def spent_usd(self) -> Decimal:
-        """What was used, as far as prices are known."""
-        return usd_of(self.spent_nano_usd)
+        """Cost so far, as far as prices are known."""
+        return to_usd(self.spent_nano_usd)

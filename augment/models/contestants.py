@@ -1,4 +1,4 @@
-"""Who is rated."""
+"""Contestants and the endpoints of their models."""
 
 import uuid
 
@@ -64,7 +64,7 @@ class KeyBinding(models.Model):
 
 
 class EndpointModel(models.Model):
-    """What is known of one model at one endpoint. Unknown is null, never guessed, never zero."""
+    """Facts about one model at one endpoint. Unknown is null, never guessed, never zero."""
 
     class ModelClass(models.TextChoices):
         FRONTIER = "frontier", "Frontier"
@@ -166,7 +166,7 @@ class CallLease(models.Model):
 
 
 class Contestant(models.Model):
-    """Who is rated."""
+    """Contestants and the endpoints of their models."""
 
     class Kind(models.TextChoices):
         REFERENCE = "reference", "Reference"
@@ -264,7 +264,7 @@ class Contestant(models.Model):
 
     @property
     def is_simulated(self) -> bool:
-        """Whether it must never mix into a rating unless somebody switched that on."""
+        """True if it must never mix into a rating unless somebody switched that on."""
         return self.kind == self.Kind.SIMULATED
 
 

@@ -6,15 +6,15 @@ from decimal import Decimal
 from django.db import models
 from django.db.models import F, Q
 
-from augment.llm.costs import usd_of
-from augment.models.budgets import Budgeted
+from augment.llm.costs import to_usd
+from augment.models.budgets import CappedWork
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.scenes import Scenario
 from augment.models.sweeps import SweepValue
 from augment.models.work import Work, account_column
 
 
-class GenerationJob(Budgeted):
+class GenerationJob(CappedWork):
     """Contestants x scenarios x samples, launched by an admin, within caps on what it may use."""
 
     class State(models.TextChoices):
@@ -298,22 +298,22 @@ class ModelCall(models.Model):
 
     @property
     def is_cached(self) -> bool:
-        """Whether it was answered from the store."""
+        """True if it was answered from the store."""
         return self.served_from_id is not None
 
     @property
     def reserved_usd(self) -> Decimal | None:
         """The worst case, None where the price is unknown."""
-        return None if self.reserved_nano_usd is None else usd_of(self.reserved_nano_usd)
+        return None if self.reserved_nano_usd is None else to_usd(self.reserved_nano_usd)
 
     @property
     def cost_usd(self) -> Decimal | None:
-        """What it cost, None while in flight or where the price is unknown."""
-        return None if self.cost_nano_usd is None else usd_of(self.cost_nano_usd)
+        """Cost, None while in flight or if the price is unknown."""
+        return None if self.cost_nano_usd is None else to_usd(self.cost_nano_usd)
 
 
 class TranscriptNote(models.Model):
-    """What happened between two calls of an attempt: a round, a tool, a review."""
+    """Event between two calls of an attempt: a round, a tool, a review."""
 
     attempt = models.ForeignKey(Attempt, on_delete=models.CASCADE, related_name="notes")
     number = models.PositiveIntegerField()

@@ -1,15 +1,15 @@
-"""What language models that judge pairs are asked and answered; measures of augmentations."""
+"""Questions to language models that judge pairs, and their answers; measures of augmentations."""
 
 from django.db import models
 from django.db.models import F, Q
 
-from augment.models.budgets import Budgeted
+from augment.models.budgets import CappedWork
 from augment.models.contestants import Endpoint
 from augment.models.jobs import Augmentation
 from augment.models.work import Work, account_column
 
 
-class JudgeRun(Budgeted):
+class JudgeRun(CappedWork):
     """One model that is asked about pairs, each in both orders. Never a person's vote."""
 
     class State(models.TextChoices):

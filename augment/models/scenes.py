@@ -178,12 +178,12 @@ class Scenario(models.Model):
 
     @property
     def in_catalogue(self) -> bool:
-        """Whether it comes with the project; its file alone changes it then."""
+        """True if it comes with the project; then only its file changes it."""
         return bool(self.catalogue_set)
 
     @property
     def followed(self) -> "list[Scenario]":
-        """Those before it in a conversation, the first one first.
+        """Scenarios before it in a conversation, the first one first.
 
         Each once, also where an imported folder leads in a circle.
         """
@@ -203,7 +203,7 @@ class Scenario(models.Model):
         return "\n".join(f"{number}. {text}" for number, text in enumerate(said, start=1))
 
     def get_type_display(self) -> str:
-        """What people read for its type."""
+        """Return the label of its type."""
         return self.type_label or ScenarioType(self.type).label
 
 

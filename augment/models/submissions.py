@@ -68,5 +68,5 @@ class Submission(SentFile):
 
     @property
     def is_decided(self) -> bool:
-        """Whether nothing is left to do with it."""
+        """True if nothing is left to do with it."""
         return self.decision != self.Decision.NONE

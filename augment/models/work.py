@@ -1,4 +1,4 @@
-"""What every row has that a worker brings to an outcome."""
+"""Common columns of all rows that a worker brings to an outcome."""
 
 import uuid
 from collections.abc import Iterable, Mapping
@@ -135,14 +135,14 @@ def after_migrations(sender: AppConfig, using: str, **_: Any) -> None:
     """Make the triggers that are missing."""
     connection = connections[using]
     with connection.cursor() as cursor:
-        for model in _stored(connection, sender.get_models()):
+        for model in _list_append_only(connection, sender.get_models()):
             for statement in _MAKING[connection.vendor](model):
                 cursor.execute(statement)
 
 
 def dropping(connection: BaseDatabaseWrapper, models: Iterable[type[Model]]) -> list[str]:
     """Statements that take the triggers of these models away."""
-    tables = [model._meta.db_table for model in _stored(connection, models)]
+    tables = [model._meta.db_table for model in _list_append_only(connection, models)]
     where = "" if connection.vendor == "sqlite" else " ON {table}"
     return [
         f"DROP TRIGGER IF EXISTS {table}_refuses_{what}{where.format(table=table)}"
@@ -154,10 +154,10 @@ def dropping(connection: BaseDatabaseWrapper, models: Iterable[type[Model]]) -> 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _stored(
+def _list_append_only(
     connection: BaseDatabaseWrapper, models: Iterable[type[Model]]
 ) -> list[type[AppendOnly]]:
-    """Those of the models that are append-only and have a table already."""
+    """Return the append-only models that already have a table."""
     tables = [model for model in models if issubclass(model, AppendOnly)]
     kept = connection.introspection.table_names() if tables else []
     return [model for model in tables if model._meta.db_table in kept]
@@ -167,7 +167,7 @@ def _for_sqlite(model: type[AppendOnly]) -> list[str]:
     table = model._meta.db_table
     return [
         f"CREATE TRIGGER IF NOT EXISTS {table}_refuses_{what} BEFORE {what} ON {table} "
-        f"BEGIN SELECT RAISE(ABORT, '{_said(table)}'); END"
+        f"BEGIN SELECT RAISE(ABORT, '{_refusal(table)}'); END"
         for what in ("update", "delete")
     ]
 
@@ -177,7 +177,7 @@ def _for_postgresql(model: type[AppendOnly]) -> list[str]:
     function = f"""
         CREATE OR REPLACE FUNCTION {table}_refuses() RETURNS trigger LANGUAGE plpgsql AS $$
         BEGIN
-            RAISE EXCEPTION '{_said(table)}' USING ERRCODE = 'integrity_constraint_violation';
+            RAISE EXCEPTION '{_refusal(table)}' USING ERRCODE = 'integrity_constraint_violation';
         END $$
     """
     # CREATE OR REPLACE would wait for everybody who reads the table, also where nothing is new.
@@ -198,7 +198,7 @@ def _for_postgresql(model: type[AppendOnly]) -> list[str]:
     return [function, *made]
 
 
-def _said(table: str) -> str:
+def _refusal(table: str) -> str:
     return f"{table} is append-only: a stored row can not be changed or deleted"
 
 

@@ -44,7 +44,7 @@ _Kind = TypeVar("_Kind", bound=Strict)
 
 
 def validate(kind: type[_Kind], value: object) -> _Kind:
-    """Return what was found as a value of that kind.
+    """Return the document as a value of that kind.
 
     Raises:
         ReplyUnreadable: It is none; each sentence has a path and echoes nothing.
@@ -53,10 +53,10 @@ def validate(kind: type[_Kind], value: object) -> _Kind:
         return kind.model_validate(value)
     except ValidationError as error:
         faults = error.errors(include_url=False, include_input=False)[:8]
-    raise ReplyUnreadable([sentence_of(fault) for fault in faults])
+    raise ReplyUnreadable([fault_sentence(fault) for fault in faults])
 
 
-def sentence_of(fault: ErrorDetails) -> str:
+def fault_sentence(fault: ErrorDetails) -> str:
     """Tell one fault of pydantic's: where it is and what is wrong, without what was written."""
     path = ".".join(ascii(part).strip("'")[:40] for part in fault["loc"])
     said = fault["msg"].removeprefix("Value error, ")
@@ -90,7 +90,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
         try:
             value = strict_json(block)
         except ReplyUnreadable:
-            clean = _mended(block)
+            clean = _mend(block)
             if clean == block:
                 raise
             value = strict_json(clean)
@@ -139,7 +139,7 @@ def declines(answer: str) -> bool:
 
 
 def without_thoughts(answer: str) -> str:
-    """Return what follows the last reasoning tag of models that think aloud."""
+    """Return the text after the last reasoning tag of models that think aloud."""
     return _THOUGHTS_END.split(answer)[-1]
 
 
@@ -165,7 +165,7 @@ def _bare_objects(answer: str) -> list[str]:
     return [*objects, answer[start:]] if depth else objects
 
 
-def _mended(block: str) -> str:
+def _mend(block: str) -> str:
     """Return it without comments and trailing commas, which cannot shift a number."""
     for noise in (_STRING_OR_COMMENT, _STRING_OR_COMMA):
         block = noise.sub(lambda match: match.group(1) or "", block)

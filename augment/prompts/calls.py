@@ -107,14 +107,14 @@ def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
             yield WrittenCall(problem=f"a call is one line of the form {_FORM}; {fault}")
             end = text.find("\n", start) if "\n" in text[start:] else len(text)
             continue
-        if isinstance(written, dict) and (call := _call_of(written)) is not None:
+        if isinstance(written, dict) and (call := _parse_call(written)) is not None:
             has_form = begins_line and written.keys() == {"call", "arguments"}
             is_mended = not (call.problem or (has_form and _ALONE_BEHIND.match(text, end)))
             yield replace(call, mended=is_mended)
 
 
-def _call_of(written: dict[str, object]) -> WrittenCall | None:
-    """Return what an object calls, None where it is something else."""
+def _parse_call(written: dict[str, object]) -> WrittenCall | None:
+    """Return the call that an object stands for, None for anything else."""
     inner = written.get("function")
     body: dict[str, object] = inner if isinstance(inner, dict) else written
     if body.keys() == {TOOL}:

@@ -1,4 +1,4 @@
-"""How much of a scene is written down: what a wish about the ego's drive can concern.
+"""Region of a scene that prompts contain: everything that can concern the ego's drive.
 
 The rule, for whoever asks: within the radius of the ego, behind it within half of that, and
 within `BESIDE_M` of where the ego can get on its lanes and those beside them by driving
@@ -56,7 +56,7 @@ class Extent:
     routes_m: FloatArray | None
 
     def holds(self, points_m: FloatArray) -> BoolArray:
-        """Which of the points (N, 2) lie in the region, (N,)."""
+        """Return for points (N, 2) whether they lie in the region, (N,)."""
         points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
         inside: BoolArray = np.hypot(*points.T) <= self.radius_m
         if self.routes_m is not None:
@@ -68,7 +68,7 @@ class Extent:
         return inside
 
     def comes_near(self, line: Polyline) -> bool:
-        """Whether a line comes within `CROSSED_M` of where the ego can drive."""
+        """Return whether a line comes within `CROSSED_M` of the ego's possible ways."""
         if self.routes_m is None:
             return True
         points = line.resampled(_ROUTE_EVERY_M).points_m
@@ -100,12 +100,12 @@ class Extent:
 
 
 def behind_m(radius_m: float) -> float:
-    """How far behind the ego a region goes that follows the lanes."""
+    """Return how far behind the ego a region along the lanes goes, in m."""
     return radius_m / 2.0
 
 
 @lru_cache(maxsize=32)
-def extent_of(scene: Scene, radius_m: float) -> Extent:
+def find_extent(scene: Scene, radius_m: float) -> Extent:
     """The region of a scene that prompts and the tool show."""
     route = None if math.isinf(radius_m) else EgoRoute.of(scene)
     if route is None:
@@ -113,7 +113,7 @@ def extent_of(scene: Scene, radius_m: float) -> Extent:
     driven_m = max(DRIVEN_M, radius_m)
     lines = [
         line.between(start_m, end_m)
-        for lane_id, (start_m, end_m) in _reached(route, driven_m).items()
+        for lane_id, (start_m, end_m) in _find_reached(route, driven_m).items()
         for line in [route.graph.lane(lane_id).centerline]
         if min(line.length_m, end_m) - start_m > _ROUTE_EVERY_M
     ]
@@ -125,12 +125,12 @@ def extent_of(scene: Scene, radius_m: float) -> Extent:
 
 
 @lru_cache(maxsize=32)
-def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]:
+def find_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]:
     """From where to where each lane and connector is shown, by its id, in the scene's order."""
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     if math.isinf(radius_m):
         return {lane.id: (0.0, lane.centerline.length_m) for lane in lanes}
-    extent = extent_of(scene, radius_m)
+    extent = find_extent(scene, radius_m)
     shown: dict[str, tuple[float, float]] = {}
     connectors: list[LaneConnector] = []
     for lane in lanes:
@@ -183,7 +183,7 @@ def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
 # Private
 
 
-def _reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, float]]:
+def _find_reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, float]]:
     """From where to where the ego can drive on each lane that it can get to, by id.
 
     Dijkstra's search; a connector that is entered is left, too.
@@ -212,7 +212,7 @@ def _reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, float]]
 
 
 def _is_the_same(one: LaneConnector, other: LaneConnector) -> bool:
-    """Whether two connectors lead the same way; their lights, limits and turns agree too."""
+    """Return whether two connectors lead the same way, with the same lights, limits and turns."""
     facts = ("from_lane", "to_lane", "turn_type", "traffic_light", "speed_limit_mps")
     if any(getattr(one, name) != getattr(other, name) for name in facts):
         return False

@@ -1,4 +1,4 @@
-"""What models are told: prompt texts filled with a scene, an instruction and what came back.
+"""Texts for models: prompts filled with a scene, an instruction and earlier answers.
 
 In: a `Scene`, an instruction, and the form of a variant (polylines or Bezier curves, with or
 without calls); later on what was answered, called and found. Out: `Message`s, ready to be sent.
@@ -38,7 +38,7 @@ Messages = tuple[Message, ...]
 
 
 class Calling(StrEnum):
-    """How the modifier calls the pose tool: not at all, by a line of its answer, or natively."""
+    """Way of calling the pose tool: not at all, by a line of the answer, or natively."""
 
     NONE = "none"
     IN_PROMPT = "in_prompt"
@@ -46,7 +46,7 @@ class Calling(StrEnum):
 
 
 class JudgeQuestion(StrEnum):
-    """By what a judge compares two pictures."""
+    """Criterion by which a judge compares two pictures."""
 
     INSTRUCTION = "instruction"
     REALISM = "realism"
@@ -109,7 +109,7 @@ def model_message(answer: str) -> Message:
     return Message(speaker=Speaker.ASSISTANT, text=answer[:LONGEST_ECHO] or "(empty answer)")
 
 
-def said_by_user(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
+def make_user_message(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
     """Return a turn of whoever talks to the model."""
     return Message(speaker=Speaker.USER, text=words, images=images)
 
@@ -128,13 +128,13 @@ def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) ->
     """
     told = [*problems, read_text("re_ask_calls.md")] if calls_in(answer) else problems
     keep = read_text("re_ask_keep.md") if names_changes(answer) else ""
-    asked = fill_text("re_ask.md", problems=_listed(told), keep=keep)
-    return (*messages, model_message(answer), said_by_user(asked))
+    asked = fill_text("re_ask.md", problems=_join_entries(told), keep=keep)
+    return (*messages, model_message(answer), make_user_message(asked))
 
 
 def follow_up_messages(messages: Messages, instruction: str) -> Messages:
     """Return the conversation up to the modifier's last answer, and what the user wishes next."""
-    return (*messages, said_by_user(fill_text("follow_up.md", quoted=quote(instruction))))
+    return (*messages, make_user_message(fill_text("follow_up.md", quoted=quote(instruction))))
 
 
 def regenerate_messages(
@@ -147,14 +147,16 @@ def regenerate_messages(
         feedback: One entry a problem.
         is_measured: Whether these are measured facts rather than somebody's opinion.
     """
-    words = fill_text("measured.md" if is_measured else "feedback.md", feedback=_listed(feedback))
-    return (*messages, said_by_user(words))
+    words = fill_text(
+        "measured.md" if is_measured else "feedback.md", feedback=_join_entries(feedback)
+    )
+    return (*messages, make_user_message(words))
 
 
 def result_text(results: Sequence[str], *, is_over: bool) -> str:
     """Tell the results of calls made in the prompt, each as one line of JSON."""
     rest = read_text("calls_are_over.md" if is_over else "calls_go_on.md")
-    return fill_text("function_result.md", results=_numbered(results), rest=rest)
+    return fill_text("function_result.md", results=_number_entries(results), rest=rest)
 
 
 @cache
@@ -206,7 +208,7 @@ def review_messages(
 
 def viewer_messages(questions: Sequence[str], pictures: Sequence[bytes]) -> Messages:
     """Ask the viewer the questions about the pictures (PNG)."""
-    lines = _numbered([" ".join(question.split()) for question in questions])
+    lines = _number_entries([" ".join(question.split()) for question in questions])
     system = fill_text("viewer.md", drawn=read_text("drawn.md"))
     return _opening(system, fill_text("viewer_task.md", questions=lines), tuple(pictures))
 
@@ -219,16 +221,16 @@ def verdict_messages(
         f"{' '.join(question.split())} -> {answers.get(number, CANNOT_SEE)}"
         for number, question in enumerate(questions, start=1)
     ]
-    told = fill_text("engineer_answers.md", answers=quote(_numbered(lines)))
-    return (*messages, said_by_user(told))
+    told = fill_text("engineer_answers.md", answers=quote(_number_entries(lines)))
+    return (*messages, make_user_message(told))
 
 
 def review_re_ask_messages(
     messages: Messages, answer: str, problems: Sequence[str], *, text: str = "review_re_ask.md"
 ) -> Messages:
     """Return the conversation so far, a reviewer's unreadable answer, and its faults."""
-    asked = fill_text(text, problems=_listed(problems))
-    return (*messages, model_message(answer), said_by_user(asked))
+    asked = fill_text(text, problems=_join_entries(problems))
+    return (*messages, model_message(answer), make_user_message(asked))
 
 
 def reader_messages(instruction: str) -> Messages:
@@ -250,7 +252,7 @@ def judge_messages(
 
 
 def _opening(system: str, task: str, images: tuple[bytes, ...] = ()) -> Messages:
-    return Message(speaker=Speaker.SYSTEM, text=system), said_by_user(task, images=images)
+    return Message(speaker=Speaker.SYSTEM, text=system), make_user_message(task, images=images)
 
 
 @cache
@@ -296,9 +298,9 @@ def _tolerances() -> str:
     return fill_text("tolerances.md", **numbers, **percent)
 
 
-def _listed(entries: Sequence[str]) -> str:
+def _join_entries(entries: Sequence[str]) -> str:
     return "\n".join(f"- {entry}" for entry in entries)
 
 
-def _numbered(entries: Sequence[str]) -> str:
+def _number_entries(entries: Sequence[str]) -> str:
     return "\n".join(f"{number}. {entry}" for number, entry in enumerate(entries, start=1))

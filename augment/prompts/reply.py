@@ -125,7 +125,7 @@ _Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK)]
 
 
 class RatedReview(Strict):
-    """What the text reviewer found.
+    """Review of a modification by the text reviewer.
 
     Remarks are too small to be corrected: for the record, nobody is told. So are the reviewer's
     own words, empty where he left them out.
@@ -146,7 +146,7 @@ class _QuestionBlock(Strict):
 
 
 class EngineerVerdict(Strict):
-    """What the engineer decided: with feedback it is not accepted; remarks change nothing."""
+    """Decision of the engineer: with feedback it is not accepted; remarks change nothing."""
 
     verdict: Literal["accept", "feedback"]
     feedback: _Feedback
@@ -154,7 +154,7 @@ class EngineerVerdict(Strict):
 
 
 class JudgeAnswer(Strict):
-    """Which of two pictures a judge found better, and why."""
+    """Picture that a judge found better, and the reason."""
 
     better: Literal["A", "B", "equal"]
     reason: Annotated[str, Field(max_length=LONGEST_ENTRY)] = ""
@@ -192,10 +192,10 @@ def read_reply(
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = fit_boxes(scene, _modification(block, scene, names))
-    return ReadReply(modification=modification, notes=notes_of(answer), mended=mended)
+    return ReadReply(modification=modification, notes=answer_notes(answer), mended=mended)
 
 
-def notes_of(answer: str) -> str:
+def answer_notes(answer: str) -> str:
     """Return the sections Insights and Summary of an answer, shortened; empty without them."""
     heads = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
     bodies = _sections(answer, heads)
@@ -249,7 +249,7 @@ def read_verdict(answer: str) -> EngineerVerdict:
 
 
 def read_sight(answer: str, count: int) -> dict[int, str]:
-    """Return what the viewer said to each question, by its number; unanswered ones are left out.
+    """Return the viewer's answer to each question by its number, without unanswered ones.
 
     Raises:
         ReplyUnreadable: No line begins with the number of a question.
@@ -328,7 +328,7 @@ def _agent(agent: _Agent) -> TrafficAgent:
 
 
 def _sections(answer: str, heads: str) -> dict[str, str]:
-    """Return what stands under each of some headings of an answer."""
+    """Return the text under each of some headings of an answer."""
     parts = re.split(rf"^[ \t#*_]*({heads})[ \t#*_]*:[ \t*_]*", answer, flags=re.MULTILINE)
     bodies = zip(parts[1::2], parts[2::2], strict=True)
     return {head: body.strip()[:LONGEST_NOTES] for head, body in bodies}

@@ -26,7 +26,7 @@ import numpy as np
 from augment.geometry.bezier import CubicBezier, travel_pose
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
-from augment.prompts.extent import boundary_near, extent_of, shown_spans
+from augment.prompts.extent import boundary_near, find_extent, find_spans
 from augment.scene import entities
 from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
 from augment.scene.codec import intent_to_parts
@@ -64,7 +64,7 @@ _WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],}])")
 
 
 class LaneFormat(StrEnum):
-    """How a lane is written down: points every 5 m, or four control points of a cubic Bezier."""
+    """Notation of a lane: points every 5 m, or four control points of a cubic Bezier."""
 
     POLYLINE = "polyline"
     BEZIER = "bezier"
@@ -95,7 +95,7 @@ class ShortNames:
     @property
     def next_agent(self) -> str:
         """The id that the first new agent should get."""
-        return f"Agent{1 + max(_number_of(short) for short in self.agents.values())}"
+        return f"Agent{1 + max(_parse_number(short) for short in self.agents.values())}"
 
 
 def short_names(scene: entities.Scene) -> ShortNames:
@@ -110,13 +110,13 @@ def short_names(scene: entities.Scene) -> ShortNames:
 
 def with_short_ids(value: Renamed, names: ShortNames) -> Renamed:
     """Return a scene, a part of one or a change with short ids in the place of the scene's own."""
-    renamed: Renamed = _renamed(value, names.agents, names.lanes)
+    renamed: Renamed = _rename(value, names.agents, names.lanes)
     return renamed
 
 
 def with_scene_ids(value: Renamed, names: ShortNames) -> Renamed:
-    """Return what has short ids with the scene's own; ids that are new to it stay."""
-    renamed: Renamed = _renamed(value, names.agent_ids, names.lane_ids)
+    """Return the document with the scene's own ids for short ones; ids that are new to it stay."""
+    renamed: Renamed = _rename(value, names.agent_ids, names.lane_ids)
     return renamed
 
 
@@ -143,12 +143,12 @@ class LaneCurve:
 
     @property
     def width_m(self) -> float:
-        """How wide it is."""
+        """Width of the lane in m."""
         return self.whole.width_m
 
     @property
     def length_m(self) -> float:
-        """How long the shown part is."""
+        """Length of the shown part in m."""
         return self.lane[-1].end_m
 
     def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
@@ -162,14 +162,14 @@ class LaneCurve:
 
     @property
     def pieces(self) -> tuple[str, ...]:
-        """How its pieces are called, in order of travel."""
+        """Names of its pieces, in order of travel."""
         return piece_ids(self.id, len(self.lane))
 
 
 def lane_curves(scene: entities.Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
     """Return all lanes and connectors that a prompt shows, by short id, in the scene's order."""
     graph = LaneGraph(scene)
-    spans = shown_spans(scene, radius_m)
+    spans = find_spans(scene, radius_m)
     begins = {key for key, (start_m, _) in spans.items() if start_m < 1e-6}
     ends = {
         key
@@ -268,7 +268,7 @@ def scene_vectors(
     direction, direction relative to the ego, width, limit, coordinates. Lane connectors: from,
     to, light, turn, width, limit, coordinates. Areas: kind and boundary.
     """
-    names, spans = short_names(scene), shown_spans(scene, radius_m)
+    names, spans = short_names(scene), find_spans(scene, radius_m)
     road: dict[str, dict[str, Vector]] = {"Lanes": {}, "Lane connectors": {}}
     every: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for lane in every:
@@ -279,7 +279,7 @@ def scene_vectors(
         facts: Vector
         if isinstance(lane, entities.Lane):
             heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
-            facts = [_number_of(short), compass(heading_rad), _relative(heading_rad)]
+            facts = [_parse_number(short), compass(heading_rad), _relative(heading_rad)]
         else:
             ends = (names.lanes.get(end or "") for end in (lane.from_lane, lane.to_lane))
             facts = [*ends, lane.traffic_light.value, lane.turn_type.value]
@@ -290,21 +290,21 @@ def scene_vectors(
             coordinates = _points(line.resampled(SPACING_M).points_m)
         kind = "Lanes" if isinstance(lane, entities.Lane) else "Lane connectors"
         road[kind][short] = [*facts, _metres(lane.width_m), limit_mps, coordinates]
-    extent = extent_of(scene, radius_m)
+    extent = find_extent(scene, radius_m)
     areas: dict[str, Vector] = {}
     for area in scene.areas:
         boundary = boundary_near(area, extent, _BOUNDARY_TOLERANCE_M)
         if len(boundary):
             areas[names.areas[area.id]] = [area.kind.value, _points(boundary)]
-    shown = shown_agents(scene, radius_m)
+    shown = list_agents(scene, radius_m)
     agents = {names.agents[one.id]: _agent_vector(one, names) for one in shown}
     return {"Agents": agents, **road, "Areas": areas}
 
 
-def shown_agents(scene: entities.Scene, radius_m: float) -> tuple[entities.TrafficAgent, ...]:
+def list_agents(scene: entities.Scene, radius_m: float) -> tuple[entities.TrafficAgent, ...]:
     """Return the ego, and the agents with their centres in the region that is shown."""
     places = np.array([(agent.x_m, agent.y_m) for agent in scene.agents]).reshape(-1, 2)
-    inside = extent_of(scene, radius_m).holds(places)
+    inside = find_extent(scene, radius_m).holds(places)
     return scene.ego, *(agent for agent, is_in in zip(scene.agents, inside, strict=True) if is_in)
 
 
@@ -324,7 +324,7 @@ def _shorten(ids: Iterable[str], prefix: str) -> dict[str, str]:
     return {name: name if name in kept else next(fresh) for name in names}
 
 
-def _number_of(short: str) -> int:
+def _parse_number(short: str) -> int:
     return int(short.lstrip(ascii_letters))
 
 
@@ -336,24 +336,24 @@ def _relative(heading_rad: float) -> str:
     return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
 
 
-def _renamed(value: Any, agents: Mapping[str, str], lanes: Mapping[str, str]) -> Any:
+def _rename(value: Any, agents: Mapping[str, str], lanes: Mapping[str, str]) -> Any:
     if isinstance(value, tuple):
-        return tuple(_renamed(part, agents, lanes) for part in value)
+        return tuple(_rename(part, agents, lanes) for part in value)
     if not isinstance(value, _WITH_IDS):
         return value
     changes = {}
     for part in fields(value):
         given, is_lane = getattr(value, part.name), isinstance(value, AnyLane)
         if part.name in _OF_LANES or (part.name == "id" and is_lane):
-            changes[part.name] = _named(given, lanes)
+            changes[part.name] = _lookup_name(given, lanes)
         elif part.name in _OF_AGENTS or part.name == "id":
-            changes[part.name] = _named(given, agents)
+            changes[part.name] = _lookup_name(given, agents)
         else:
-            changes[part.name] = _renamed(given, agents, lanes)
+            changes[part.name] = _rename(given, agents, lanes)
     return replace(value, **changes)
 
 
-def _named(given: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any:
+def _lookup_name(given: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any:
     if isinstance(given, tuple):
         return tuple(names.get(name, name) for name in given)
     return given and names.get(given, given)
@@ -361,15 +361,15 @@ def _named(given: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any
 
 def motion_parts(motion: PlannedMotion) -> dict[str, object]:
     """Return a motion as it stands in lists and answers, to the centimetre."""
-    parts: dict[str, object] = _rounded(intent_to_parts(motion))
+    parts: dict[str, object] = _round(intent_to_parts(motion))
     return parts
 
 
-def _rounded(part: Any) -> Any:
+def _round(part: Any) -> Any:
     if isinstance(part, dict):
-        return {name: _rounded(value) for name, value in part.items()}
+        return {name: _round(value) for name, value in part.items()}
     if isinstance(part, list):
-        return [_rounded(value) for value in part]
+        return [_round(value) for value in part]
     return _metres(part) if isinstance(part, float) else part
 
 

@@ -31,7 +31,7 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import AnyLane
 from augment.scene.recording import Recording
-from augment.scene.trails import trails_of
+from augment.scene.trails import find_trails
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named for reviewers, and lie over the boxes."""
@@ -133,10 +133,10 @@ def _paint_scene(
     rest = replace(after, agents=tuple(one for one in after.agents if one.id not in changed))
     # The scale keeps away from who was there before the change, the same for every contestant.
     corner = road.scale_corner(scene, camera)
-    ground = _unchanged(rest, camera, corner).copy()
+    ground = _draw_unchanged(rest, camera, corner).copy()
     if ghosts:
         draw_ghosts(ground, scene, modification)
-    draw_trails(ground, trails_of(scene, modification, recording))
+    draw_trails(ground, find_trails(scene, modification, recording))
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
     lost = [one for one in modification.changed if not ground.shows(ground.at(one.x_m, one.y_m))]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
@@ -147,7 +147,7 @@ def _paint_scene(
 
 
 @lru_cache(maxsize=4)
-def _unchanged(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
+def _draw_unchanged(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
     """Draw everything that a change leaves as it is; nobody draws on it, only on copies."""
     ground = _still(rest, camera, corner)
     traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]

@@ -1,4 +1,4 @@
-"""Which part of a scene a picture shows: one window for every contestant of a scenario.
+"""Window of a scene's picture: the same for every contestant of a scenario.
 
 The window holds the ego, all that the scenario's reference touches and what any contestant
 changed nearby, and lies where it shows the most of the road.
@@ -19,11 +19,11 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
-from augment.render.shapes import ring_of, sides
+from augment.render.shapes import lane_ring, sides
 from augment.scene.entities import Modification, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
 from augment.scene.recording import Recording
-from augment.scene.trails import ego_spots, trails_of
+from augment.scene.trails import ego_spots, find_trails
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0
@@ -134,7 +134,7 @@ def camera_for(
     spots = [
         spot
         for change in moving
-        for trail in trails_of(scene, change, recording)
+        for trail in find_trails(scene, change, recording)
         for spot in trail.spots
     ]
     spots += ego_spots(scene, recording) if moving else ()
@@ -162,13 +162,13 @@ def _camera_for(
     places = [*_places(scene, reference or Modification())]
     followed = [place for change in changes for place in _places(scene, change)]
     places += [one for one in followed if _distance_m(one) <= FOLLOWED_M]
-    need = _widened(need, places, MAX_WIDTH_M)
+    need = _widen(need, places, MAX_WIDTH_M)
     widest_m = max(PASSED_WIDTH_M, _width_m(need))
-    return _best(_widened(need, [np.array(place) for place in passed], widest_m), scene)
+    return _best(_widen(need, [np.array(place) for place in passed], widest_m), scene)
 
 
-def _widened(need: FloatArray, places: list[FloatArray], widest_m: float) -> FloatArray:
-    """What is needed (2, 2) with those places as well, the nearest first, up to a width."""
+def _widen(need: FloatArray, places: list[FloatArray], widest_m: float) -> FloatArray:
+    """Return the window (2, 2) widened by those places, the nearest first, up to a width."""
     for place in sorted(places, key=_distance_m):
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
@@ -191,7 +191,7 @@ def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.n
     pen = ImageDraw.Draw(raster)
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for polygon in (
-        *(ring_of(*sides(lane)) for lane in lanes),
+        *(lane_ring(*sides(lane)) for lane in lanes),
         *(np.array(area.boundary_m, dtype=np.float64) for area in scene.areas),
     ):
         cells = (polygon - origin_m) * _CELLS_PER_M

@@ -163,7 +163,7 @@ class Canvas:
         finished = self._finished()
         if np.asarray(finished).max() < _FIRST_OF_TRAILS:
             finished.putpalette(_FLAT_PALETTE[: 3 * _FIRST_OF_TRAILS])
-        return _packed(finished)
+        return _pack(finished)
 
     def _finished(self) -> Image.Image:
         finished = self.copy()
@@ -198,7 +198,7 @@ def stack_png(above: Canvas, below: Canvas) -> bytes:
     whole = Image.new("RGB", (first.width, first.height + second.height), palette.PAPER)
     whole.paste(first, (0, 0))
     whole.paste(second, (0, first.height))
-    return _packed(whole)
+    return _pack(whole)
 
 
 def text_width_px(text: str, size_px: int) -> float:
@@ -232,7 +232,7 @@ def shrink_png(png: bytes, widest: int) -> bytes:
     few = _smaller(png, widest).quantize(
         _SMALL_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
     )
-    return _packed(few, level=9)
+    return _pack(few, level=9)
 
 
 # Private
@@ -247,7 +247,7 @@ def _smaller(png: bytes, widest: int) -> Image.Image:
     return colours.reduce(factor) if factor > 1 else colours
 
 
-def _packed(image: Image.Image, level: int = _COMPRESS_LEVEL) -> bytes:
+def _pack(image: Image.Image, level: int = _COMPRESS_LEVEL) -> bytes:
     stream = io.BytesIO()
     image.save(stream, format="PNG", compress_level=level)
     return stream.getvalue()

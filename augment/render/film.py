@@ -26,7 +26,7 @@ from augment.render.marks import draw_mark, is_small, is_upright
 from augment.render.palette import Colour, MarkStyle
 from augment.render.shapes import runs
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import HORIZON_S, STEP_S, Movement, motion_of
+from augment.scene.motion import HORIZON_S, STEP_S, Movement, find_motion
 from augment.scene.recording import Recording
 
 STEPS = round(HORIZON_S / STEP_S) + 1
@@ -37,7 +37,7 @@ _MARGIN_M = 3.0
 Entry = list[Any]
 
 
-def film_of(
+def make_film(
     scene: Scene,
     modification: Modification,
     camera: Camera,
@@ -57,7 +57,7 @@ def film_of(
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    motion = motion_of(
+    motion = find_motion(
         apply(scene, modification),
         recording=recording,
         replaced=modification.replaced,

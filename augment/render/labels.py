@@ -1,4 +1,4 @@
-"""What is written into a picture: arrows at its edge, and for reviewers names and numbers."""
+"""Labels in a picture: arrows at its edge, and for reviewers names and numbers."""
 
 import math
 from collections.abc import Iterable, Iterator

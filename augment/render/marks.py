@@ -57,7 +57,7 @@ def draw_walks(ground: Canvas, walkers: list[tuple[TrafficAgent, MarkStyle]]) ->
         if not is_walking(agent):
             continue
         line = ground.px(np.array([[agent.x_m, agent.y_m], agent.walk_to_m]))
-        line = _moved_apart(line, drawn)
+        line = _move_apart(line, drawn)
         drawn.append(line)
         ground.dashed(line, palette.PAPER, 5.5, 9.5, 3.5)
         ground.dashed(line, style.fill, 2.5, 8.0, 5.0)
@@ -119,7 +119,7 @@ def is_small(agent: TrafficAgent) -> bool:
 # Private
 
 
-def _moved_apart(line: FloatArray, drawn: list[FloatArray]) -> FloatArray:
+def _move_apart(line: FloatArray, drawn: list[FloatArray]) -> FloatArray:
     """Return the line (2, 2), or beside its place where another one lies there already."""
     step = line[1] - line[0]
     along = step / max(float(np.hypot(*step)), 1e-9)

@@ -46,7 +46,7 @@ LIGHT_GREEN: Colour = (30, 138, 74)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkStyle:
-    """How the mark of one class of agents looks.
+    """Style of the mark of one class of agents.
 
     Attributes:
         detail: For what lies on the body: nose, wedge, cross.

@@ -10,7 +10,7 @@ from augment.render import palette
 from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, overlap
 from augment.render.palette import Colour
-from augment.render.shapes import long_axis, offset, resample_line, ring_of, runs, sides, stripes
+from augment.render.shapes import lane_ring, long_axis, offset, resample_line, runs, sides, stripes
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AreaKind,
@@ -75,7 +75,7 @@ def draw_ground(ground: Canvas, scene: Scene) -> None:
 
 
 def beyond_road(scene: Scene) -> Colour:
-    """Return what a picture is filled with first: paper, or a ground of its own.
+    """Return a picture's first filling: paper, or a ground of its own.
 
     A map without walkways has nothing between road and paper: only a colour tells them apart.
     """
@@ -198,7 +198,7 @@ def _surface(
     for polygon in walkways:
         ground.fill(polygon, palette.WALKWAY)
     roads = [ground.px(ring) for kind, ring in areas if kind in _ROAD_AREAS]
-    roads += [ground.px(ring_of(left, right)) for _, left, right in strips]
+    roads += [ground.px(lane_ring(left, right)) for _, left, right in strips]
     for polygon in roads:
         ground.stroke(polygon, palette.ROAD_EDGE, 4.0, closed=True)
     for polygon in roads:

@@ -39,9 +39,9 @@ def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def ring_of(left: FloatArray, right: FloatArray) -> FloatArray:
+def lane_ring(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return the polygon (P, 2) between two sides of a lane, drawn out a little at its ends."""
-    return np.concatenate([_lengthened(left), _lengthened(right)[::-1]])
+    return np.concatenate([_lengthen(left), _lengthen(right)[::-1]])
 
 
 def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
@@ -118,7 +118,7 @@ def _points_at(points: FloatArray, stations: FloatArray, at: FloatArray) -> Floa
     return np.stack([x, y], axis=-1)
 
 
-def _lengthened(points: FloatArray) -> FloatArray:
+def _lengthen(points: FloatArray) -> FloatArray:
     """Draw out both ends of a line; lanes that bend meet at a slight angle, with a gap."""
     longer = np.array(points, dtype=np.float64)
     for end, inner in ((0, 1), (-1, -2)):

@@ -33,7 +33,7 @@ _Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far a piece may be from its centreline.
+    """Allowed distance of a piece from its centreline.
 
     As written, to the centimetre, it is then within 0.1 m and 3 degrees.
     """
@@ -169,7 +169,7 @@ def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
 def _piece(line: Polyline, span: _Span, fixed: tuple[bool, bool] = (True, True)) -> LanePiece:
     """One cubic with the line's heading at the ends where that is fixed."""
     start_rad, end_rad = (
-        _heading_of(line, s_m) if is_fixed else None
+        _heading_at(line, s_m) if is_fixed else None
         for s_m, is_fixed in zip(span, fixed, strict=True)
     )
     curve = fit(line.between(*span), start_rad=start_rad, end_rad=end_rad)
@@ -177,7 +177,7 @@ def _piece(line: Polyline, span: _Span, fixed: tuple[bool, bool] = (True, True))
     return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error)
 
 
-def _heading_of(line: Polyline, s_m: float) -> float:
+def _heading_at(line: Polyline, s_m: float) -> float:
     """The heading of all pieces that begin or end there: no kink at a joint, no flare at an end.
 
     It is the chord's, or at an end of the line, where there is none, that of the parabola from

@@ -29,7 +29,7 @@ _ALWAYS_WRITTEN = ("requests", "kind", "body")
 
 
 def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
-    """What keeps a well-shaped value from being a scene."""
+    """Yield the reasons why a well-shaped value is no scene."""
     ego = scene.ego
     if ego.id != EGO_ID:
         yield "ego.id", f"the ego is {EGO_ID!r}, got {ego.id!r}"
@@ -41,7 +41,7 @@ def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
     named = [("ego.id", ego.id)]
     for key in ("agents", "lanes", "connectors", "areas"):
         named += [(path(key, i, "id"), one.id) for i, one in enumerate(getattr(scene, key))]
-    yield from _doubled(named)
+    yield from _find_doubled(named)
     yield from _second_egos(agents=scene.agents)
     yield from _motion_problems(agents=scene.agents)
     yield from _reference_problems(scene)
@@ -57,16 +57,16 @@ def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
 
 
 def _modification_problems(change: entities.Modification) -> Iterator[Problem]:
-    """What keeps a well-shaped value from being a modification of any scene."""
+    """Yield the reasons why a well-shaped value is no modification of any scene."""
     named = [(path("add", i, "id"), agent.id) for i, agent in enumerate(change.added)]
     named += [(path("move", i, "id"), agent.id) for i, agent in enumerate(change.moved)]
     named += [(path("remove", i), name) for i, name in enumerate(change.removed)]
-    yield from _doubled(named)
+    yield from _find_doubled(named)
     yield from _second_egos(add=change.added, move=change.moved)
     yield from _motion_problems(add=change.added, move=change.moved)
 
 
-def _doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
+def _find_doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
     first: dict[str, str] = {}
     for place, name in named:
         if name in first:

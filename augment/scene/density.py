@@ -191,7 +191,7 @@ def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
     )
 
 
-def _extended(scene: Scene, graph: LaneGraph, lane_id: str) -> list[str]:
+def _extend(scene: Scene, graph: LaneGraph, lane_id: str) -> list[str]:
     """The lane with what leads to it and follows it, 50 m from the ego or to a traffic light."""
     # interPlan's map says which connectors have no light at all; another map may not know.
     is_told = scene.options.interplan is not None
@@ -225,7 +225,7 @@ def _fill(
     The first is as fast as the limit, or slow enough to stop at the end; each further one slow
     enough to stop behind the one before it.
     """
-    lines = [graph.lane(name).centerline for name in _extended(scene, graph, lane_id)]
+    lines = [graph.lane(name).centerline for name in _extend(scene, graph, lane_id)]
     line = Polyline([point for one in lines for point in one.points_m.tolist()])
     ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
     is_egos = lane_id == find_ego_lane(scene, graph)

@@ -87,7 +87,7 @@ class EgoRoute:
         )
 
     def locate(self, x_m: float, y_m: float) -> RoutePosition:
-        """Where a point is by the route."""
+        """Return the position of a point relative to the route."""
         beside = self.line.project(x_m, y_m)
         return RoutePosition(
             ahead_m=beside.s_m - self.ego_s_m,
@@ -96,7 +96,7 @@ class EgoRoute:
         )
 
     def locate_agent(self, agent: TrafficAgent) -> RoutePosition:
-        """Where an agent's centre is by the route."""
+        """Return the position of an agent's centre relative to the route."""
         return self.locate(agent.x_m, agent.y_m)
 
     def position(self, ahead_m: float, left_m: float = 0.0) -> Point:

@@ -37,7 +37,7 @@ Point = tuple[float, float]
 
 
 class AgentType(StrEnum):
-    """What a traffic agent is: nuPlan's classes, and the bus that interPlan adds to them."""
+    """Type of a traffic agent: nuPlan's classes, and the bus that interPlan adds to them."""
 
     EGO_VEHICLE = "EGO_VEHICLE"
     VEHICLE = "VEHICLE"
@@ -61,7 +61,7 @@ class TrafficLight(StrEnum):
 
 
 class TurnType(StrEnum):
-    """How a connector leads through its intersection."""
+    """Turn of a connector through its intersection."""
 
     STRAIGHT = "straight"
     LEFT = "left"
@@ -70,7 +70,7 @@ class TurnType(StrEnum):
 
 
 class TrafficDensity(StrEnum):
-    """How much traffic is spawned in place of the recorded one; interPlan's three, and none."""
+    """Density of traffic spawned in place of the recorded one; interPlan's three, and none."""
 
     NONE = "none"
     LOW = "low"
@@ -79,7 +79,7 @@ class TrafficDensity(StrEnum):
 
 
 class AreaKind(StrEnum):
-    """What an area is; the union of lanes, connectors and `drivable` areas can be driven on."""
+    """Kind of an area; the union of lanes, connectors and `drivable` areas can be driven on."""
 
     DRIVABLE = "drivable"
     WALKWAY = "walkway"
@@ -202,7 +202,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Where the ego frame lies in the source's own world frame."""
+    """Pose of the ego frame in the source's own world frame."""
 
     frame: Annotated[Text, Field(min_length=1, max_length=200)]
     x_m: WorldMetres
@@ -222,7 +222,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InterplanRules:
-    """What interPlan does to a scenario of its file: it lasts 30 s, and boxes are interPlan's.
+    """interPlan's rules for a scenario of its file: it lasts 30 s, and boxes are interPlan's.
 
     Attributes:
         boxes_m: Length and width of the vehicles put there, one after the other; those after the
@@ -234,7 +234,7 @@ class InterplanRules:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneOptions:
-    """What a scenario sets besides its change.
+    """Settings of a scenario besides its change.
 
     Attributes:
         density: Of the spawned traffic, which is among the scene's agents.
@@ -319,7 +319,7 @@ class Modification:
 
     @property
     def is_empty(self) -> bool:
-        """Whether the scene stays as it is."""
+        """True if the scene stays as it is."""
         return not (self.added or self.moved or self.removed)
 
     @property
@@ -334,7 +334,7 @@ class Modification:
 
     @property
     def has_motion(self) -> bool:
-        """Whether an agent is made to do something after t0."""
+        """True if an agent has a motion after t0."""
         return any(agent.motion is not None for agent in self.changed)
 
 
@@ -406,7 +406,7 @@ def in_type_order(names: Iterable[str]) -> list[str]:
 
 
 class CatalogueSet(StrEnum):
-    """Which part of the authored catalogue a scenario belongs to."""
+    """Part of the authored catalogue that a scenario belongs to."""
 
     PAPER = "paper"
     HARD = "hard"

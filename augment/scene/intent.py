@@ -1,4 +1,4 @@
-"""What an instruction asks for, as frozen values; what it does not say stays open (None).
+"""Intent of an instruction as frozen values; an unstated one stays open (None).
 
 Distances run along the ego's lane, from centre to centre, in metres. Left and right are those of
 the ego's direction of travel. Kerb and centre line are named as such here and become left or
@@ -25,7 +25,7 @@ from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Ye
 
 
 class IntentOrigin(StrEnum):
-    """Where an intent comes from."""
+    """Source of an intent."""
 
     AUTHORED = "authored"
     ENTERED = "entered"
@@ -44,7 +44,7 @@ class LateralTarget(StrEnum):
 
 
 class Nearness(StrEnum):
-    """How far towards the target, where the sentence gives no number."""
+    """Distance towards the target if the sentence has no number."""
 
     SLIGHTLY = "slightly"
     AT_EDGE = "at the edge"
@@ -53,7 +53,7 @@ class Nearness(StrEnum):
 
 
 class Body(StrEnum):
-    """What is meant to stand or drive; `vehicle` and `car` share one size."""
+    """Kind of object; `vehicle` and `car` share one size."""
 
     VEHICLE = "vehicle"
     CAR = "car"
@@ -66,7 +66,7 @@ class Body(StrEnum):
 
 
 class Facing(StrEnum):
-    """Where something looks, against the direction of its lane."""
+    """Heading relative to the direction of its lane."""
 
     WITH_LANE = "with the lane"
     AGAINST_LANE = "against the lane"
@@ -74,7 +74,7 @@ class Facing(StrEnum):
 
 
 class Shape(StrEnum):
-    """How cones stand together."""
+    """Arrangement of cones."""
 
     TAPER = "taper"
     LINE = "line"
@@ -92,7 +92,7 @@ class Bearing(StrEnum):
 
 
 class Post(StrEnum):
-    """Where a worker stands by the cones."""
+    """Place of a worker by the cones."""
 
     BEHIND = "behind the cones"
     BESIDE = "beside the cones"
@@ -136,7 +136,7 @@ class LaneChoice(StrEnum):
 
 
 class Sight(StrEnum):
-    """What a road user of the scene is called."""
+    """Name of a road user of the scene in the sentence."""
 
     VEHICLE = "vehicle"
     PARKED = "parked vehicle"
@@ -192,7 +192,7 @@ _Changes = Annotated[tuple[_Item, ...], Field(fail_fast=True, max_length=MOST_RE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lateral:
-    """Where across the lane: towards `target`, by `offset` or, without a number, by `nearness`.
+    """Place across the lane: towards `target`, by `offset` or, without a number, by `nearness`.
 
     Attributes:
         on_shoulder: The sentence says that it stands (partly) beside the road, so the target has
@@ -448,7 +448,7 @@ class Move:
 
     @property
     def stays(self) -> bool:
-        """Whether it stays where it is and only moves otherwise."""
+        """True if it stays at its place and only its motion changes."""
         return self.motion is not None and self.spot == Spot()
 
     @property

@@ -13,7 +13,7 @@ from numpy.random import Generator
 from pydantic import Field, model_validator
 
 from augment.scene.planned_motion import MotionPreset
-from augment.scene.presets import numbers_of
+from augment.scene.presets import preset_numbers
 from augment.scene.schema import Real, Yes
 
 _Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
@@ -33,7 +33,7 @@ class Side(StrEnum):
 
     @property
     def sign(self) -> float:
-        """Of numbers to that side: left is positive."""
+        """Sign of numbers to that side: left is positive."""
         return 1.0 if self is Side.LEFT else -1.0
 
 
@@ -76,7 +76,7 @@ class Length:
 
     @property
     def is_range(self) -> bool:
-        """Whether a value has to be drawn from it."""
+        """True if a value has to be drawn from it."""
         return self.high_m > self.low_m
 
     def drawn(self, rng: Generator) -> float:
@@ -140,7 +140,7 @@ class StartWish:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionWish:
-    """What somebody is to do after t0, by its name.
+    """Motion after t0, by its name in the sentence.
 
     Attributes:
         start: When; open where nobody says.
@@ -159,7 +159,7 @@ class MotionWish:
 
     @model_validator(mode="after")
     def _has_the_numbers_of_its_preset(self) -> Self:
-        own = numbers_of(self.preset)
+        own = preset_numbers(self.preset)
         for name in ("speed_mps", "braking_mps2", "duration_s"):
             amount = getattr(self, name)
             if amount is not None and name not in own:

@@ -46,7 +46,7 @@ class LanePosition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beside:
-    """How a point lies beside one lane.
+    """Position of a point relative to one lane.
 
     Attributes:
         s_m: Along the centreline, within its ends.
@@ -66,7 +66,7 @@ class Beside:
 
     @property
     def covers(self) -> bool:
-        """Whether the lane lies under the point."""
+        """True if the lane lies under the point."""
         return abs(self.d_m) <= self.width_m / 2.0 and self.beyond_m <= _JOINT_M
 
     @property
@@ -269,7 +269,7 @@ class LaneGraph:
         return next(iter(wanted or options), None)
 
 
-def turn_type_of(line: Polyline) -> TurnType:
+def classify_turn(line: Polyline) -> TurnType:
     """Return how a line turns from its first point to its last, all bends summed up."""
     headings = np.arctan2(*np.diff(line.points_m, axis=0).T[::-1]).tolist()
     turn = sum(difference(after, before) for before, after in pairwise(headings))
@@ -280,7 +280,7 @@ def turn_type_of(line: Polyline) -> TurnType:
     return TurnType.LEFT if turn > 0.0 else TurnType.RIGHT
 
 
-def traffic_side_of(lanes: Sequence[Lane]) -> TrafficSide | None:
+def find_traffic_side(lanes: Sequence[Lane]) -> TrafficSide | None:
     """Return the side that most lanes keep to.
 
     Oncoming traffic to the left means right-hand traffic.

@@ -1,4 +1,4 @@
-"""Who is where when: what a scenario's agents do after t0, and how that is known.
+"""Motion of a scenario's agents after t0, and its source.
 
 Frame: ego frame of t0. T steps.
 """
@@ -16,7 +16,7 @@ from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import AtPlace
 from augment.scene.planned_mover import HeldCourse, PlannedMover
-from augment.scene.recording import Recording, agent_of
+from augment.scene.recording import Recording, track_agent
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ SETS_OUT_WITHIN_M: Final = 50.0
 
 
 class MotionSource(StrEnum):
-    """How one knows what an agent does after t0."""
+    """Source of an agent's motion after t0."""
 
     RECORDED = "recorded"
     WALK = "walk"
@@ -63,7 +63,7 @@ class Movement:
 
     @property
     def stands(self) -> bool:
-        """Whether it is there from t0 to the end and never moves."""
+        """True if it is there from t0 to the end and never moves."""
         return self.source is MotionSource.STANDING
 
 
@@ -86,14 +86,14 @@ class Motion:
         return float(self.times_s[1] - self.times_s[0])
 
 
-def motion_of(
+def find_motion(
     scene: Scene,
     *,
     recording: Recording | None = None,
     replaced: frozenset[str] = frozenset(),
     with_later: bool = False,
 ) -> Motion:
-    """What is known of the scene's agents after t0, and what has to be assumed.
+    """Return the motion of the scene's agents after t0, with assumptions where it is unknown.
 
     Who has a planned motion carries it out; who was recorded does what was recorded; who has a
     walk goes it; who moves otherwise holds the
@@ -120,13 +120,13 @@ def motion_of(
         if agent.walk_to_m is not None:
             others[agent.id] = _walk(agent, times_s, ego)
         elif recording is not None and track is not None and agent.id not in replaced:
-            others[agent.id] = _recorded(agent, track.states, recording, times_s)
+            others[agent.id] = _resample_track(agent, track.states, recording, times_s)
         else:
-            others[agent.id] = _assumed(agent, times_s, graph)
+            others[agent.id] = _assume_movement(agent, times_s, graph)
     if recording is not None and with_later:
         taken = {agent.id for agent in scene.everyone}
         others |= {one.agent.id: one for one in _later(recording, times_s, taken, replaced)}
-    others |= _planned(scene, times_s, graph, {ego.agent.id: ego} | others)
+    others |= _plan_movements(scene, times_s, graph, {ego.agent.id: ego} | others)
     return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
 
 
@@ -141,10 +141,10 @@ def with_movers_alone(scene: Scene, besides: Collection[str] = ()) -> Scene:
 # Private
 
 
-def _planned(
+def _plan_movements(
     scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
 ) -> dict[str, Movement]:
-    """Those with a motion of their own, who watch everybody for their triggers."""
+    """Return the agents with a planned motion, who watch everybody for their triggers."""
     movers = [PlannedMover(agent, graph) for agent in scene.agents if agent.motion is not None]
     if not movers:
         return {}
@@ -173,8 +173,8 @@ def _ego_movement(
 ) -> Movement:
     """The ego's recorded motion, completed so that it is there at every step."""
     if recording is None or not recording.shows_ego:
-        return _assumed(ego, times_s, graph, stays=True)
-    read = _recorded(ego, recording.ego, recording, times_s)
+        return _assume_movement(ego, times_s, graph, stays=True)
+    read = _resample_track(ego, recording.ego, recording, times_s)
     states, seen = read.states, np.flatnonzero(read.is_present)
     last = int(seen[-1])
     gaps = np.flatnonzero(~read.is_present[:last])
@@ -182,18 +182,20 @@ def _ego_movement(
     known[:, 2] = np.unwrap(known[:, 2])
     for column in range(4):
         states[gaps, column] = np.interp(times_s[gaps], times_s[seen], known[:, column])
-    states[gaps, 2] = _wrapped(states[gaps, 2])
+    states[gaps, 2] = _wrap_angles(states[gaps, 2])
     if last + 1 < len(times_s):
         x_m, y_m, heading_rad, speed_mps = states[last].tolist()
         lane_id = graph.under(x_m, y_m, heading_rad)
         there = replace(
             ego, x_m=x_m, y_m=y_m, heading_rad=heading_rad, speed_mps=speed_mps, lane_id=lane_id
         )
-        states[last:] = _assumed(there, times_s[last:] - times_s[last], graph, stays=True).states
+        states[last:] = _assume_movement(
+            there, times_s[last:] - times_s[last], graph, stays=True
+        ).states
     return read
 
 
-def _recorded(
+def _resample_track(
     agent: TrafficAgent, states: FloatArray, recording: Recording, times_s: FloatArray
 ) -> Movement:
     """A track, read at even times; its first state is that of the scene, to the last digit."""
@@ -211,9 +213,9 @@ def _read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) ->
     # A share of nothing of what was not seen is nothing, not NaN.
     low, high = states[before], states[after]
     step = high - low
-    step[:, 2] = _wrapped(step[:, 2])
+    step[:, 2] = _wrap_angles(step[:, 2])
     read = np.where(share < 1e-6, low, np.where(share > 1.0 - 1e-6, high, low + share * step))
-    read[:, 2] = _wrapped(read[:, 2])
+    read[:, 2] = _wrap_angles(read[:, 2])
     return np.asarray(read, dtype=np.float64)
 
 
@@ -226,7 +228,7 @@ def _later(
         states = _read_at(track.states, recording.times_s, times_s)
         seen = np.flatnonzero(~np.isnan(states).any(axis=1))
         if len(seen):
-            agent = agent_of(track, states[seen[0]])
+            agent = track_agent(track, states[seen[0]])
             yield Movement(agent=agent, source=MotionSource.RECORDED, states=states)
 
 
@@ -260,7 +262,7 @@ def walking_pace_mps(agent: TrafficAgent) -> float:
     return math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
 
 
-def _assumed(
+def _assume_movement(
     agent: TrafficAgent, times_s: FloatArray, graph: LaneGraph, *, stays: bool = False
 ) -> Movement:
     """Standing, or at the speed of t0 along the lane; past the map it is gone, or it `stays`."""
@@ -277,7 +279,7 @@ def _assumed(
     return Movement(agent=agent, source=MotionSource.HELD_SPEED, states=states)
 
 
-def _wrapped(angles_rad: FloatArray) -> FloatArray:
+def _wrap_angles(angles_rad: FloatArray) -> FloatArray:
     """Angles in (-pi, pi]."""
     return np.asarray(np.pi - np.mod(np.pi - angles_rad, 2.0 * np.pi), dtype=np.float64)
 

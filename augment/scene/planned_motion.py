@@ -1,4 +1,4 @@
-"""What an agent is made to do after t0: along which path, how fast, and from when on.
+"""Planned motion of an agent after t0: its path, its speeds, and its trigger.
 
 Frame: the scene's. Distances between road users run straight from centre to centre.
 """

@@ -1,4 +1,4 @@
-"""Carries a planned motion out, step by step: in `motion_of` and in drives alike.
+"""Carries a planned motion out, step by step: in `find_motion` and in drives alike.
 
 Frame: the scene's.
 """
@@ -186,15 +186,15 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline | None:
         InvalidModification: A lane is unknown, or neither follows nor runs beside the one before.
     """
     check_lane_path(graph, path)
-    runs = _runs_of(graph, path.lane_ids)
-    line, last_begins_m = _followed(graph, runs[0])
+    runs = _split_runs(graph, path.lane_ids)
+    line, last_begins_m = _join_run(graph, runs[0])
     at = line.project(*here)
     at_m, d_m, points = at.s_m, at.d_m, [here]
     is_beside = abs(d_m) > graph.lane(path.lane_ids[0]).width_m * _KEEPS_OFFSET_SHARE
     for run in runs[0 if is_beside and at.beyond_m == 0.0 else 1 :]:
         begins_m = at_m if run is runs[0] else max(at_m, last_begins_m)
         points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
-        target, last_begins_m = _followed(graph, run)
+        target, last_begins_m = _join_run(graph, run)
         for s_m in _samples(begins_m, begins_m + path.change_m, most=MOST_OF_CHANGE):
             share = smooth_share((s_m - begins_m) / path.change_m)
             start = line.position(s_m, d_m)
@@ -287,7 +287,7 @@ def _row(pose: tuple[float, float, float] | None, speed_mps: float) -> FloatArra
     return np.full(4, np.nan) if pose is None else np.array([*pose, speed_mps])
 
 
-def _runs_of(graph: LaneGraph, lane_ids: tuple[str, ...]) -> list[list[str]]:
+def _split_runs(graph: LaneGraph, lane_ids: tuple[str, ...]) -> list[list[str]]:
     """Lanes that follow each other, one list for each lane change more."""
     runs = [[lane_ids[0]]]
     for before, after in pairwise(lane_ids):
@@ -298,7 +298,7 @@ def _runs_of(graph: LaneGraph, lane_ids: tuple[str, ...]) -> list[list[str]]:
     return runs
 
 
-def _followed(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
+def _join_run(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
     """The line over lanes and what follows the last straightest; where that last one begins."""
     lines = [graph.lane(name).centerline for name in run]
     last_begins_m = sum(line.length_m for line in lines[:-1])

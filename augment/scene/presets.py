@@ -68,7 +68,7 @@ _SLOWEST_EGO_MPS = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PresetNumbers:
-    """What a preset leaves to choose; None for its usual number.
+    """Free numbers of a preset; None for the usual one.
 
     Attributes:
         start: When it sets out.
@@ -124,7 +124,7 @@ def with_preset(
     route = EgoRoute.of(scene)
     if route is None:
         raise CannotPlace("The ego stands on no lane of the map.")
-    own = numbers_of(preset)
+    own = preset_numbers(preset)
     for name in _NUMBERS:
         if getattr(numbers, name) is not None and name not in own:
             raise CannotPlace(f"{preset.label}: {name} is none of its numbers: {', '.join(own)}.")
@@ -142,7 +142,7 @@ def with_preset(
     return mover
 
 
-def numbers_of(preset: MotionPreset) -> tuple[str, ...]:
+def preset_numbers(preset: MotionPreset) -> tuple[str, ...]:
     """Return the fields of `PresetNumbers` that it leaves to choose, the main one first."""
     return tuple(name for name in _NUMBERS if getattr(USUAL[preset], name) is not None)
 
@@ -156,7 +156,7 @@ def find_crossing(connector: LaneConnector, route: EgoRoute) -> Point | None:
         heading_rad, ego_rad = (one.project(x_m, y_m).heading_rad for one in (line, ahead))
         turn_rad = abs(difference(heading_rad, ego_rad))
         if _CROSSES_ABOVE_RAD < turn_rad < math.pi - _CROSSES_ABOVE_RAD:
-            return _rounded((x_m, y_m))
+            return _round((x_m, y_m))
     return None
 
 
@@ -284,7 +284,7 @@ def _late_pedestrian(case: _Case) -> TrafficAgent:
         case.agent, speed_mps=0.0, walk_to_m=None, heading_rad=math.atan2(north, east)
     )
     speed_mps = case.number("speed_mps")
-    path = PointPath(points_m=(_rounded(end),))
+    path = PointPath(points_m=(_round(end),))
     return replace(case, agent=waiting).moving(path, ((_STARTS_WALKING_S, speed_mps),))
 
 
@@ -303,7 +303,7 @@ def _door_opening(case: _Case) -> TrafficAgent:
         raise case.refusal("the car has to stand along the ego's lane.")
     closed_m = car.width_m / 2.0 + DOOR_WIDTH_M / 2.0 + _DOOR_GAP_M
     local = [(_DOOR_AHEAD_M, side * across) for across in (closed_m, closed_m + DOOR_REACH_M)]
-    closed, opened = map(_rounded, car.pose.to_parent(np.array(local)).tolist())
+    closed, opened = map(_round, car.pose.to_parent(np.array(local)).tolist())
     door = TrafficAgent(
         id="",
         type=AgentType.GENERIC_OBJECT,
@@ -336,7 +336,7 @@ def _u_turn(case: _Case) -> TrafficAgent:
         raise case.refusal("the lanes end before it begins.")
     points = [here[:2]] if gone_m else []
     points += _turn_points(case, Pose(x_m=here[0], y_m=here[1], heading_rad=here[2]))
-    path = PointPath(points_m=tuple(map(_rounded, points)))
+    path = PointPath(points_m=tuple(map(_round, points)))
     return case.moving(path, _ramp(agent.speed_mps, turn_mps), start)
 
 
@@ -469,7 +469,7 @@ def _ramp(
 
 
 def _road_edge_m(route: EgoRoute, ahead_m: float, side: float) -> float:
-    """How far from the ego's way, straight across, its road's last lane ends."""
+    """Return the distance in m from the ego's way, straight across, to its road's far edge."""
     end_m = across_m = 0.0
     while across_m - end_m < _GAP_M and across_m < _ACROSS_M:
         across_m += _ACROSS_STEP_M
@@ -490,5 +490,5 @@ def _road(route: EgoRoute) -> shapely.Geometry:
     return shapely.union_all([*lanes, *(shapely.make_valid(a).buffer(_OFF_ROAD_M) for a in areas)])
 
 
-def _rounded(point: Sequence[float]) -> Point:
+def _round(point: Sequence[float]) -> Point:
     return round(point[0], 3) + 0.0, round(point[1], 3) + 0.0

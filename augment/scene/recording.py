@@ -1,4 +1,4 @@
-"""What was recorded after t0: the tracks of the others and the ego's own motion.
+"""Recording after t0: the tracks of the others and the ego's own motion.
 
 Frame: the ego frame of t0 (the Scene's frame). T steps.
 """
@@ -23,7 +23,7 @@ _UNSEEN = (np.nan,) * 4
 
 
 class _NumberList:
-    """How an array stands in a document: as a list; a state of NaN alone is null."""
+    """Array as a document has it: a list; a state of NaN alone is null."""
 
     def __init__(self, item: Any, least: int = 0) -> None:
         self._items = Annotated[list[item], Field(fail_fast=True, min_length=least)]
@@ -98,11 +98,11 @@ class Recording:
 
     @property
     def shows_ego(self) -> bool:
-        """Whether more of the ego was recorded than where it began."""
+        """True if more of the ego was recorded than its start."""
         return int(self.ego_is_seen.sum()) > 1
 
 
-def agent_of(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
+def track_agent(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
     """Return the agent of a track as it is in one of its states (4,)."""
     x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)
     return TrafficAgent(

@@ -1,4 +1,4 @@
-"""What the project's own JSON documents are made of, and the reasons for what breaks them.
+"""Schema of the project's own JSON documents, and reasons for violations.
 
 A value is a dataclass whose fields say in these types what may stand in them; a `TypeAdapter`
 reads and writes it. Values are strict: no text for numbers, no unknown fields, nothing that is
@@ -58,7 +58,7 @@ Ring = Annotated[
 
 
 class _PointList:
-    """How a `Polyline` stands in a document: as a list of its points."""
+    """`Polyline` as a document has it: a list of its points."""
 
     @staticmethod
     def __get_pydantic_core_schema__(_: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -103,7 +103,7 @@ class Codec(Generic[Value]):
 
     @property
     def frame(self) -> dict[str, Any]:
-        """What every document of the kind begins with."""
+        """First fields of every document of the kind."""
         return {"format": f"scenario-arena/{self.what}", "version": VERSION}
 
     def to_document(self, value: Value) -> dict[str, Any]:
@@ -131,11 +131,13 @@ class Codec(Generic[Value]):
             raise InvalidDocument(self.what, [("", text)])
         wanted, given = self.frame["format"], document.get("format")
         if given != wanted:
-            text = f"expected {wanted!r}, got {_shown(given)}"
+            text = f"expected {wanted!r}, got {_shorten(given)}"
             raise InvalidDocument(self.what, [("format", text)])
         version = document.get("version")
         if type(version) is not int or version != VERSION:
-            text = f"version {_shown(version)} is not known; this program reads version {VERSION}"
+            text = (
+                f"version {_shorten(version)} is not known; this program reads version {VERSION}"
+            )
             raise InvalidDocument(self.what, [("version", text)])
         parts = {name: part for name, part in document.items() if name not in self.frame}
         return self.from_parts(parts)
@@ -145,7 +147,7 @@ class Codec(Generic[Value]):
         try:
             value = self.shape.validate_python(parts)
         except ValidationError as fault:
-            raise InvalidDocument(self.what, problems_of(fault)) from None
+            raise InvalidDocument(self.what, list_problems(fault)) from None
         problems = list(self.problems(value))
         if problems:
             raise InvalidDocument(self.what, problems)
@@ -175,7 +177,7 @@ def remember(read: Callable[[object], Value], most: int) -> Callable[[object], V
     return read_once
 
 
-def problems_of(fault: ValidationError) -> list[tuple[str, str]]:
+def list_problems(fault: ValidationError) -> list[tuple[str, str]]:
     """Each fault that pydantic found, as its path and a sentence."""
     return [(path(*error["loc"]), _sentence(error)) for error in fault.errors(include_url=False)]
 
@@ -199,10 +201,10 @@ def _sentence(error: Any) -> str:
     reason = "Input should be an object" if error["type"] == "dataclass_type" else error["msg"]
     # What is a tuple here is a list in JSON.
     reason = reason.replace("tuple", "list").replace("Tuple", "List")
-    return f"{reason}, got {_shown(error['input'])}"
+    return f"{reason}, got {_shorten(error['input'])}"
 
 
-def _shown(value: object) -> str:
+def _shorten(value: object) -> str:
     if isinstance(value, dict | list):
         return f"a {'list' if isinstance(value, list) else 'object'} of {len(value)}"
     text = repr(value) if not isinstance(value, int) or abs(value) < 1e30 else "a huge number"

@@ -1,4 +1,4 @@
-"""Where those with a planned motion come along: what stills show of it, and what windows hold.
+"""Trails of planned motions: outlines in stills, and places that windows must hold.
 
 Frame: ego frame of t0. P points.
 """
@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from augment.scene.entities import Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, motion_of, with_movers_alone
+from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, find_motion, with_movers_alone
 from augment.scene.planned_motion import AtTime
 from augment.scene.recording import Recording
 
@@ -37,7 +37,7 @@ class Trail:
 
 
 @lru_cache(maxsize=32)
-def trails_of(
+def find_trails(
     scene: Scene, modification: Modification, recording: Recording | None = None
 ) -> tuple[Trail, ...]:
     """Return the trail of every changed agent with a motion, in the order of the modification.
@@ -45,7 +45,7 @@ def trails_of(
     Args:
         scene: Before the change.
         modification: What changes.
-        recording: What was recorded after t0; triggers fire by it as they do in `motion_of`.
+        recording: What was recorded after t0; triggers fire by it as they do in `find_motion`.
 
     Raises:
         InvalidModification: The change does not fit the scene, or a path its lanes.
@@ -53,7 +53,7 @@ def trails_of(
     if not modification.has_motion:
         return ()
     after = apply(scene, modification)
-    motion = motion_of(
+    motion = find_motion(
         with_movers_alone(after), recording=recording, replaced=modification.replaced
     )
     started = {one.agent.id: _trail_since(one.started_s, one.states) for one in motion.others}
@@ -66,7 +66,7 @@ def trails_of(
             if one.motion is not None and one.id in waiting
         ),
     )
-    would = {one.agent.id: one.states[: _STEPS + 1, :2] for one in motion_of(at_once).others}
+    would = {one.agent.id: one.states[: _STEPS + 1, :2] for one in find_motion(at_once).others}
     trails = []
     for agent in modification.changed:
         if agent.motion is None:
@@ -85,7 +85,7 @@ def trails_of(
 @lru_cache(maxsize=8)
 def ego_spots(scene: Scene, recording: Recording | None = None) -> tuple[TrafficAgent, ...]:
     """Return the ego every second of a film, as recorded or at its speed."""
-    motion = motion_of(replace(scene, agents=()), recording=recording)
+    motion = find_motion(replace(scene, agents=()), recording=recording)
     return _spots(scene.ego, motion.ego.states[: _STEPS + 1 : _EVERY])
 
 

@@ -1,6 +1,6 @@
 """Requests as dataclasses: each field says once what it holds and how it is asked for.
 
-`input_field` declares a field, `inputs_of` lists those of a request. Forms, bodies of the API and
+`input_field` declares a field, `to_inputs` lists those of a request. Forms, bodies of the API and
 the options of commands are made of that list: a field that is added is added to all of them.
 """
 
@@ -17,7 +17,7 @@ Request = TypeVar("Request")
 
 
 class InputKind(StrEnum):
-    """What a field holds: a text, a number, yes or no, one of several words, or many texts."""
+    """Kind of a field: a text, a number, yes or no, one of several words, or many texts."""
 
     TEXT = "text"
     WHOLE = "whole"
@@ -71,7 +71,7 @@ class Input:
 
     @property
     def is_required(self) -> bool:
-        """Whether the request can't be made without it."""
+        """True if the request can't be made without it."""
         return self.default is MISSING
 
 
@@ -83,8 +83,8 @@ def input_field(
     return field(default=default, metadata=metadata)
 
 
-def inputs_of(request: type) -> tuple[Input, ...]:
-    """Return what a request asks for, in the order of its fields."""
+def to_inputs(request: type) -> tuple[Input, ...]:
+    """Return the inputs of a request, in the order of its fields."""
     return tuple(
         Input(name=one.name, **one.metadata["input"])
         for one in fields(request)
@@ -100,7 +100,7 @@ def read_request(request: type[Request], given: Mapping[str, Any], **more: Any) 
         given: Values by name; empty ones leave the default, other names are ignored.
         more: What else the request holds.
     """
-    return request(**read_values(inputs_of(request), given) | more)
+    return request(**read_values(to_inputs(request), given) | more)
 
 
 def read_values(inputs: Iterable[Input], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def check_bounds(request: Any) -> None:
     """
     problems = [
         (one.name, f"goes from {one.least:g} to {one.most:g}, not {value:g}")
-        for one in inputs_of(type(request))
+        for one in to_inputs(type(request))
         if one.least is not None and one.most is not None
         if (value := getattr(request, one.name)) is not None
         if value != value or not one.least <= value <= one.most  # NaN is not itself

@@ -1,4 +1,4 @@
-"""What a row from outside must keep to, beyond its columns: the rules of the forms and the API.
+"""Rules for a row from outside beyond its columns: those of the forms and the API.
 
 Each rule is the function by which the form or the API reads the same thing.
 """
@@ -21,7 +21,7 @@ from augment.scene.codec import (
 )
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
 from augment.services.scenarios import scenes
-from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import MOST_SAMPLES, options_from_document
@@ -39,7 +39,7 @@ def _check_document(read: Callable[[Any], object], document: Any) -> None:
 def _check_scene(row: models.BaseScene) -> None:
     scenes.check_slug(row.slug, what="scene")
     scene_from_document(row.document)
-    notes_of(row.notes)
+    note_sentences(row.notes)
     _check_document(recording_from_document, row.recording)
 
 
@@ -50,7 +50,7 @@ def _check_scenario(row: models.Scenario) -> None:
     check_picture_name("original_image", row.original_image)
     _check_document(intent_from_document, row.intent)
     if row.reference is not None:
-        scenes.check_reference(scenes.scene_of(row), modification_from_document(row.reference))
+        scenes.check_reference(scenes.load_scene(row), modification_from_document(row.reference))
 
 
 def _check_benchmark(row: models.Benchmark) -> None:

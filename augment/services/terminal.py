@@ -13,7 +13,7 @@ from django.core.management.base import BaseCommand, CommandError, CommandParser
 
 from augment.errors import AugmentError
 from augment.escaping import escape_controls
-from augment.services.inputs import add_options, inputs_of
+from augment.services.inputs import add_options, to_inputs
 
 
 class TerminalOutput(OutputWrapper):
@@ -55,7 +55,7 @@ class TerminalCommand(BaseCommand):
         for name, options in self.arguments.items():
             parser.add_argument(name, **options)
         if self.request is not None:
-            add_options(parser, inputs_of(self.request))
+            add_options(parser, to_inputs(self.request))
 
     # Django sets both again when it is called with streams of its own.
 
@@ -66,7 +66,7 @@ class TerminalCommand(BaseCommand):
 
     @stdout.setter
     def stdout(self, given: Any) -> None:
-        self._stdout = _wrapped(given)
+        self._stdout = _wrap(given)
 
     @property  # type: ignore[override]
     def stderr(self) -> TerminalOutput:
@@ -75,7 +75,7 @@ class TerminalCommand(BaseCommand):
 
     @stderr.setter
     def stderr(self, given: Any) -> None:
-        self._stderr = _wrapped(given)
+        self._stderr = _wrap(given)
 
     def execute(self, *args: Any, **options: Any) -> str | None:
         """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
@@ -86,7 +86,7 @@ class TerminalCommand(BaseCommand):
             raise CommandError(f"{self.failure} {error}".lstrip()) from error
 
 
-def _wrapped(given: OutputWrapper) -> TerminalOutput:
+def _wrap(given: OutputWrapper) -> TerminalOutput:
     made = TerminalOutput(given._out, ending=given.ending)  # type: ignore[arg-type]
     made.style_func = given.style_func
     return made

@@ -29,7 +29,7 @@ _MOTION = TypeAdapter(PlannedMotion)
 
 
 def motion_in_words(agent: dict[str, Any]) -> str:
-    """Return what an agent of a stored modification is made to do; empty where nothing is."""
+    """Return the motion of a stored modification's agent in words; empty if it has none."""
     return str(_MOTION.validate_python(agent["motion"])) if "motion" in agent else ""
 
 

@@ -47,7 +47,7 @@ FREE: Mapping[str, Any] = {"claim": None, "heartbeat_at": None}
 
 
 class TryEnd(StrEnum):
-    """How a worker's try can end beside the outcomes of its row."""
+    """End of a worker's try beside the outcomes of its row."""
 
     LOST = "lost"
     RELEASED = "released"
@@ -56,7 +56,7 @@ class TryEnd(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settlement:
-    """What became of a row.
+    """Result of settling a row.
 
     Attributes:
         state: One that is not under way.
@@ -359,7 +359,7 @@ def is_passing(error: Exception) -> bool:
 
 
 def wait_out(act: Callable[[], Result], *, sleep: Callable[[float], None] = time.sleep) -> Result:
-    """Return what a transaction returns, tried again for as long as the database is locked.
+    """Return the transaction's result, tried again for as long as the database is locked.
 
     Raises:
         DatabaseLocked: It took nothing for PATIENCE_S.

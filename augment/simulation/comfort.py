@@ -1,4 +1,4 @@
-"""What passengers feel of a drive; T moments every 0.1 s.
+"""Comfort of a drive; T moments every 0.1 s.
 
 The final score and PDM-Closed's own smooth accelerations in different ways (`SCORE`, `PROPOSAL`);
 both hold every moment against the same limits. Savitzky-Golay filters are kept as matrices, so
@@ -50,7 +50,7 @@ def filter_matrix(count: int, window: int, order: int, derivative: int = 0) -> F
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """How accelerations become signals, in samples; yaw takes a window of 5 either way.
+    """Filters of acceleration signals, in samples; yaw takes a window of 5 either way.
 
     Attributes:
         acceleration: The window of the acceleration itself.

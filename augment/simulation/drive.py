@@ -12,7 +12,7 @@ from augment.scene.entities import Modification
 from augment.scene.recording import Recording
 from augment.simulation.planning import IdmPlanner, Plan, Planner, Situation
 from augment.simulation.road import Road
-from augment.simulation.shapes import moved_ahead
+from augment.simulation.shapes import move_ahead
 from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, start_state
 from augment.simulation.tracker import drive_steps
 from augment.simulation.traffic import DriveSetting, Traffic
@@ -26,7 +26,7 @@ _PACE_S = 1.0
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Drive:
-    """What happened. T moments, one more than steps were driven.
+    """Result of a closed-loop drive. T moments, one more than steps were driven.
 
     Attributes:
         states: (T, 6) of the ego's rear axle.
@@ -51,12 +51,12 @@ class Drive:
 
     @property
     def duration_s(self) -> float:
-        """How long was driven."""
+        """Driven time in s."""
         return (len(self.states) - 1) * STEP_S
 
     @property
     def outlasts_recording(self) -> bool:
-        """Whether part of it was driven after the end of the recording."""
+        """True if part of it was driven after the end of the recording."""
         return self.recorded_s is not None and self.duration_s > self.recorded_s + STEP_S / 2.0
 
 
@@ -112,11 +112,11 @@ def run(
 
 
 def _goal_m(setting: DriveSetting, road: Road, body: EgoBody) -> float:
-    """Where on the centreline interPlan ends a drive; a goal that it names ends none here."""
+    """Return interPlan's end of a drive on the centreline in m; a goal it names ends none here."""
     recording, options = setting.recording, setting.scene.options
     if options.interplan is None or options.goal or not (recording and recording.shows_ego):
         return math.inf
-    axle = moved_ahead(recording.ego[recording.ego_is_seen][-1, :3], -body.centre_m)
+    axle = move_ahead(recording.ego[recording.ego_is_seen][-1, :3], -body.centre_m)
     return road.centreline.station_of(axle) - NEAR_GOAL_M
 
 
@@ -131,7 +131,7 @@ def _poses(plan: Plan) -> FloatArray:
 
 
 class ExpertKind(StrEnum):
-    """Where the expert's progress comes from."""
+    """Source of the expert's progress."""
 
     RECORDED = "recorded"
     IDM = "idm"
@@ -147,11 +147,11 @@ class Expert:
 
     @property
     def progress_m(self) -> float:
-        """How far it came."""
+        """Progress along the route in m."""
         return self.end_m - self.start_m
 
 
-def expert_of(setting: DriveSetting, road: Road, *, steps: int | None = None) -> Expert:
+def find_expert(setting: DriveSetting, road: Road, *, steps: int | None = None) -> Expert:
     """Return the recorded ego, or an IDM drive at the speed limit without the change.
 
     Either goes as long as the drive lasts and as far as the map goes. Where the recording ends
@@ -162,14 +162,16 @@ def expert_of(setting: DriveSetting, road: Road, *, steps: int | None = None) ->
     has_goal = setting.scene.options.goal is not None
     if setting.recording is not None and setting.recording.shows_ego and not has_goal:
         end_m = road.end_m - setting.scene.ego.length_m / 2.0
-        return _recorded(setting.recording, road, end_m, steps * STEP_S)
+        return _read_recorded(setting.recording, road, end_m, steps * STEP_S)
     plain = replace(setting, modification=Modification())
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)
     ends, _ = road.centreline.beside(drive.boxes[[0, -1], :2])
     return Expert(kind=ExpertKind.IDM, start_m=float(ends[0]), end_m=float(ends[1]))
 
 
-def _recorded(recording: Recording, road: Road, furthest_m: float, duration_s: float) -> Expert:
+def _read_recorded(
+    recording: Recording, road: Road, furthest_m: float, duration_s: float
+) -> Expert:
     seen = recording.ego_is_seen & (recording.times_s <= duration_s + STEP_S / 2.0)
     times_s = recording.times_s[seen]
     stations_m, _ = road.centreline.beside(recording.ego[seen, :2])

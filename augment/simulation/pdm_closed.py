@@ -69,7 +69,7 @@ def brake(ego: FloatArray, body: EgoBody) -> FloatArray:
     if speed > _LOW_MPS:
         commanded *= 1.1
     way_m = commanded * STEP_S * np.arange(WHOLE_STEPS + 1)
-    return shapes.moved_ahead(np.tile(body.boxes(ego), (len(way_m), 1)), way_m)
+    return shapes.move_ahead(np.tile(body.boxes(ego), (len(way_m), 1)), way_m)
 
 
 class PdmClosed:
@@ -177,7 +177,7 @@ class PdmClosed:
     def _leaders(
         self, station: FloatArray, corridor: planning.Corridor, moment: int, reaches_m: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Where the leader's rear is (P, V), and its speed; of equal ones the first.
+        """Return the leader's rear (P, V), and its speed; of equal ones the first.
 
         As released: ahead is whose centre lies beyond the rear axle, even beside the ego itself.
         Something stands at the end of each path.
@@ -199,7 +199,7 @@ class PdmClosed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProposalScores:
-    """How good each of B proposals is.
+    """Scores of B proposals.
 
     Attributes:
         scores: (B,) 0 to 1.
@@ -260,7 +260,7 @@ class _Look:
         return proposal[hit], moment[hit], thing[hit]
 
     def astray(self, proposal: IntArray, moment: IntArray) -> BoolArray:
-        """Whether the ego (K,) is off the road or not on one way; each place is asked once."""
+        """Return whether the ego (K,) is off the road or not on one way; asks a place once."""
         keys, back = np.unique(proposal * self.states.shape[1] + moment, return_inverse=True)
         rows, times = np.divmod(keys, self.states.shape[1])
         wrong = self.off_road[rows, times] | ~self.road.on_one_way(self.corners[rows, times])
@@ -337,7 +337,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
 def _meetings(look: _Look, later: int) -> IntArray:
     """Proposal, moment, object and steps (4, K) of who meets if the ego goes straight on."""
     boxes, speed = look.boxes.copy(), look.states[..., SPEED]
-    boxes[..., :3] = shapes.moved_ahead(boxes, speed * (later * STEP_S))
+    boxes[..., :3] = shapes.move_ahead(boxes, speed * (later * STEP_S))
     proposal, moment, thing = look.contacts(boxes, later)
     meetings = np.stack([proposal, moment, thing, np.full(len(proposal), later)])
     return meetings[:, speed[proposal, moment] > _STILL_MPS]

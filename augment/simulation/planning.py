@@ -1,4 +1,4 @@
-"""What a planner is given and gives back, and what the built-in ones share.
+"""Planner interface: observation and plan, and parts shared by the built-in planners.
 
 Whoever fits `Planner` can be driven. A planner of your own is a class without arguments in a
 module that can be imported, named by its dotted path (docs/simulation.md has an example).
@@ -46,7 +46,7 @@ class Situation:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Proposals:
-    """What a planner considered, for people to look at; nothing depends on it.
+    """Proposals of a planner, for people to look at; nothing depends on it.
 
     Attributes:
         states: (B, T, 3 or more): rear-axle poses over the planner's horizon.
@@ -61,7 +61,7 @@ class Proposals:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
-    """What the ego is to do.
+    """Plan for the ego.
 
     Attributes:
         poses: (T, 3), rear axle, every `STEP_S` from this moment on, T >= 2. The tracker reads
@@ -83,7 +83,7 @@ class Planner(Protocol):
         """Get to know the map and the car; forget every drive before."""
 
     def plan(self, situation: Situation) -> Plan:
-        """Return what to do from this moment on."""
+        """Return the plan from this moment on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def nearest(objects: Objects, place_m: FloatArray, radius_m: float = RADIUS_M) -
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Corridor:
-    """Which road each object takes up on each path.
+    """Road that each object takes up on each path.
 
     Attributes:
         near_m: (F, P, A) where it begins on the path; inf where it does not meet the corridor.

@@ -108,7 +108,7 @@ def _is_aligned(place: Beside, heading_rad: float) -> bool:
 
 
 def _driven(graph: LaneGraph, recording: Recording) -> Counter[str]:
-    """How many moments of the recorded ego lie on each way, in its direction."""
+    """Return the number of moments of the recorded ego on each way, in its direction."""
     return Counter(
         place.lane_id
         for x_m, y_m, heading_rad, _ in recording.ego[recording.ego_is_seen].tolist()
@@ -187,7 +187,7 @@ class Road:
 
     @cached_property
     def red_stations_m(self) -> FloatArray:
-        """Where on the centreline the route enters connectors whose light is red (R,)."""
+        """Stations on the centreline where the route enters connectors with a red light (R,)."""
         starts = np.concatenate([[0.0], self.route_ends_m[:-1]])
         return starts[np.array([name in self.red for name in self.route], dtype=np.bool_)]
 

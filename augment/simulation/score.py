@@ -59,7 +59,7 @@ _DETOUR = (
 
 
 class ScoreKind(StrEnum):
-    """Whose score."""
+    """Benchmark whose score it is."""
 
     NUPLAN = "nuplan"
     INTERPLAN = "interplan"
@@ -281,7 +281,7 @@ def _pick_way(
 
 
 def _direction(drive: Drive, ways: IntArray) -> float:
-    """By the longest way against the lane's direction in 1.1 s: < 2 m is 1, < 6 m 0.5, else 0.
+    """Return 1, 0.5 or 0 by the longest way against the lane in 1.1 s: < 2 m, < 6 m, else.
 
     The first two moments on another way count nothing.
     """
@@ -355,7 +355,7 @@ def _first_meeting(box: FloatArray, state: FloatArray, objects: Objects) -> floa
     near = ((objects.boxes[:, :2] - box[:2]) ** 2).sum(axis=1) <= reach**2
     theirs = objects.chosen(near).later(times)
     mine = np.broadcast_to(box, theirs.shape).copy()
-    mine[..., :3] = shapes.moved_ahead(mine, (times * state[SPEED])[:, None])
+    mine[..., :3] = shapes.move_ahead(mine, (times * state[SPEED])[:, None])
     hit = shapes.meet(mine, theirs).any(axis=1)
     return float(times[hit.argmax()]) if hit.any() else float("inf")
 

@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 _SIGNS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
-def moved_ahead(poses: FloatArray, way_m: NDArray[Any] | float) -> FloatArray:
+def move_ahead(poses: FloatArray, way_m: NDArray[Any] | float) -> FloatArray:
     """Return poses (..., 3) that lie so far (...) ahead of poses or boxes (..., 3 or more)."""
     moved = poses[..., :3].copy()
     moved[..., 0] += way_m * np.cos(moved[..., 2])

@@ -1,4 +1,4 @@
-"""What drives are computed with: states, boxes and objects as rows of numbers.
+"""States, boxes and objects of drives as rows of numbers.
 
 A state is a row of `WIDTH` numbers about the rear axle: x_m, y_m, heading_rad, speed_mps,
 acceleration_mps2 and steering_rad (angle of the front wheels).
@@ -60,7 +60,7 @@ class EgoBody:
     def boxes(self, states: FloatArray) -> FloatArray:
         """Return the boxes (..., 5) of states or rear-axle poses (..., 3 or more)."""
         boxes = np.empty((*states.shape[:-1], 5))
-        boxes[..., :3] = shapes.moved_ahead(states, self.centre_m)
+        boxes[..., :3] = shapes.move_ahead(states, self.centre_m)
         boxes[..., 3:] = self.length_m, self.width_m
         return boxes
 
@@ -68,11 +68,11 @@ class EgoBody:
 def start_state(ego: TrafficAgent, body: EgoBody) -> FloatArray:
     """Return the ego at t0 as a state (6,): nothing is known of its pedals and its wheel."""
     centre = np.array([ego.x_m, ego.y_m, ego.heading_rad])
-    return np.concatenate([shapes.moved_ahead(centre, -body.centre_m), [ego.speed_mps, 0.0, 0.0]])
+    return np.concatenate([shapes.move_ahead(centre, -body.centre_m), [ego.speed_mps, 0.0, 0.0]])
 
 
 class Kind(IntEnum):
-    """What an object is to planner and score."""
+    """Class of an object for planner and score."""
 
     VEHICLE = 0
     PEDESTRIAN = 1
@@ -121,11 +121,11 @@ class Objects:
     def later(self, seconds: NDArray[Any]) -> FloatArray:
         """Return the boxes (..., A, 5) after times (...), each going straight on at its speed."""
         boxes = np.broadcast_to(self.boxes, (*seconds.shape, *self.boxes.shape)).copy()
-        boxes[..., :3] = shapes.moved_ahead(boxes, seconds[..., None] * self.speeds_mps)
+        boxes[..., :3] = shapes.move_ahead(boxes, seconds[..., None] * self.speeds_mps)
         return boxes
 
 
-def objects_of(agents: Sequence[TrafficAgent]) -> Objects:
+def to_objects(agents: Sequence[TrafficAgent]) -> Objects:
     """Return agents as they stand in the scene."""
     boxes = [(a.x_m, a.y_m, a.heading_rad, a.length_m, a.width_m) for a in agents]
     kinds = [_KINDS.get(agent.type, Kind.STATIC) for agent in agents]
@@ -148,7 +148,7 @@ def join_objects(parts: list[Objects]) -> Objects:
 
 
 class Contact(IntEnum):
-    """How ego and object came together."""
+    """Kind of contact between ego and object."""
 
     STOPPED_EGO = 0
     STOPPED_TRACK = 1
@@ -162,7 +162,7 @@ def classify_contacts(
 ) -> IntArray:
     """Return the `Contact` of ego states (K, 6) with boxes (K, 5) of such speeds and kinds."""
     bumper = np.zeros((len(states), 5))
-    bumper[:, :3] = shapes.moved_ahead(states, body.front_m)
+    bumper[:, :3] = shapes.move_ahead(states, body.front_m)
     bumper[:, 4] = body.width_m
     contacts = np.full(len(states), Contact.LATERAL, dtype=np.int64)
     contacts[shapes.meet(bumper, boxes)] = Contact.FRONT

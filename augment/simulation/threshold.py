@@ -1,4 +1,4 @@
-"""Where along the values of a sweep a planner fails, and the hardest value that is solvable.
+"""Threshold of a sweep: the first value that a planner fails, and the hardest solvable one.
 
 In: for each value the drives of several planners, one of which is under test. A drive is lawful
 if it has no collision at fault, stays on the road and makes progress on its way. The side of the
@@ -48,7 +48,7 @@ class TriedValue:
 
     @property
     def is_passed(self) -> bool | None:
-        """Whether the planner under test drives it lawfully; None where it has not driven."""
+        """True if the planner under test drives it lawfully; None if it has not driven."""
         return None if self.tested is None else self.tested.is_lawful
 
     @property

@@ -23,7 +23,7 @@ LINE_EVERY = 8
 _AROUND_M = 90.0
 
 
-def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any]:
+def make_trace(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any]:
     """Return the document of a drive."""
     return {
         "format": FORMAT,
@@ -38,12 +38,12 @@ def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any
         "objects": _objects(setting, drive),
         "plans": _plans(drive),
         "braking": [number for number, plan in enumerate(drive.plans) if plan.braking],
-        "events": events_of(drive, score),
+        "events": list_drive_events(drive, score),
         "road": _road(drive),
     }
 
 
-def events_of(drive: Drive, score: Score) -> list[dict[str, Any]]:
+def list_drive_events(drive: Drive, score: Score) -> list[dict[str, Any]]:
     """Return all events in the order of time: when each began, what it was, and with whom.
 
     Somebody is `touched` in a collision that is not the ego's fault.
@@ -122,7 +122,7 @@ def _objects(setting: DriveSetting, drive: Drive) -> list[dict[str, Any]]:
 
 
 def _plans(drive: Drive) -> list[dict[str, Any]]:
-    """What was considered, every half second: a line and a score for each proposal."""
+    """Return proposals every half second: a line and a score for each."""
     kept = []
     for step in range(0, len(drive.plans), PLAN_EVERY):
         shown = drive.plans[step].proposals

@@ -123,7 +123,7 @@ def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
 
 
 class _Plan:
-    """What of the references does not depend on the states, laid out by step."""
+    """Part of the references that does not depend on the states, by step."""
 
     def __init__(self, poses: FloatArray, steps: int) -> None:
         speed = speeds(poses)

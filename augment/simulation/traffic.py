@@ -13,7 +13,7 @@ import numpy as np
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
 from augment.scene.planned_motion import EGO_ID
 from augment.scene.planned_mover import PlannedMover
-from augment.scene.recording import Recording, Track, agent_of
+from augment.scene.recording import Recording, Track, track_agent
 from augment.simulation import shapes
 from augment.simulation.path import Path
 from augment.simulation.planning import Idm
@@ -27,7 +27,7 @@ from augment.simulation.states import (
     Kind,
     Objects,
     join_objects,
-    objects_of,
+    to_objects,
 )
 
 TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
@@ -53,7 +53,7 @@ _ON_LANES = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveSetting:
-    """What is to be driven: a scene with its change, and what was recorded after t0.
+    """Setting of a drive: a scene with its change, and the recording after t0.
 
     Attributes:
         scene: Before the change.
@@ -111,7 +111,7 @@ class Walkers:
         self, agents: Sequence[TrafficAgent], road: Road, ego_box: FloatArray, by_rules: bool
     ) -> None:
         self._road, self._by_rules = road, by_rules
-        base = objects_of(agents)
+        base = to_objects(agents)
         ends = np.array([agent.walk_to_m for agent in agents], dtype=np.float64).reshape(-1, 2)
         self._walks = ends - base.boxes[:, :2]
         far = np.hypot(*self._walks.T) > 1e-6
@@ -169,11 +169,11 @@ class Replay:
         """Return those who are seen now, as agents."""
         at = int(np.abs(self._times - self._step * STEP_S).argmin())
         seen = [track for track in self._tracks if not np.isnan(track.states[at]).any()]
-        return [agent_of(track, track.states[at]) for track in seen]
+        return [track_agent(track, track.states[at]) for track in seen]
 
     def objects(self) -> Objects:
         """Return those who are seen now."""
-        return objects_of(self.agents() if self.steps_left >= 0 else [])
+        return to_objects(self.agents() if self.steps_left >= 0 else [])
 
     def step(self, ego_box: FloatArray, everybody: Objects) -> None:
         """Go one step on."""
@@ -185,7 +185,7 @@ class StraightOn:
     """Agents who stand or go straight on at their speed."""
 
     def __init__(self, agents: Sequence[TrafficAgent]) -> None:
-        self._objects = objects_of(agents)
+        self._objects = to_objects(agents)
 
     def objects(self) -> Objects:
         """Return all of them."""
@@ -200,7 +200,7 @@ class PlannedMovers:
     """Agents with a motion, who react to nobody but for their triggers."""
 
     def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
-        self._base, self._step = objects_of(agents), 0
+        self._base, self._step = to_objects(agents), 0
         self._movers = [PlannedMover(agent, road.graph) for agent in agents]
 
     def objects(self) -> Objects:
@@ -229,9 +229,9 @@ class LaneDrivers:
     """
 
     def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
-        self._base, self._sweep_s = objects_of(agents), 0.0
+        self._base, self._sweep_s = to_objects(agents), 0.0
         self.speeds = self._base.speeds_mps
-        routes = [_route_of(road, agent) for agent in agents]
+        routes = [_find_route(road, agent) for agent in agents]
         paths = [road.path_over(route, spacing_m=1.0) for route in routes]
         stations = [
             path.station_of(box) for path, box in zip(paths, self._base.boxes, strict=True)
@@ -241,7 +241,9 @@ class LaneDrivers:
         # (D, M, 5) at every whole metre, the last of each path repeated: x, y, heading, the
         # wished speed, and where the next red stop line is.
         metres = np.arange(int(self._ends.max(initial=0.0)) + 2, dtype=np.float64)
-        tables = [_table_of(road, *row, metres) for row in zip(agents, routes, paths, strict=True)]
+        tables = [
+            _driver_table(road, *row, metres) for row in zip(agents, routes, paths, strict=True)
+        ]
         self._tables = np.array(tables).reshape(len(agents), len(metres), 5)
         self._rows = np.arange(len(agents))
 
@@ -314,7 +316,7 @@ class LaneDrivers:
         return driver[hit], other[hit], first[hit]
 
 
-def _route_of(road: Road, agent: TrafficAgent) -> list[str]:
+def _find_route(road: Road, agent: TrafficAgent) -> list[str]:
     """The ways that a driver follows from the one under it on."""
     name = lane_under(road, agent)
     if name is None:
@@ -323,7 +325,7 @@ def _route_of(road: Road, agent: TrafficAgent) -> list[str]:
     return road.graph.route(name, start_m + PATH_M)
 
 
-def _table_of(
+def _driver_table(
     road: Road, agent: TrafficAgent, route: Sequence[str], path: Path, metres: FloatArray
 ) -> FloatArray:
     """One driver's row of `LaneDrivers`' tables, (M, 5)."""
@@ -355,9 +357,9 @@ def _set_moving(
     driving = [one for one in moving if one.type in _ON_LANES and lane_under(road, one)]
     straight_on = StraightOn([*standing, *(one for one in moving if one not in driving)])
     if start_clear_of is not None:
-        taken, clear = np.vstack([start_clear_of[None], objects_of(standing).boxes]), []
+        taken, clear = np.vstack([start_clear_of[None], to_objects(standing).boxes]), []
         for agent in driving:
-            box = objects_of([agent]).boxes
+            box = to_objects([agent]).boxes
             if not shapes.meet(taken, box).any():
                 clear.append(agent)
                 taken = np.vstack([taken, box])
@@ -376,7 +378,7 @@ class Traffic:
 
     def __init__(self, setting: DriveSetting, road: Road, body: EgoBody, ego: FloatArray) -> None:
         self._body, self._road, ego_box = body, road, body.boxes(ego)
-        replayed = _replayed(setting, road)
+        replayed = _list_replayed(setting, road)
         names = {track.agent_id for track in replayed}
         own = [agent for agent in setting.after.agents if agent.id not in names]
         plain = [agent for agent in own if agent.walk_to_m is None]
@@ -416,7 +418,7 @@ class Traffic:
             mover.step(ego_box, everybody)
 
 
-def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
+def _list_replayed(setting: DriveSetting, road: Road) -> list[Track]:
     """The tracks that are played back."""
     if setting.recording is None or not setting.replay:
         return []
@@ -438,6 +440,6 @@ def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
 
 
 def _moves(track: Track) -> bool:
-    """Whether a track goes anywhere: a metre or more from its first seen place."""
+    """Return whether a track moves a metre or more from its first seen place."""
     seen = track.states[~np.isnan(track.states).any(axis=1), :2]
     return bool(len(seen) and np.hypot(*(seen - seen[0]).T).max() >= 1.0)

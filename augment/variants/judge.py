@@ -21,7 +21,7 @@ UNREADABLE = "unreadable"
 
 
 class Exchange(StrEnum):
-    """What becomes of a judge's two answers about a pair; all but KEPT are ties."""
+    """Outcome of a judge's two answers about a pair; all but KEPT are ties."""
 
     KEPT = "kept"
     EQUAL = "equal"
@@ -42,7 +42,7 @@ def exchange(first: str, second: str) -> Exchange:
     return Exchange.KEPT if {first, second} == {"A", "B"} else Exchange.LOST
 
 
-def preference_of(first: str, second: str) -> int:
+def combine_answers(first: str, second: str) -> int:
     """Return 1 where the left picture was preferred in both orders, -1 the right one, else 0."""
     if exchange(first, second) is not Exchange.KEPT:
         return 0
@@ -79,7 +79,7 @@ def ask_judge(
 
 
 def most_nano_usd(instruction: str, price: Price) -> int:
-    """Return what one question to a judge costs at most, in nano-dollars."""
+    """Return the largest cost of one question to a judge, in nano-dollars."""
     messages = judge_messages(JudgeQuestion.INSTRUCTION, instruction, (b"", b""))
     request = Request(model="", messages=messages, max_tokens=JUDGE_TOKENS)
     return worst_case(request).nano_usd(price) or 0

@@ -1,4 +1,4 @@
-"""How a contestant asks, beyond its model and its variant: a frozen value.
+"""Options of a contestant's requests beyond its model and its variant: a frozen value.
 
 None means: left open, so that the default counts, or what is known of the model.
 """
@@ -23,7 +23,7 @@ MOST_ROUNDS = 10
 
 
 class ToolProtocol(StrEnum):
-    """How a modifier calls its function: by a line of its answer, or on the wire's own way."""
+    """Protocol of function calls: by a line of the answer, or on the wire's own way."""
 
     PROMPT = "prompt"
     NATIVE = "native"
@@ -31,7 +31,7 @@ class ToolProtocol(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What is to know of an option besides its name.
+    """Rule of an option besides its name.
 
     Attributes:
         label: What people call it, with its unit.
@@ -151,7 +151,7 @@ class ContestantOptions:
             raise InvalidDocument("set of options", problems)
 
     def to_document(self) -> dict[str, Any]:
-        """Return what was chosen or fixed, ready for JSON; what is open is not in it."""
+        """Return the chosen or fixed options, ready for JSON, without open ones."""
         values = {name: getattr(self, name) for name in NAMES}
         return {
             name: str(value) if isinstance(value, StrEnum) else value
@@ -160,7 +160,7 @@ class ContestantOptions:
         }
 
     def sampling(self, sample: int = 1) -> Sampling:
-        """Return what the requests of one sample are sent with; sample k has the seed + k - 1."""
+        """Return the sampling parameters of one sample; sample k has the seed + k - 1."""
         return Sampling(
             temperature=self.temperature,
             seed=None if self.seed is None else self.seed + sample - 1,
@@ -168,7 +168,7 @@ class ContestantOptions:
         )
 
     def key(self, sample: int = 1) -> dict[str, Any]:
-        """Return what keeps the answers of these options and this sample apart from all others.
+        """Return the part of the cache key that sets these options and this sample apart.
 
         A default is no option of its own: so variants that ask the very same share the answer.
         """
@@ -180,7 +180,7 @@ class ContestantOptions:
         return chosen | ({"sample": sample} if sample > 1 else {})
 
     def describe(self) -> str:
-        """Return what was chosen in a few words, for names; empty where nothing was."""
+        """Return the chosen options in a few words, for names; empty if there are none."""
         chosen = self.to_document().items()
         return ", ".join(RULES[name].words.format(value) for name, value in chosen)
 

@@ -48,7 +48,7 @@ _LONGEST_NOTED = 500
 
 
 class OutcomeStatus(StrEnum):
-    """How a run ended."""
+    """End of a run."""
 
     DONE = "done"
     UNREADABLE = "unreadable"
@@ -57,7 +57,7 @@ class OutcomeStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a variant made of one scenario.
+    """Result of a variant on one scenario.
 
     Attributes:
         modification: None unless the status is done.
@@ -129,7 +129,7 @@ def run(
 def ask_for_intent(
     instruction: str, *, client: ChatClient, model: str, transcript: Transcript
 ) -> Intent:
-    """Return what a model reads out of a sentence, which is all that it is shown.
+    """Return a model's reading of a sentence, the only thing that it is shown.
 
     What it read counts for nothing until a person has accepted it.
 
@@ -149,7 +149,7 @@ def ask_for_intent(
     return intent
 
 
-def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
+def modifier_form(recipe: Recipe, *, native_tools: bool = False) -> Form:
     """Return the form in which a recipe's modifier gets its task."""
     calling = Calling.NONE
     if recipe.tools is Tools.POSE:
@@ -168,7 +168,7 @@ def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Round:
-    """What was made in one turn, and what the review said, None without a usable one."""
+    """Result of one turn, and its review, None without a usable one."""
 
     number: int
     read: ReadReply
@@ -189,7 +189,7 @@ class _Work:
         return Ground.of(self.task.scene)
 
     def outcome(self) -> Outcome:
-        """Return what came of it, an answer that is none included."""
+        """Return the outcome, also of a missing answer."""
         try:
             kept, remark = self.modify_and_review()
         except ReplyUnreadable as unreadable:
@@ -216,7 +216,7 @@ class _Work:
         """
         note = self.respondents.transcript.note
         native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
-        form = form_of(self.recipe, native_tools=native)
+        form = modifier_form(self.recipe, native_tools=native)
         messages = self.task.begun or fill.modifier_messages(
             self.task.scene, self.task.instruction, form
         )
@@ -365,7 +365,7 @@ class _ToolDesk:
         if not results:
             return ()
         told = fill.result_text(results, is_over=self.is_over)
-        return fill.model_message(reply.text), fill.said_by_user(told)
+        return fill.model_message(reply.text), fill.make_user_message(told)
 
     def _native_turns(self, reply: Reply) -> Messages:
         """Return the calls as they came and one message for each: all must have a result."""

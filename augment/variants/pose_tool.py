@@ -33,7 +33,7 @@ from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.motion import LENGTH_S, Motion, Movement
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
-from augment.scene.schema import problems_of
+from augment.scene.schema import list_problems
 
 LANE_START = "lane"
 FURTHEST_M, WIDEST_M = 1000.0, 30.0
@@ -122,15 +122,15 @@ class PoseOnLane:
     def to_document(self) -> dict[str, object]:
         """Return the answer under the names of the answer's block, rounded as the prompt is."""
         document: dict[str, object] = {
-            "x_m": _rounded(self.pose.x_m),
-            "y_m": _rounded(self.pose.y_m),
-            "heading_rad": _rounded(self.pose.heading_rad, 3),
-            "heading_deg": _rounded(math.degrees(self.pose.heading_rad), 1),
+            "x_m": _round(self.pose.x_m),
+            "y_m": _round(self.pose.y_m),
+            "heading_rad": _round(self.pose.heading_rad, 3),
+            "heading_deg": _round(math.degrees(self.pose.heading_rad), 1),
         }
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
             if value is not None or field.default is MISSING:
-                document[field.name] = _rounded(value) if isinstance(value, float) else value
+                document[field.name] = _round(value) if isinstance(value, float) else value
         return document
 
 
@@ -191,7 +191,7 @@ class PoseTool:
         )
 
     def answer(self, arguments: object) -> dict[str, object]:
-        """Return what goes back to the model, ready for JSON.
+        """Return the answer to the model, ready for JSON.
 
         A pose; {"poses": one entry a place} where several distances were asked for, with what is
         the same at all of them beside it; or {"error": a sentence}, where nothing can be read,
@@ -200,7 +200,7 @@ class PoseTool:
         try:
             call = _Call.model_validate(arguments)
         except pydantic.ValidationError as fault:
-            return {"error": "; ".join(f"{place}: {text}" for place, text in problems_of(fault))}
+            return {"error": "; ".join(f"{place}: {text}" for place, text in list_problems(fault))}
         lists: list[list[Any]] = [call.distance_m, call.lateral_m, call.object]
         count = max(map(len, lists))
         if any(len(values) not in (1, count) for values in lists):
@@ -233,7 +233,7 @@ class PoseTool:
     @cached_property
     def agents(self) -> dict[str, TrafficAgent]:
         """The shown agents by short id."""
-        return {one.id: one for one in vectors.shown_agents(self._shown, self.radius_m)}
+        return {one.id: one for one in vectors.list_agents(self._shown, self.radius_m)}
 
     @cached_property
     def _shown(self) -> Scene:
@@ -285,7 +285,7 @@ class PoseTool:
         motion = self._ground.motion_after(change, of_all=False)
         moved = motion.others[-1]
         found: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
-        return found | ({"started_s": _rounded(moved.started_s)} if call.motion else {})
+        return found | ({"started_s": _round(moved.started_s)} if call.motion else {})
 
     def _at(self, after_s: float, moved: Movement, motion: Motion) -> dict[str, object]:
         """Return where one is at the step nearest to a moment, and how far from the ego."""
@@ -297,16 +297,16 @@ class PoseTool:
         lane_id = self._ground.graph.under(x_m, y_m, heading_rad)
         return {
             "after_s": after_s,
-            "x_m": _rounded(x_m),
-            "y_m": _rounded(y_m),
-            "heading_rad": _rounded(heading_rad, 3),
-            "speed_mps": _rounded(speed_mps),
+            "x_m": _round(x_m),
+            "y_m": _round(y_m),
+            "heading_rad": _round(heading_rad, 3),
+            "speed_mps": _round(speed_mps),
             "lane": lane_id,
-            "ego_distance_m": _rounded(ego_m),
+            "ego_distance_m": _round(ego_m),
         }
 
     def _line(self, lane: object) -> tuple[LaneCurve, float]:
-        """Return what a call goes along, and from where on it."""
+        """Return the line that a call follows, and its start on it."""
         if isinstance(lane, str) and lane in self.curves:
             return self.curves[lane], 0.0
         control = None
@@ -354,7 +354,7 @@ class PoseTool:
     def _walk(
         self, curve: LaneCurve, start_m: float, distance_m: float
     ) -> tuple[list[LaneCurve], float]:
-        """Return what is passed on the way, and s on the last of it."""
+        """Return the lanes passed on the way, and s on the last of them."""
         s_m, passed = start_m + distance_m, [curve]
         while s_m > passed[-1].length_m:
             here, over_m = passed[-1], s_m - passed[-1].length_m
@@ -448,7 +448,7 @@ def _refuse_past_end(
     raise ToolError(
         TOOL,
         f"the lanes that are shown {side} {over_m:.2f} m short of that ({path}): from this start "
-        f"distance_m can be {_rounded(possible_m):.2f} at {bound}",
+        f"distance_m can be {_round(possible_m):.2f} at {bound}",
     )
 
 
@@ -458,6 +458,6 @@ def _unknown(kind: str, name: object, known: Iterable[str]) -> str:
     return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."
 
 
-def _rounded(value: float | None, digits: int = 2) -> float | None:
+def _round(value: float | None, digits: int = 2) -> float | None:
     """Round, and never to minus zero; unknown stays unknown."""
     return None if value is None else round(float(value), digits) + 0.0

@@ -18,14 +18,14 @@ SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
 
 
 class Tools(StrEnum):
-    """Which functions the modifier may call."""
+    """Functions that the modifier may call."""
 
     NONE = "none"
     POSE = "pose"
 
 
 class Keep(StrEnum):
-    """Which round's modification counts: the best reviewed (of equals the last), or the last.
+    """Round whose modification counts: the best reviewed (of equals the last), or the last.
 
     A review that is content ends the rounds, so the last is the accepted one if there is one.
     """
@@ -62,7 +62,7 @@ class Recipe:
 
     @property
     def rounds(self) -> int:
-        """How often the modifier is put to work at most."""
+        """Largest number of rounds."""
         return 1 if self.review is None else self.limits.rounds
 
 

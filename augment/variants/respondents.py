@@ -1,4 +1,4 @@
-"""Who plays which role, how a role is asked until its answer can be read, and the record of it."""
+"""Roles and their models, repeated requests until an answer can be read, and their record."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 from augment import errors
 from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
-from augment.llm.costs import cut_of
+from augment.llm.costs import find_cut
 from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
 from augment.prompts.blocks import declines
 from augment.prompts.fill import prompt_version, review_re_ask_messages
@@ -19,7 +19,7 @@ _Read = TypeVar("_Read")
 
 
 class ModelRole(StrEnum):
-    """What a language model is asked to be: the paper's agents, a reader of intents, a judge."""
+    """Role of a language model: one of the paper's agents, a reader of intents, a judge."""
 
     MODIFIER = "modifier"
     REVIEWER = "reviewer"
@@ -30,7 +30,7 @@ class ModelRole(StrEnum):
 
 
 class NoteKind(StrEnum):
-    """What a transcript notes between two calls."""
+    """Kind of an event between two calls in a transcript."""
 
     ROUND = "round"
     TOOL_CALL = "tool_call"
@@ -79,7 +79,7 @@ class Transcript(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sampling:
-    """What every request of a run is sent with; None is not sent."""
+    """Sampling parameters of every request of a run; None is not sent."""
 
     temperature: float | None = None
     seed: int | None = None
@@ -88,7 +88,7 @@ class Sampling:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RespondentClient:
-    """Who plays a role.
+    """Client of a role.
 
     Attributes:
         model: The model id that the client is asked for.
@@ -241,10 +241,10 @@ class Respondents:
             try:
                 sending = partial(self.transcript.sending, number)
                 reply = respondent.client.complete(request, sending=sending)
-            except errors.Unwanted as why:
+            except errors.NotNeeded as why:
                 self.transcript.broke(number, errors.NotSent(f"not sent: {why}"))
                 raise
-            except errors.Abandoned as fault:
+            except errors.CallDropped as fault:
                 self.transcript.broke(number, fault)
                 raise fault.why from None
             except ModelFault as fault:
@@ -255,7 +255,7 @@ class Respondents:
                 self.patience.sleep(wait_s)
                 attempt += 1
             else:
-                cut = cut_of(request, reply, context_tokens=respondent.context_tokens)
+                cut = find_cut(request, reply, context_tokens=respondent.context_tokens)
                 self.transcript.answered(number, reply, cut)
                 if cut is not None:
                     raise cut

@@ -27,7 +27,7 @@ from augment.variants.respondents import ModelRole, Respondents
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What one run of a recipe may use.
+    """Limits of one run of a recipe.
 
     Attributes:
         radius_m: How far around the ego the scene is written down.
@@ -53,7 +53,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReviewedAnswer:
-    """What is reviewed, and whom a review may ask.
+    """Answer under review, and the clients that a review may ask.
 
     Attributes:
         ground: The scene before the change, laid out for the checks.
@@ -187,7 +187,7 @@ def review_picture(answer: ReviewedAnswer) -> Verdict:
 
 
 def review_geometry(answer: ReviewedAnswer) -> Verdict:
-    """Return what the checks make of a modification.
+    """Return the verdict of the checks on a modification.
 
     Without an intent a doubtful finding may be just what was asked for: a modifier that keeps
     its modification in spite of doubts has the last word, in spite of what is wrong it has not.

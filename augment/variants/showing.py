@@ -1,4 +1,4 @@
-"""What a role of a variant is asked, and how much that can be, before anybody is asked. Pure.
+"""Prompts of a variant's roles and their longest size, before any request. Pure.
 
 Reviewers judge what a modifier made; where nothing is given, they are shown an unchanged scene.
 Counted are calls that get an answer. Attempts that break on the wire come on top; a job's cap
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from augment.llm.messages import Message
 from augment.prompts import fill
 from augment.scene.entities import Modification, Scene
-from augment.variants.pipeline import form_of
+from augment.variants.pipeline import modifier_form
 from augment.variants.recipes import Recipe, Tools
 from augment.variants.respondents import ModelRole
 from augment.variants.reviews import pictures
@@ -30,7 +30,7 @@ EXAMPLE_QUESTIONS = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
+class ShownPrompt:
     """A prompt as it would be sent.
 
     Attributes:
@@ -63,7 +63,7 @@ class CallRange:
     most: int
 
 
-def shown_prompt(
+def build_prompt(
     recipe: Recipe,
     role: ModelRole,
     scene: Scene,
@@ -71,8 +71,8 @@ def shown_prompt(
     modification: Modification,
     *,
     native_tools: bool = False,
-) -> Shown:
-    """Return what that role is asked first.
+) -> ShownPrompt:
+    """Return the first prompt of that role.
 
     Args:
         recipe: The variant.
@@ -83,22 +83,22 @@ def shown_prompt(
         native_tools: Whether the modifier calls natively.
     """
     if role is ModelRole.MODIFIER:
-        form = form_of(recipe, native_tools=native_tools)
+        form = modifier_form(recipe, native_tools=native_tools)
         native = form.calling is fill.Calling.NATIVE
-        return Shown(
+        return ShownPrompt(
             messages=fill.modifier_messages(scene, instruction, form),
             tools=(json.dumps(fill.pose_tool().to_document()),) if native else (),
         )
     if role is ModelRole.VIEWER:
         images = pictures(scene, modification, width_px=recipe.limits.picture_px)
-        return Shown(messages=fill.viewer_messages(EXAMPLE_QUESTIONS, images))
+        return ShownPrompt(messages=fill.viewer_messages(EXAMPLE_QUESTIONS, images))
     radius_m = recipe.limits.radius_m
-    return Shown(
+    return ShownPrompt(
         messages=fill.review_messages(role, scene, instruction, modification, radius_m=radius_m)
     )
 
 
-def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
+def call_ranges(recipe: Recipe) -> dict[ModelRole, CallRange]:
     """Return the calls of every role that a recipe has."""
     limits, rounds = recipe.limits, recipe.rounds
     again = 1 + limits.re_asks

@@ -4,12 +4,12 @@ from django.contrib.auth.models import User
 from django.test import Client
 
 from arena.people.links import make_api_token
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 
 
 def secret_of(user: User, role: str | None = None) -> str:
     """A new token, in the most powerful role unless another is named."""
-    role = role or role_of(user) or ""
+    role = role or top_role(user) or ""
     return make_api_token(owner=user, name="a program", role=role, days=1).secret
 
 

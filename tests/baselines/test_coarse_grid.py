@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.baselines import coarse_grid, rule_placer
-from augment.baselines.coarse_grid import Code, Direction, code_of
+from augment.baselines.coarse_grid import Code, Direction, quantise
 from augment.baselines.registry import PLACERS
 from augment.scene.entities import AgentType, TrafficAgent
 from bench.displacement import made, measured
@@ -34,7 +34,7 @@ def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float =
         length_m=4.8,
         speed_mps=speed_mps,
     )
-    return code_of(agent)
+    return quantise(agent)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_it_stands_on_a_centreline_within_its_code() -> None:
     assert made.lane_id is not None
     lane = next(lane for lane in scene.lanes if lane.id == made.lane_id)
     assert lane.centerline.project(made.x_m, made.y_m).distance_m < 0.01
-    assert code_of(made) == code_of(right)
+    assert quantise(made) == quantise(right)
     assert (made.length_m, made.width_m, made.type) == (4.8, 2.0, AgentType.VEHICLE)
 
 

@@ -8,7 +8,7 @@ from pytest_django.live_server_helper import LiveServer
 
 from augment.models import Augmentation
 from augment.scene.entities import Modification
-from augment.services.scenarios.pictures import camera_of, picture_of
+from augment.services.scenarios.pictures import draw_picture, load_camera
 from tests.browser.booth import Booth, all_sent, press
 from tests.scenes import vehicle
 from tests.study_rows import a_study, hang
@@ -36,9 +36,9 @@ def drawn(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
     places = {slug: 8.0 + 6.0 * n for n, slug in enumerate(("ann", "bob", "cid"))}
     for row in Augmentation.objects.select_related("scenario", "contestant"):
         car = vehicle("New1", places[row.contestant.slug], 0.0)
-        camera = camera_of(row.scenario)
-        hang(row, picture_of(row.scenario, Modification(added=(car,)), camera))
-        unchanged = picture_of(row.scenario, Modification(), camera)
+        camera = load_camera(row.scenario)
+        hang(row, draw_picture(row.scenario, Modification(added=(car,)), camera))
+        unchanged = draw_picture(row.scenario, Modification(), camera)
         row.scenario.matchups.update(original_image=unchanged)
     made = Booth(address=live_server.url, browser=browser, study=study)
     yield made

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.checks.derived import describe_change, type_of_change
+from augment.checks.derived import classify_change, describe_change
 from augment.checks.ground import Ground
 from augment.checks.registry import check_against_intent
 from augment.scene.codec import intent_to_document
@@ -106,7 +106,7 @@ def test_a_motion_that_was_placed_is_derived_as_it_was_asked_for(name: str) -> N
     for part in ("start", "speed_mps", "braking_mps2", "duration_s"):
         assert getattr(wanted, part) in (None, getattr(got, part))
     assert f"then: {got.preset.label.lower()}" in sentence
-    assert type_of_change(change, base) == wanted.preset
+    assert classify_change(change, base) == wanted.preset
     found = check_against_intent(Ground.of(base), change, intent)
     assert not [one for one in found if one.is_fault and one.kind.startswith("asked")]
 

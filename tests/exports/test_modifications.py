@@ -9,7 +9,7 @@ import yaml
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from augment.formats.interplan.file import token_of
+from augment.formats.interplan.file import scene_token
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.pictures import store
@@ -60,8 +60,8 @@ def test_a_job_goes_to_a_file(job: GenerationJob, tmp_path: Path) -> None:
     with zipfile.ZipFile(file) as archive:
         (name,) = [one for one in archive.namelist() if one.endswith(".yaml")]
         details = yaml.safe_load(archive.read(name))["modification_details_dictionary"]
-    assert set(details) == {token_of("mill-junction"), token_of("ferry-road")}
-    assert list(details[token_of("mill-junction")]["special_scenario"]) == ["0", "1"]
+    assert set(details) == {scene_token("mill-junction"), scene_token("ferry-road")}
+    assert list(details[scene_token("mill-junction")]["special_scenario"]) == ["0", "1"]
 
 
 def test_a_contestant_that_is_none_is_named(job: GenerationJob) -> None:

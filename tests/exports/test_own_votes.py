@@ -14,7 +14,7 @@ from arena.people.links import mark_author
 from arena.results.exports.writers import bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.ratings import votes_of
+from arena.results.services.ratings import read_votes
 from augment.models import Event
 from tests.full_study import Size, full_study
 
@@ -62,9 +62,9 @@ def test_they_count_unless_a_rating_leaves_them_out_and_are_counted_by_reason(
     assert left.votes_sha256 != counted.votes_sha256
     assert not any(
         vote.judge == code_of(AUTHOR) and OWN in (vote.left, vote.right)
-        for vote in votes_of(left).counted
+        for vote in read_votes(left).counted
     )
-    assert any(vote.judge == code_of(AUTHOR) for vote in votes_of(left).counted)
+    assert any(vote.judge == code_of(AUTHOR) for vote in read_votes(left).counted)
 
 
 def test_the_zip_never_says_who_is_author(study: Study) -> None:

@@ -8,7 +8,7 @@ from django.core.management import call_command
 
 from augment.models import Augmentation, GenerationJob
 from augment.services.running import runner
-from augment.services.running.transcript_records import transcript_of
+from augment.services.running.transcript_records import full_transcript
 from tests.jobs.models import Model, after_a_second_look, llama_job
 
 pytestmark = pytest.mark.django_db
@@ -25,7 +25,7 @@ def job() -> GenerationJob:
 
 def alone(row: Augmentation) -> dict[str, object]:
     """Its own transcript, with the names of its images."""
-    record: dict[str, object] = json.loads(json.dumps(transcript_of(row)))
+    record: dict[str, object] = json.loads(json.dumps(full_transcript(row)))
     images = record["images"]
     assert isinstance(images, dict)
     return record | {"images": sorted(images)}

@@ -16,10 +16,10 @@ from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.exports.writers import FORMATS, RATING_FILES, plain_text
 from arena.results.pages.tabs import TABS
 from arena.results.queries.evidence import count_settled
-from arena.results.queries.votes import Filters, last_vote_of, vote_set
-from arena.results.services.ratings import plan_snapshot, votes_of
+from arena.results.queries.votes import Filters, last_vote_id, vote_set
+from arena.results.services.ratings import plan_snapshot, read_votes
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, votes_csv
+from arena.results.services.vote_files import COLUMNS, sha256_hex, vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Scenario
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.django_db
 
 
 def counted(study: Study, **filters: object) -> list[str]:
-    found = vote_set(study, filters=Filters(**filters), last=last_vote_of(study))  # type: ignore[arg-type]
+    found = vote_set(study, filters=Filters(**filters), last=last_vote_id(study))  # type: ignore[arg-type]
     return [f"{one.item} {one.left} {one.right} {one.outcome}" for one in found.counted]
 
 
@@ -45,7 +45,7 @@ def test_filters_choose_by_type_and_expert_and_count_what_they_leave_out() -> No
     assert len(counted(study)) == 12
     assert len(counted(study, types=(ScenarioType.OVERTAKE.value,))) == wanted > 0
     assert len(counted(study, experts=(str(eva.code),))) == 6
-    found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_of(study))
+    found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_id(study))
     assert found.left_out == {"filtered": 6}
 
 
@@ -53,7 +53,7 @@ def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:
     study = a_study(votes_per_expert=2)
     first, second = matchups_of(study, "eva")
     old = vote(first, "left")
-    last = last_vote_of(study)
+    last = last_vote_id(study)
     vote(first, "right", supersedes=old.key)
     vote(second, "left")
     found = vote_set(study, filters=Filters(), last=last)
@@ -148,11 +148,11 @@ def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> 
     assert snapshot.results.judges[str(person.code)] == person.pseudonym
     person.pseudonym = "Somebody else"
     person.save()
-    assert len(votes_of(snapshot).counted) == 6, "the name of then counts"
+    assert len(read_votes(snapshot).counted) == 6, "the name of then counts"
     with rewriting(Vote):
         Vote.objects.filter(pk=snapshot.last_vote or 0).update(ms_visible=1)
     with pytest.raises(Conflict, match="not those of this rating any more"):
-        votes_of(snapshot)
+        read_votes(snapshot)
 
 
 def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
@@ -163,7 +163,7 @@ def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
     study.allow_both_miss = True
     study.save()
     vote(third, "equal", both_miss=True)
-    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    found = vote_set(study, filters=Filters(), last=last_vote_id(study))
     names = {found.counted[0].judge: "=cmd|calc"}
     lines = list(csv.DictReader(io.StringIO(votes_csv(vote_rows(found.counted, names)).decode())))
     assert tuple(lines[0]) == COLUMNS
@@ -205,10 +205,10 @@ def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
     vote(matchups_of(study, "eva")[0], "left")
     snapshot = rate(study=close_study(study=study), rounds=10)
     content = VOTE_FORMATS["csv"].write(vote_table(snapshot))
-    assert digest_of(content) == snapshot.votes_sha256
+    assert sha256_hex(content) == snapshot.votes_sha256
     old = [",".join(line.split(",")[:10]) for line in content.decode().splitlines()]
     before = "".join(f"{line}\n" for line in old).encode()
-    snapshot.votes_sha256 = digest_of(before)
+    snapshot.votes_sha256 = sha256_hex(before)
     snapshot.versions = {"results": 1}
     assert VOTE_FORMATS["csv"].write(vote_table(snapshot)) == before
     table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot))))

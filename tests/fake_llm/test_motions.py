@@ -9,7 +9,7 @@ import pytest
 from augment.baselines.rule_placer import place
 from augment.checks import Ground
 from augment.fake_llm.careless import MOTION_MISTAKES
-from augment.fake_llm.playing import problems_of
+from augment.fake_llm.playing import review_problems
 from augment.fake_llm.server import FakeServer, running
 from augment.fake_llm.sight import Task
 from augment.llm.client import Patience
@@ -100,7 +100,7 @@ def test_a_good_reviewer_finds_a_mistake_in_a_motion(name: str, mistake: str) ->
         agent, motion=MOTION_MISTAKES[mistake](agent, agent.motion, route, random.Random(2))
     )
     told = [
-        [problem["problem"].split()[0] for problem in problems_of(task(change, scene, intent))]
+        [problem["problem"].split()[0] for problem in review_problems(task(change, scene, intent))]
         for change in (right, with_one(right, bent))
     ]
     assert told == [[], [agent.id]]

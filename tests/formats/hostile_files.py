@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import feather, parquet
 
-from augment.formats.waymo.scenario import masked_crc32c
+from augment.formats.waymo.scenario import mask_crc32c
 from augment.scene.codec import SCENE_FORMAT
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.test_commonroad import HEAD, PROBLEM
@@ -114,7 +114,7 @@ def commonroad_that_lasts_very_long(root: Path) -> Made:
 def waymo_a_record_that_claims_two_gigabytes(root: Path) -> Made:
     block = waymo_files.record(waymo_files.scenario())
     head = struct.pack("<Q", 2 << 30)
-    check = struct.pack("<I", masked_crc32c(head))
+    check = struct.pack("<I", mask_crc32c(head))
     file = root / "made.tfrecord"
     file.write_bytes(head + check + block[12:])
     return "waymo", file

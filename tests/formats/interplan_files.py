@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from augment.formats.documents import read_yaml
-from augment.formats.interplan.file import WHAT, file_of, read_entry
+from augment.formats.interplan.file import WHAT, parse_file, read_entry
 from augment.scene.entities import Modification, Scene
 from tests.formats.nuplan_files import CITIES, token, write_log, write_map
 
@@ -165,7 +165,7 @@ def write_folder(root: Path, city: str = CITY) -> Path:
 
 def entries_of(text: str, scenes: Mapping[str, Scene]) -> list[tuple[Modification, list[str]]]:
     """The special scenarios of the tokens that have a scene, as changes with what they lose."""
-    by_token = file_of(read_yaml(text, what=WHAT)).modification_details_dictionary
+    by_token = parse_file(read_yaml(text, what=WHAT)).modification_details_dictionary
     return [
         read_entry(token, index, entry, scenes[token])
         for token, one in by_token.items()

@@ -64,7 +64,7 @@ def check_crossing(told: dict[str, Any]) -> None:
 
 
 def check_moving(told: dict[str, Any]) -> None:
-    """All of them move as `motion_of` says, step by step; the door is of unknown type."""
+    """All of them move as `find_motion` says, step by step; the door is of unknown type."""
     assert sorted(one["type"] for one in told["dynamic"]) == ["car"] * 3 + [
         "pedestrian",
         "unknown",

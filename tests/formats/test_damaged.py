@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
-from augment.formats.readers import READERS, reader_of
+from augment.formats.readers import READERS, find_reader
 from augment.scene.codec import SCENE_FORMAT, scene_to_document
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.test_commonroad import newer
@@ -69,7 +69,7 @@ def test_damaged_bytes_end_in_a_scene_or_in_our_own_error(
         file.write_bytes(_damaged(file.read_bytes(), data))
         path = folder if good[name].is_dir() else folder / good[name].name
         try:
-            reading = reader_of(name).read(path, item=None, frame=None, name="damaged")
+            reading = find_reader(name).read(path, item=None, frame=None, name="damaged")
             scene_to_document(reading.scene)
         except (InvalidDocument, MemoryError):  # how `sandbox` says the latter has its own test
             pass
@@ -122,7 +122,7 @@ def test_any_value_in_any_column_of_a_database_is_read_or_refused(
         base.close()
         try:
             item = nuplan_files.token(100).hex()
-            reading = reader_of("nuplan").read(
+            reading = find_reader("nuplan").read(
                 folder / "made.db", item=item, frame=None, name="damaged"
             )
             scene_to_document(reading.scene)

@@ -19,7 +19,7 @@ import pytest
 from pyarrow import feather, parquet
 
 from augment.errors import InvalidDocument
-from augment.formats.readers import reader_of
+from augment.formats.readers import find_reader
 from augment.formats.waymo.scenario import Scenario
 from augment.scene.codec import scene_to_document
 from tests.formats import nuplan_files, waymo_files
@@ -190,7 +190,7 @@ def test_no_field_of_a_wrong_type_is_passed_over_in_silence(name: str, tmp_path:
         write_json(path, scene_to_document(junction()))
 
     def read_notes() -> set[str]:
-        reading = reader_of(name).read(path, item=item, frame=None, name="made")
+        reading = find_reader(name).read(path, item=item, frame=None, name="made")
         scene_to_document(reading.scene)
         return set(reading.notes)
 

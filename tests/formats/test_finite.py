@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.formats.writers import WRITERS, writer_named
-from augment.formats.writing import Written
+from augment.formats.writing import Output
 from augment.scene.codec import recording_from_document
 from augment.scene.recording import Recording
 from tests.formats.cells import cell, crossing, recorded_street
@@ -32,7 +32,7 @@ def not_finite(value: Any) -> bool:
     return False
 
 
-def check_finite_files(written: Written) -> None:
+def check_finite_files(written: Output) -> None:
     for name, content in written.files.items():
         if name.endswith(".pkl"):
             assert not not_finite(loaded(content)), name

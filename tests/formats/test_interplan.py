@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.interplan.file import token_of
+from augment.formats.interplan.file import scene_token
 from augment.formats.interplan.runs import MODIFICATIONS
 from augment.formats.interplan.writer import write as write_files
 from augment.formats.writing import Cell, Loss
@@ -51,7 +51,7 @@ def tellable(slug: str) -> tuple[TrafficAgent, ...]:
 def read_again(one: Cell) -> Modification:
     text, _ = write([one])
     scene = without_traffic(one.scene)
-    ((found, _),) = entries_of(text, {token_of(scene.name): scene})
+    ((found, _),) = entries_of(text, {scene_token(scene.name): scene})
     return found
 
 
@@ -73,8 +73,8 @@ def test_plain_yaml_shows_interplans_keys() -> None:
     document = yaml.safe_load(text)
     by_token = document.pop("modification_details_dictionary")
     assert document == {"accel_max": 1.0, "decel_max": 2.0, "scenario_specifics": None}
-    assert list(by_token) == [token_of("mill-junction"), token_of("terrace-row")]
-    details = by_token[token_of("mill-junction")]
+    assert list(by_token) == [scene_token("mill-junction"), scene_token("terrace-row")]
+    details = by_token[scene_token("mill-junction")]
     zone = details.pop("special_scenario")["0"]
     assert details == {
         "extra_agents_to_spawn": [],
@@ -88,7 +88,7 @@ def test_plain_yaml_shows_interplans_keys() -> None:
     (worker,) = zone["pedestrian"]
     assert math.dist(worker[:2], worker[2:4]) == pytest.approx(1.0, abs=0.001)
     assert worker[4] is None
-    assert f'"{token_of("mill-junction")}":' in text, "some look like numbers"
+    assert f'"{scene_token("mill-junction")}":' in text, "some look like numbers"
 
 
 def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file() -> None:
@@ -104,7 +104,7 @@ def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file() -> Non
 def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
     same = cell("nudge-plane-tree-street")
     text, _ = write([same, replace(same, name="another")])
-    token = token_of("plane-tree-street")
+    token = scene_token("plane-tree-street")
     assert f"# {token}-s1 plane-tree-street: another" in text
     with pytest.raises(Conflict, match="at most 100"):
         write([same] * 101)
@@ -175,7 +175,7 @@ def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: Scenari
     given = cells.cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
     text, losses = write([given])
     scene = without_traffic(given.scene)
-    ((found, _),) = entries_of(text, {token_of(scene.name): scene})
+    ((found, _),) = entries_of(text, {scene_token(scene.name): scene})
     wanted, got = given.modification.added, found.added
     assert len(got) == (1 if odd in ("missing", "another scene") else 2)
     changed = {change.name for change in agent_changes(wanted, got)}

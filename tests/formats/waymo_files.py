@@ -3,7 +3,7 @@
 import struct
 from pathlib import Path
 
-from augment.formats.waymo.scenario import masked_crc32c
+from augment.formats.waymo.scenario import mask_crc32c
 
 Fields = list[tuple[int, object]]
 
@@ -94,9 +94,9 @@ def record(payload: bytes) -> bytes:
     head = struct.pack("<Q", len(payload))
     return (
         head
-        + struct.pack("<I", masked_crc32c(head))
+        + struct.pack("<I", mask_crc32c(head))
         + payload
-        + struct.pack("<I", masked_crc32c(payload))
+        + struct.pack("<I", mask_crc32c(payload))
     )
 
 

@@ -1,7 +1,7 @@
 """Driving scores and their parts, of drives that stop, pass and turn."""
 
 from augment.scene.entities import Modification, ScenarioType, Scene
-from augment.simulation.drive import expert_of, run
+from augment.simulation.drive import find_expert, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
@@ -31,7 +31,7 @@ def driven(scene: Scene, change: Modification) -> dict[str, object]:
     """Where the ego is every 3 s (x, y in m, speed in m/s), and both scores with their parts."""
     setting, road = DriveSetting(scene=scene, modification=change), Road(scene)
     drive = run(setting, PdmClosed(), road=road)
-    expert = expert_of(setting, road)
+    expert = find_expert(setting, road)
     parts: dict[str, object] = {}
     for kind in ScoreKind:
         score = score_drive(

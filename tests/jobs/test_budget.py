@@ -178,7 +178,7 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     assert held is not None
     call = in_flight(job, held)
     AUGMENTATIONS.take_back_lost(now=timezone.now())
-    used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
+    used = budget.settle_reply(reply(), worst=WORST, price=ONE_USD)
     budget.settle(call=call, used=used, now=timezone.now())
     job.refresh_from_db()
     assert (job.spent_calls, job.spent_tokens, job.spent_nano_usd) == (1, 3020, 3_020_000)

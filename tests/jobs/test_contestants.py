@@ -13,7 +13,7 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import ChatClient
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.wire_transport import server_of
+from augment.llm.wire_transport import host_and_port
 from augment.models import (
     Augmentation,
     Contestant,
@@ -88,7 +88,7 @@ def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatc
     assert made.endpoint is not None
     assert made.endpoint.base_url == "https://api.openai.com/v1"
     assert made.endpoint.key_variable == "OPENAI_API_KEY"
-    assert known_endpoints.key_of(made.endpoint) == "sk-very-secret"
+    assert known_endpoints.read_key(made.endpoint) == "sk-very-secret"
     assert "sk-very-secret" not in str(list(Endpoint.objects.values()))
     assert "sk-very-secret" not in str(list(Event.objects.values()))
 
@@ -239,7 +239,7 @@ def test_another_server_never_receives_a_key(
         recorder() as thief,
         recorder(307, {}, {"Location": f"{thief.url}/chat/completions"}) as home,
     ):
-        settings.KEY_VARIABLES = [f"LAB_API_KEY={server_of(home.url)}"]
+        settings.KEY_VARIABLES = [f"LAB_API_KEY={host_and_port(home.url)}"]
         # As if it were written into the table by hand, or changed after the key was entered.
         address = home.url if redirects else thief.url
         Endpoint.objects.update(base_url=address, key_variable=variable)

@@ -25,17 +25,17 @@ from augment.services.running.estimates import estimate
 from augment.services.running.follow_ups import (
     FollowUpRequest,
     ask_follow_up,
-    conversation_of,
+    read_conversation_until,
     steps_to,
 )
 from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.scenarios.prompts import stored_tasks
+from augment.services.scenarios.prompts import find_stored_tasks
 from augment.services.scenarios.scenes import (
     NewScenario,
     add_scenario,
     change_surroundings,
-    scene_of,
+    load_scene,
 )
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
@@ -68,7 +68,7 @@ def two_steps(*, intents: bool = False) -> tuple[Scenario, Scenario]:
         for ahead_m, body in ((20.0, Body.CAR), (24.0, Body.BUS))
     ]
     first = rows.add_scenario("street", instruction=WISH, intent=intent_to_document(asked[0]))
-    made = [place(scene_of(first), intent).modification for intent in asked]
+    made = [place(load_scene(first), intent).modification for intent in asked]
     Scenario.objects.filter(pk=first.pk).update(reference=modification_to_document(made[0]))
     follow_up = add_scenario(
         NewScenario(
@@ -215,12 +215,12 @@ def test_only_a_language_models_finished_answer_on_record_can_go_on(server: Scri
     with pytest.raises(Conflict, match="No language model gave this answer"):
         ask_follow_up(theirs, request)
     with pytest.raises(Conflict, match="was deleted"):
-        conversation_of(None)
+        read_conversation_until(None)
 
 
 def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
     first, follow_up = two_steps()
-    assert scene_of(first) == scene_of(follow_up)
+    assert load_scene(first) == load_scene(follow_up)
     with pytest.raises(Conflict, match="It follows “street”"):
         change_surroundings(follow_up, keep_traffic=True, density="", goal="")
     rows.add_scenario("elsewhere")
@@ -235,7 +235,7 @@ def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the
     None
 ):
     two_steps()
-    with running(known=stored_tasks) as stand_in:
+    with running(known=find_stored_tasks) as stand_in:
         request = EndpointRequest(label="fake", base_url=stand_in.url, is_simulated=True)
         endpoint = ensure_endpoint(request)
         for model in ("fake-good", "fake-careless"):

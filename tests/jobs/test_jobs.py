@@ -7,7 +7,7 @@ from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs
 from augment.services.running.jobs import JobRequest
-from augment.services.running.progress import cause_of, count_rows
+from augment.services.running.progress import count_rows, generalise_reason
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
@@ -143,4 +143,4 @@ def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() ->
 def test_reasons_have_one_cause_where_only_numbers_and_ids_differ(
     reason: str, other: str, are_alike: bool
 ) -> None:
-    assert (cause_of(reason) == cause_of(other)) is are_alike
+    assert (generalise_reason(reason) == generalise_reason(other)) is are_alike

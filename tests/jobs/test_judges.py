@@ -13,7 +13,7 @@ from augment.errors import Conflict
 from augment.fake_llm.server import running
 from augment.models import Augmentation, EndpointModel, JudgeRun, ModelCall, PairJudgement
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.known_models import family_of, model_at
+from augment.services.endpoints.known_models import model_at, vendor_family
 from augment.services.running import calls
 from augment.services.running.judge_runs import (
     JUDGEMENTS,
@@ -24,7 +24,7 @@ from augment.services.running.judge_runs import (
     plan_judge,
 )
 from augment.services.scenarios.pictures import store
-from augment.variants.judge import Exchange, exchange, preference_of
+from augment.variants.judge import Exchange, combine_answers, exchange
 from tests import study_rows
 from tests.jobs.scripted import Scripted
 from tests.llm.json_server import serving
@@ -110,7 +110,7 @@ def test_both_orders_are_asked_blind_and_each_call_is_kept_raw() -> None:
 def test_a_preference_counts_where_it_survives_the_exchange(
     first: str, second: str, became: Exchange, preference: int
 ) -> None:
-    assert (exchange(first, second), preference_of(first, second)) == (became, preference)
+    assert (exchange(first, second), combine_answers(first, second)) == (became, preference)
 
 
 @pytest.mark.parametrize("babble", ["Both are nice.", says("C"), '```json\n{"reason": ""}\n```'])
@@ -228,4 +228,4 @@ def test_the_stand_in_judges_by_what_it_is_sent(
     ],
 )
 def test_a_family_is_the_vendor_or_the_first_word(model: str, family: str) -> None:
-    assert family_of(model) == family
+    assert vendor_family(model) == family

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation, Endpoint, ModelCall
 from augment.services.running import runner
-from augment.services.running.transcript_records import transcript_of
+from augment.services.running.transcript_records import full_transcript
 from tests.jobs.models import llama_job
 from tests.jobs.rows import only_row
 from tests.llm.recorder import recorder
@@ -73,6 +73,6 @@ def test_a_planted_key_is_found_nowhere(
             ("job", row.job.code),
         )
     ]
-    kept = [*every_stored_value(), caplog.text, json.dumps(transcript_of(row)), *pages]
+    kept = [*every_stored_value(), caplog.text, json.dumps(full_transcript(row)), *pages]
     assert [text[:200] for text in kept if KEY in text] == []
     assert any("[key]" in text for text in kept), "the server did echo it"

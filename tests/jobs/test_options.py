@@ -14,11 +14,11 @@ from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.contestants import ContestantRequest
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.treatments import options_of
+from augment.services.endpoints.treatments import read_options
 from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
 from augment.services.running.jobs import JobRequest
-from augment.services.running.transcript_records import transcript_of
+from augment.services.running.transcript_records import full_transcript
 from augment.variants.options import NAMES, options_from_document
 from tests.jobs.rows import add_scenario
 from tests.jobs.scripted import Bodies, Scripted, add, run
@@ -125,8 +125,8 @@ def test_what_is_sent_is_what_the_option_says(
         assert by_default(server.bodies[sent:]) or name == "prompt_version"
     assert told.options is not None
     assert told.options[name] == value
-    assert transcript_of(told)["contestant"]["frozen_options"] == told.options
-    assert transcript_of(told)["contestant"]["options"] == {name: value}
+    assert full_transcript(told)["contestant"]["frozen_options"] == told.options
+    assert full_transcript(told)["contestant"]["options"] == {name: value}
     assert (told.options == usual.options) is (name in ("prompt_version",))
 
 
@@ -141,7 +141,7 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
         assert len(server.bodies) == 3
     sources = [ModelCall.objects.get(attempt__augmentation=row).served_from for row in again]
     assert [one.attempt.augmentation for one in sources if one and one.attempt] == rows
-    sent = [transcript_of(row)["attempts"][0]["steps"][0]["request"] for row in rows]
+    sent = [full_transcript(row)["attempts"][0]["steps"][0]["request"] for row in rows]
     assert [(call["temperature"], call["seed"]) for call in sent] == [(1.0, 7), (1.0, 8), (1.0, 9)]
 
 
@@ -162,7 +162,7 @@ def test_the_command_takes_every_option_and_keeps_contestants_apart(
             **{"max_output_tokens": 900, "protocol": "native", "accepted_from": 4.5},
             "radius_m": 60.0,
         }
-        assert options_of(made).prompt_version == prompt_version()
+        assert read_options(made).prompt_version == prompt_version()
         with pytest.raises(CommandError, match="another contestant called 'a'"):
             call_command("add_contestant", "a", *asked, "--temperature=0.8")
         with pytest.raises(CommandError, match=r"temperature.*from 0 to 2"):

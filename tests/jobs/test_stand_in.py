@@ -3,8 +3,8 @@
 import pytest
 
 from augment.scene.intent import Shape
-from augment.services.scenarios.prompts import stored_tasks
-from augment.services.scenarios.scenes import scene_of
+from augment.services.scenarios.prompts import find_stored_tasks
+from augment.services.scenarios.scenes import load_scene
 from tests.intents import cones
 from tests.jobs.rows import INSTRUCTION, add_scenario
 
@@ -12,8 +12,8 @@ pytestmark = pytest.mark.django_db(transaction=True)
 
 
 def test_a_task_is_found_by_the_text_of_its_instruction_however_it_is_spaced() -> None:
-    assert stored_tasks(INSTRUCTION) == []
+    assert find_stored_tasks(INSTRUCTION) == []
     row = add_scenario("street")
     spaced = f"  {INSTRUCTION.replace(' ', '  ')}\n"
-    assert stored_tasks(spaced) == [(scene_of(row), cones(20.0, 1, Shape.LINE))]
-    assert stored_tasks("Paint the sky green.") == []
+    assert find_stored_tasks(spaced) == [(load_scene(row), cones(20.0, 1, Shape.LINE))]
+    assert find_stored_tasks("Paint the sky green.") == []

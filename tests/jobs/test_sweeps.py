@@ -21,14 +21,14 @@ from augment.services.judging.simulations import DRIVES, Options
 from augment.services.judging.sweeps import (
     SweepRequest,
     add_family,
-    numbers_of,
     plan_sweep,
-    ways_of,
+    swept_numbers,
+    tested_ways,
 )
-from augment.services.judging.thresholds import conclude, result_of
+from augment.services.judging.thresholds import conclude, sweep_result
 from augment.services.scenarios.editing import enter_intent
-from augment.services.scenarios.scenes import intent_of, reference_of
-from augment.simulation.drive import expert_of, run
+from augment.services.scenarios.scenes import load_intent, load_reference
+from augment.simulation.drive import find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.traffic import DriveSetting
@@ -94,15 +94,15 @@ def settle_others(**scores: float) -> None:
 
 def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
     sweep = planned()
-    assert Simulation.objects.count() == 8 * len(ways_of(STRAIGHT)) == 32
+    assert Simulation.objects.count() == 8 * len(tested_ways(STRAIGHT)) == 32
     drive_tested()
-    result = result_of(sweep)
+    result = sweep_result(sweep)
     by_hand = {}
     for line in result.lines:
         setting = DriveSetting(scene=scene(), modification=parked(line.row.value))
         road = Road(setting.scene)
         drive = run(setting, Straight(), road=road)
-        by_hand[line.row.value] = not score_drive(drive, expert_of(setting, road)).collisions
+        by_hand[line.row.value] = not score_drive(drive, find_expert(setting, road)).collisions
     assert {line.row.value: line.tried.is_passed for line in result.lines} == by_hand
     # Bodies 2.297 m and 2 m wide pass each other at 2.149 m.
     assert result.edges == ((2.5, 2.0),)
@@ -118,7 +118,7 @@ def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> Non
     kept = sweep.hardest
     assert kept is not None
     assert sweep.concluded_at is not None
-    reference = reference_of(kept)
+    reference = load_reference(kept)
     assert reference is not None
     assert (kept.slug, reference.added[0].y_m) == ("parked-1", 1.0)
     assert kept.instruction.endswith("(add[0].y_m: 1)")
@@ -152,7 +152,7 @@ def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> 
     DRIVES.tidy(rows.NOON)
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert [line.tried.is_passed for line in result_of(sweep).lines] == [False, True]
+    assert [line.tried.is_passed for line in sweep_result(sweep).lines] == [False, True]
     assert DRIVES.find_unsent(older_than=timedelta(0)) == []
 
 
@@ -160,11 +160,11 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     intent = intent_to_document(cones(20.0, 1, Shape.LINE))
     scenario = rows.add_scenario("cones", intent=intent)
     number = "requests[0].spot.distance"
-    assert number in numbers_of(scenario)
+    assert number in swept_numbers(scenario)
     sweep = plan_sweep(
         scenario=scenario, request=asked(number=number, low=20.0, high=220.0, count=3)
     )
-    near, middle, far = result_of(sweep).lines
+    near, middle, far = sweep_result(sweep).lines
     assert near.row.modification is not None
     assert near.row.modification["add"][0]["x_m"] == pytest.approx(20.0, abs=0.5)
     assert (middle.row.modification, far.row.modification) == (None, None), "the lane ends"
@@ -174,7 +174,7 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     drive_tested()
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert intent_of(sweep.hardest) == cones(20.0, 1, Shape.LINE)
+    assert load_intent(sweep.hardest) == cones(20.0, 1, Shape.LINE)
 
 
 @pytest.mark.parametrize("now", [cones(60.0, 1, Shape.LINE), parked_car(20.0)])
@@ -190,7 +190,7 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
     drive_tested()
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert intent_of(sweep.hardest) is None
+    assert load_intent(sweep.hardest) is None
 
 
 @pytest.mark.parametrize(
@@ -220,7 +220,7 @@ def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -
     assert (len(made) + len(refused), bool(made), bool(refused)) == (10, True, True)
     assert [row.slug for row in made] == [f"cones-{n}" for n in range(1, len(made) + 1)]
     for row in made:
-        intent, reference = intent_of(row), reference_of(row)
+        intent, reference = load_intent(row), load_reference(row)
         assert intent is not None
         assert reference is not None
         distance = intent.requests[0].spot.distance

@@ -14,7 +14,7 @@ from augment.models import Attempt, Augmentation, Endpoint, ModelCall, Transcrip
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.progress import tool_calls
-from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
+from augment.services.running.transcript_records import full_transcript, list_tries, sum_totals
 from augment.variants.respondents import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, ran
 from tests.jobs.rows import INSTRUCTION, NOON, launch, only_row
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.django_db
 
 def test_the_document_holds_the_whole_record() -> None:
     row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
-    document = json.loads(json.dumps(transcript_of(row)))
+    document = json.loads(json.dumps(full_transcript(row)))
     assert (document["format"], document["version"]) == ("scenario-arena/transcript", 3)
     assert document["augmentation"]["state"] == "done"
     assert document["augmentation"]["modification"] == row.modification
@@ -63,7 +63,7 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
     with speaking(whole(json.dumps(HEARD).encode())) as server:
         Endpoint.objects.update(base_url=server.url)
         runner.AUGMENTATIONS.perform(row.pk)
-    document = json.loads(json.dumps(transcript_of(row)))
+    document = json.loads(json.dumps(full_transcript(row)))
     calls = [step for step in document["attempts"][0]["steps"] if step["kind"] == "call"]
     sent = [json.loads(heard.partition(b"\r\n\r\n")[2]) for heard in server.heard]
     assert [call["request"] for call in calls] == sent
@@ -80,12 +80,12 @@ def test_a_call_from_the_store_names_its_source() -> None:
     model = Model(after_a_second_look)
     row = ran(only_row(job), model)
     jobs.resume(job, higher=Caps(cap_calls=2))
-    document = transcript_of(ran(row, model))
+    document = full_transcript(ran(row, model))
     paid = document["attempts"][0]["steps"][0]
     copied, last = document["attempts"][1]["steps"]
     assert (copied["served_from"], copied["cost_usd"]) == (paid["code"], "0")
     assert (paid["served_from"], last["served_from"]) == (None, None)
-    totals = totals_of(tries_of(row))
+    totals = sum_totals(list_tries(row))
     assert (totals.calls, totals.calls_from_store, totals.spent_tokens) == (2, 1, 6040)
 
 
@@ -107,13 +107,13 @@ def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
         kind=NoteKind.KEPT,
         document={"round": 1, "accepted": None, "remark": ""},
     )
-    before = json.dumps(transcript_of(row))
+    before = json.dumps(full_transcript(row))
     call.request, note.document = backwards(call.request), backwards(note.document)
     call.save()
     note.save()
     row.modification = backwards(row.modification)
     row.save()
-    assert json.dumps(transcript_of(Augmentation.objects.get(pk=row.pk))) == before
+    assert json.dumps(full_transcript(Augmentation.objects.get(pk=row.pk))) == before
     known = request_hash(
         base_url="http://127.0.0.1:9/v1",
         document=ModelCall.objects.get().request,

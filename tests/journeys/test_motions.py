@@ -23,7 +23,7 @@ from augment.services.running.jobs import JobRequest, launch
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.pictures import film_document
-from augment.services.scenarios.prompts import stored_tasks
+from augment.services.scenarios.prompts import find_stored_tasks
 from tests import study_rows
 from tests.opening import open_study
 
@@ -34,7 +34,7 @@ CONDITIONS = {"RelativeDistanceCondition", "DistanceCondition", "SimulationTimeC
 
 @pytest.fixture
 def server() -> Iterator[FakeServer]:
-    with running(known=stored_tasks) as serving:
+    with running(known=find_stored_tasks) as serving:
         yield serving
 
 

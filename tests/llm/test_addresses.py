@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.llm.addresses import addresses_of, check_base_url
+from augment.llm.addresses import check_base_url, resolve_host
 
 
 def leading_to(*addresses: str) -> Any:
@@ -52,10 +52,10 @@ def test_a_forbidden_address_is_refused_as_it_stands(address: str) -> None:
 @pytest.mark.parametrize("address", ALLOWED)
 def test_an_address_beside_the_forbidden_ones_passes(address: str) -> None:
     check_base_url(f"http://{host(address)}:8000/v1")
-    assert addresses_of("models.example", resolve=leading_to(address))
+    assert resolve_host("models.example", resolve=leading_to(address))
 
 
 @pytest.mark.parametrize("address", FORBIDDEN)
 def test_a_name_that_leads_to_a_metadata_address_is_refused(address: str) -> None:
     with pytest.raises(InvalidDocument, match=r"models\.example leads to .*metadata"):
-        addresses_of("models.example", resolve=leading_to("93.184.216.34", address))
+        resolve_host("models.example", resolve=leading_to("93.184.216.34", address))

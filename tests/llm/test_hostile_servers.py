@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from augment.errors import Abandoned, JobCancelled, ModelFault, NotSent, Unwanted
+from augment.errors import CallDropped, JobCancelled, ModelFault, NotNeeded, NotSent
 from augment.llm.answers import LONGEST_ARGUMENTS, LONGEST_EXTRA, MOST_CALLS, MOST_TOKENS
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
@@ -107,7 +107,7 @@ def test_a_call_in_flight_that_nobody_wants_any_more_is_given_up_at_the_next_loo
         look_every_s=0.03,
         timeout_s=60.0,
     )
-    assert isinstance(broken, Abandoned)
+    assert isinstance(broken, CallDropped)
     assert isinstance(broken.why, JobCancelled)
     assert not broken.retryable
 
@@ -116,7 +116,7 @@ def test_a_call_that_nobody_wants_before_it_is_sent_is_not_sent() -> None:
     def unwanted() -> None:
         raise JobCancelled
 
-    with pytest.raises(Unwanted) as raised:
+    with pytest.raises(NotNeeded) as raised:
         ask(whole(BODY), still_wanted=unwanted, look_every_s=0.0)
     assert isinstance(raised.value, JobCancelled)
 

@@ -11,10 +11,10 @@ from augment.llm.client import ModelProfile, Patience
 from augment.llm.costs import (
     IMAGE_TOKENS,
     Price,
-    cut_of,
+    find_cut,
     least_tokens,
-    nano_usd_of,
-    usd_of,
+    to_nano_usd,
+    to_usd,
     worst_case,
 )
 from augment.llm.messages import (
@@ -93,13 +93,13 @@ def request(text: str = "x", *, images: tuple[bytes, ...] = (), max_tokens: int 
 
 
 def test_a_bill_is_counted_in_whole_nano_dollars() -> None:
-    assert GPT_4O.nano_usd(prompt_tokens=1_000_000, completion_tokens=0) == nano_usd_of(
+    assert GPT_4O.nano_usd(prompt_tokens=1_000_000, completion_tokens=0) == to_nano_usd(
         Decimal("2.5")
     )
     tokens = {"prompt_tokens": 900, "completion_tokens": 120}
-    assert usd_of(GPT_4O.nano_usd(**tokens)) == Decimal("0.00345")
+    assert to_usd(GPT_4O.nano_usd(**tokens)) == Decimal("0.00345")
     cached = replace(GPT_4O, cached_usd=Decimal("1.25"))
-    assert usd_of(cached.nano_usd(**tokens, cached_tokens=800)) == Decimal("0.00245")
+    assert to_usd(cached.nano_usd(**tokens, cached_tokens=800)) == Decimal("0.00245")
     assert GPT_4O.nano_usd(**tokens, cached_tokens=800) == GPT_4O.nano_usd(**tokens)
 
 
@@ -149,16 +149,16 @@ def test_a_text_has_at_least_so_many_tokens(text: str, least: int) -> None:
 
 def test_a_count_far_below_what_was_sent_is_a_cut_prompt_at_a_window_alone() -> None:
     assert least_tokens(LONG) > 6000
-    assert cut_of(asking(), reply(1200)) is None
-    cut = cut_of(asking(), reply(4096))
+    assert find_cut(asking(), reply(1200)) is None
+    cut = find_cut(asking(), reply(4096))
     assert cut is not None
     assert not cut.retryable
 
 
 @pytest.mark.parametrize("window", [2048, 4096, 8192])
 def test_a_finished_answer_to_a_prompt_of_exactly_a_window_is_sound(window: int) -> None:
-    assert cut_of(asking("Hello"), reply(window)) is None
-    assert cut_of(asking("Hello"), reply(window), context_tokens=window) is None
+    assert find_cut(asking("Hello"), reply(window)) is None
+    assert find_cut(asking("Hello"), reply(window), context_tokens=window) is None
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_a_finished_answer_to_a_prompt_of_exactly_a_window_is_sound(window: int)
 def test_a_count_at_the_window_below_the_least_is_a_cut(
     words: int, known: int | None, is_cut: bool
 ) -> None:
-    cut = cut_of(asking("word " * words), reply(4096), context_tokens=known)
+    cut = find_cut(asking("word " * words), reply(4096), context_tokens=known)
     assert (cut is not None) == is_cut
 
 
@@ -186,7 +186,7 @@ def test_a_count_at_the_window_below_the_least_is_a_cut(
 def test_an_answer_that_runs_into_the_window_shows_a_cut(
     prompt: int, completion: int | None, finish: str, is_cut: bool
 ) -> None:
-    cut = cut_of(asking("Hello"), reply(prompt, completion, finish))
+    cut = find_cut(asking("Hello"), reply(prompt, completion, finish))
     assert (cut is not None) == is_cut
 
 

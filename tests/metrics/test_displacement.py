@@ -13,10 +13,10 @@ from augment.metrics.displacement import (
     Match,
     ObjectClass,
     are_alike,
-    box_of,
     displacement,
     look_alike,
     summarise,
+    summarize_box,
 )
 from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion
@@ -272,7 +272,7 @@ def of(*distances_m: float, missing: int = 0, surplus: int = 0) -> Displacement:
 
 
 def test_quartiles_whiskers_and_outliers_of_a_row_of_numbers() -> None:
-    box = box_of([5.0, 1.0, 3.0, 2.0, 4.0, 30.0, 6.0])
+    box = summarize_box([5.0, 1.0, 3.0, 2.0, 4.0, 30.0, 6.0])
     assert (box.q1_m, box.median_m, box.q3_m) == (2.5, 4.0, 5.5)
     assert (box.low_m, box.high_m) == (1.0, 6.0)
     assert box.outliers_m == (30.0,)
@@ -288,7 +288,7 @@ def test_objects_of_all_augmentations_count_once_each() -> None:
 
 @given(values=st.lists(st.floats(0.0, 1e3), min_size=1, max_size=40))
 def test_a_box_is_in_order_and_loses_no_value(values: list[float]) -> None:
-    box = box_of(values)
+    box = summarize_box(values)
     numbers = [box.low_m, box.q1_m, box.median_m, box.q3_m, box.high_m]
     assert numbers == sorted(numbers)
     inside = [one for one in values if box.low_m <= one <= box.high_m]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.metrics.kept import KeptObject, KeptSummary, kept_objects, summarise_kept
+from augment.metrics.kept import KeptObject, KeptSummary, find_kept_objects, summarise_kept
 from augment.scene.entities import Modification, TrafficAgent
 from tests.scenes import cone, pedestrian, vehicle
 
@@ -20,7 +20,7 @@ FOLLOW_UP = placed(replace(CAR, x_m=24.0), CONE, WALKER)
 
 
 def kept(before: Modification, after: Modification | None) -> tuple[KeptObject, ...]:
-    return kept_objects(before, after, reference_before=REFERENCE, reference_after=FOLLOW_UP)
+    return find_kept_objects(before, after, reference_before=REFERENCE, reference_after=FOLLOW_UP)
 
 
 def test_only_what_both_references_have_alike_is_to_be_kept() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Entry, PlanRules, plan
-from arena.pairing.rules import grid_of
+from arena.pairing.rules import make_grid
 
 RATED, NEW = ("ann", "bob", "cid"), ("dot", "eli")
 ENTRIES = tuple(
@@ -37,7 +37,7 @@ def test_pairs_without_a_challenger_are_not_shown_and_the_others_equally_often()
 
 def test_rated_pairs_that_look_alike_are_not_settled_either() -> None:
     alike = (("place-0", "ann", "bob"), ("place-1", "ann", "dot"))
-    grid = grid_of(ENTRIES, alike, NEW)
+    grid = make_grid(ENTRIES, alike, NEW)
     assert grid.identical == (("place-1", "ann", "dot"),)
     assert int(grid.showable.sum()) == 7 * 8 - 1
 

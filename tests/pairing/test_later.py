@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from arena.errors import NothingToPlan
-from arena.pairing.later import GridUnit, deal, follow_on, units_of
+from arena.pairing.later import GridUnit, deal, follow_on, main_units
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import PlannedMatchup, plan
-from arena.pairing.rules import PlanRules, grid_of
+from arena.pairing.rules import PlanRules, make_grid
 from tests.pairing.studies import by_expert, pair, paper_rules, smallest_gap
 
 
@@ -16,9 +16,9 @@ def handed_over(
 ) -> dict[str, list[PlannedMatchup]]:
     """Everybody's showings after the giver stopped at a position."""
     made = by_expert(plan(rules))
-    grid, rng = grid_of(rules.entries), np.random.default_rng(5)
+    grid, rng = make_grid(rules.entries), np.random.default_rng(5)
     known: dict[str, list[PlannedMatchup]] = defaultdict(list, made)
-    left = units_of(grid, made[giver][done:])
+    left = main_units(grid, made[giver][done:])
     known[giver] = made[giver][:done]
     dealt = deal(grid, known, to, left, rng)
     for name in to:
@@ -61,9 +61,9 @@ def test_what_is_handed_over_keeps_every_pair_and_every_rule(to: list[str]) -> N
 
 def test_what_everybody_knows_is_judged_on_another_scenario() -> None:
     rules = paper_rules(1, votes=20, experts=2)
-    grid = grid_of(rules.entries)
+    grid = make_grid(rules.entries)
     known = by_expert(plan(rules))
-    shared = units_of(grid, known["expert-1"])
+    shared = main_units(grid, known["expert-1"])
     dealt = deal(grid, known, ["expert-1"], shared, np.random.default_rng(1))["expert-1"]
     assert Counter(u.pair for u in dealt) == Counter(u.pair for u in shared)
     assert not {(u.pair, u.scenario) for u in dealt} & {(u.pair, u.scenario) for u in shared}
@@ -71,7 +71,7 @@ def test_what_everybody_knows_is_judged_on_another_scenario() -> None:
 
 def test_a_pair_that_everybody_has_judged_everywhere_is_refused_by_name() -> None:
     rules = paper_rules(1, votes=20, experts=1)
-    grid = grid_of(rules.entries)
+    grid = make_grid(rules.entries)
     first, second = grid.pairs[0]
     all_of_it = [
         PlannedMatchup(expert="eva", position=n + 1, scenario=scenario, left=first, right=second)

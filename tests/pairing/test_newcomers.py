@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.pairing.later import choose_for_newcomer as choose_units
-from arena.pairing.rules import Entry, Grid, grid_of
+from arena.pairing.rules import Entry, Grid, make_grid
 
 NAMES = ("ann", "bob", "cid", "dot")
 
 
 def grid(scenarios: int = 5, missing: tuple[tuple[int, str], ...] = ()) -> Grid:
-    return grid_of(
+    return make_grid(
         tuple(
             Entry(scenario=f"place-{place}", contestant=name, picture=f"{place}-{name}")
             for place in range(scenarios)

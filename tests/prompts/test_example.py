@@ -14,7 +14,7 @@ import pytest
 from augment.geometry.polyline import Polyline
 from augment.prompts.calls import calls_in
 from augment.prompts.fill import read_text
-from augment.prompts.reply import notes_of, read_reply
+from augment.prompts.reply import answer_notes, read_reply
 from augment.prompts.vectors import LaneFormat, scene_text
 from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 from augment.variants.pose_tool import PoseTool
@@ -79,7 +79,7 @@ def test_the_answer_of_the_example_is_read_and_right(work: str) -> None:
     text = read_text(f"work_{work}.md")
     answer = text[text.index("Insights:") :]
     car, walker = read_reply(answer, example()).modification.added
-    assert notes_of(answer).startswith("A road with a single lane")
+    assert answer_notes(answer).startswith("A road with a single lane")
     tool = PoseTool(example())
     assert walker.walk_to_m is not None
     spots = [

@@ -8,13 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from augment.prompts.fill import regenerate_messages, result_text, said_by_user, viewer_messages
+from augment.prompts.fill import (
+    make_user_message,
+    regenerate_messages,
+    result_text,
+    viewer_messages,
+)
 from augment.scene.entities import Modification
 from augment.scene.planned_motion import LanePath, NearEgo, PlannedMotion
-from augment.variants.pipeline import form_of
+from augment.variants.pipeline import modifier_form
 from augment.variants.recipes import RECIPES, VQA
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import Shown, shown_prompt
+from augment.variants.showing import ShownPrompt, build_prompt
 from tests.scenes import junction, pedestrian, vehicle
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -43,7 +48,9 @@ CASES = [
 
 
 def shown(variant: str, role: ModelRole, native: bool) -> str:
-    made: Shown = shown_prompt(RECIPES[variant], role, junction(), WISH, DONE, native_tools=native)
+    made: ShownPrompt = build_prompt(
+        RECIPES[variant], role, junction(), WISH, DONE, native_tools=native
+    )
     parts = [f"=== {m.speaker}\n{m.text}\n" for m in made.messages]
     return "\n".join(parts)
 
@@ -64,8 +71,8 @@ def test_what_is_said_between_two_answers_is_what_the_golden_file_says() -> None
 def between() -> str:
     """Results and feedback, which come in the middle of a conversation."""
     told = [
-        said_by_user(result_text(['{"x_m": 1.0}', '{"error": "no"}'], is_over=False)),
-        said_by_user(result_text(['{"error": "no call is left"}'], is_over=True)),
+        make_user_message(result_text(['{"x_m": 1.0}', '{"error": "no"}'], is_over=False)),
+        make_user_message(result_text(['{"error": "no call is left"}'], is_over=True)),
         *regenerate_messages(
             (), ["It is in Lane2. Reason: a. Corrective action: b."], is_measured=False
         ),
@@ -76,7 +83,7 @@ def between() -> str:
 
 def test_every_recipe_shows_one_of_these_prompts() -> None:
     for one in RECIPES.values():
-        form = form_of(one)
+        form = modifier_form(one)
         assert (form.lanes, form.calling) in {("polyline", "none"), ("bezier", "in_prompt")}
         if one.review is VQA.review:
             (_, task) = viewer_messages(["a?", "b?", "c?"], [b"one", b"two"])

@@ -10,8 +10,8 @@ from augment.prompts.extent import (
     BESIDE_M,
     Extent,
     boundary_within,
-    extent_of,
-    shown_spans,
+    find_extent,
+    find_spans,
     simplify_boundary,
 )
 from augment.prompts.vectors import (
@@ -142,7 +142,7 @@ def test_the_areas_of_every_prompt_keep_ten_centimetres(slug: str) -> None:
     written = scene_vectors(shown, 80.0)["Areas"]
     assert written
     for area in shown.areas:
-        cut = boundary_within(np.array(area.boundary_m), extent_of(shown, 80.0).box_m)
+        cut = boundary_within(np.array(area.boundary_m), find_extent(shown, 80.0).box_m)
         if names.areas[area.id] in written:
             _, points = written[names.areas[area.id]]
             # Rounded to a centimetre, each point moves by 0.007 m at most.
@@ -172,7 +172,7 @@ def test_what_runs_too_far_beside_the_ego_is_left_out(y_m: float, is_shown: bool
         lanes=(*scene().lanes, lane("Lane3", (-50.0, y_m), (100.0, y_m))),
         agents=(vehicle("Agent2", 20.0, y_m),),
     )
-    assert ("Lane3" in shown_spans(street, 80.0)) is is_shown
+    assert ("Lane3" in find_spans(street, 80.0)) is is_shown
     assert ("Agent2" in scene_vectors(street, 80.0)["Agents"]) is is_shown
     assert ("Lane3" in PoseTool(street).curves) is is_shown
 
@@ -180,13 +180,13 @@ def test_what_runs_too_far_beside_the_ego_is_left_out(y_m: float, is_shown: bool
 def test_a_crossing_street_is_cut_where_the_wish_ends_and_goes_far_ahead() -> None:
     crossing = lane("Lane3", (40.0, -70.0), (40.0, 70.0))
     street = scene(lanes=(*scene().lanes, crossing, lane("Lane4", (-60.0, -9.0), (-60.0, 9.0))))
-    spans = shown_spans(street, 80.0)
+    spans = find_spans(street, 80.0)
     assert spans["Lane3"] == pytest.approx((70.0 - BESIDE_M, 70.0 + BESIDE_M), abs=0.5)
     assert "Lane4" not in spans
 
 
 def test_where_the_ego_can_turn_off_is_shown_as_far_as_it_can_drive() -> None:
-    spans = shown_spans(junction(), 80.0)
+    spans = find_spans(junction(), 80.0)
     start_m, end_m = spans["Lane3"]
     assert start_m == 0.0
     assert end_m == pytest.approx(52.0, abs=0.5)
@@ -205,7 +205,7 @@ def test_a_turning_lane_beside_the_ego_leads_on_too() -> None:
     )
     away = lane("Lane3", (28.0, 11.5), (28.0, 70.0))
     street = scene(lanes=(ahead, beside, away), connectors=(leads,), areas=())
-    assert shown_spans(street, 80.0)["Lane3"][1] > 50.0
+    assert find_spans(street, 80.0)["Lane3"][1] > 50.0
 
 
 def test_of_connectors_that_lead_the_same_way_one_is_shown() -> None:
@@ -213,7 +213,7 @@ def test_of_connectors_that_lead_the_same_way_one_is_shown() -> None:
     first = cross.connectors[0]
     twin = replace(first, id="Connector3", centerline=Polyline([(20.0, 0.4), (36.0, 0.4)]))
     other = replace(first, id="Connector4", centerline=Polyline([(20.0, 0.6), (36.0, 0.6)]))
-    spans = shown_spans(replace(cross, connectors=(*cross.connectors, twin, other)), 80.0)
+    spans = find_spans(replace(cross, connectors=(*cross.connectors, twin, other)), 80.0)
     assert "Connector3" not in spans
     assert "Connector4" in spans
 
@@ -222,7 +222,7 @@ def test_of_connectors_that_lead_the_same_way_one_is_shown() -> None:
 def test_every_place_of_a_reference_is_shown_with_its_lane(slug: str) -> None:
     base, reference = whole_scene(entry(slug).scene), entry(slug).reference
     assert reference is not None
-    extent, spans = extent_of(base, DEFAULT_RADIUS_M), shown_spans(base, DEFAULT_RADIUS_M)
+    extent, spans = find_extent(base, DEFAULT_RADIUS_M), find_spans(base, DEFAULT_RADIUS_M)
     for agent in reference.changed:
         ends = [(agent.x_m, agent.y_m), *([agent.walk_to_m] if agent.walk_to_m else [])]
         assert extent.holds(np.array(ends)).all()
@@ -244,4 +244,4 @@ def test_a_connector_that_no_way_of_the_ego_meets_is_left_out(y_m: float, is_sho
         turn_type=TurnType.STRAIGHT,
     )
     crossing = replace(street, connectors=(beside,))
-    assert ("Connector1" in shown_spans(crossing, 80.0)) is is_shown
+    assert ("Connector1" in find_spans(crossing, 80.0)) is is_shown

@@ -10,8 +10,8 @@ from arena.rating.bootstrap import percentile_interval
 from arena.rating.chains import Status
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, fill_lines, rate
-from arena.rating.parts import Rated
-from arena.rating.ranking import ranks, shown_ranks
+from arena.rating.parts import RatedGroup
+from arena.rating.ranking import decide_ranks, ranks
 from arena.rating.rules import Unit
 from tests.rating.votes import Comparison, as_arrays, by_votes, named, versus
 
@@ -197,7 +197,7 @@ def test_bounds_that_touch_do_not_tell_two_apart() -> None:
 def test_a_rank_needs_bounds_that_decide_it(
     lower: list[float], upper: list[float], expected: list[int]
 ) -> None:
-    assert shown_ranks(np.array(lower), np.array(upper), average=0.0).tolist() == expected
+    assert decide_ranks(np.array(lower), np.array(upper), average=0.0).tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -265,7 +265,7 @@ def test_a_new_column_of_a_part_reaches_the_line_by_its_name() -> None:
         width: float | None = None
 
     @dataclass(frozen=True, kw_only=True)
-    class WiderRated(Rated):
+    class WiderRated(RatedGroup):
         width: object
 
     lines: list[Line] = [WiderLine(name=name, rank=7) for name in "abc"]

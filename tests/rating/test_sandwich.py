@@ -12,7 +12,7 @@ from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, t_abo
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.models import ELO_PER_LOGIT, Meetings, to_elo
 from arena.rating.rules import Unit
-from arena.rating.sandwich import Pulls, left_of_effect, pulls_of_model, spread_of
+from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model, remaining_share
 from bench.worlds import World
 from tests.rating.votes import fit, simulated
 
@@ -126,7 +126,7 @@ def test_what_the_fit_leaves_is_that_of_a_weighted_mean(
     share = np.array(shares)
     residual = np.diag(share) @ (np.eye(len(share)) - np.outer(np.ones(len(share)), share))
     exact = np.trace(residual @ residual.T) / (share @ share)
-    found = left_of_effect(np.array([share @ share]), np.array([(share**3).sum()]))[0]
+    found = remaining_share(np.array([share @ share]), np.array([(share**3).sum()]))[0]
     assert found == pytest.approx(exact if left is None else left)
     assert found >= exact - 1e-12
 
@@ -146,7 +146,7 @@ def test_variances_are_those_of_simulated_ratings(world: dict[str, float]) -> No
     ratings, variances = [], []
     for seed in range(STUDIES):
         votes = World(ratings=np.full(9, 1000.0), **world).votes(np.random.default_rng(seed))  # type: ignore[arg-type]
-        spread = spread_of(pulls_of(votes), Unit.TWO_WAY)
+        spread = estimate_spread(pulls_of(votes), Unit.TWO_WAY)
         ratings.append(to_elo(fit(votes)))
         variances.append(spread.covariance.diagonal())
     truth = np.mean(np.square(np.array(ratings) - 1000.0))

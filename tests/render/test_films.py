@@ -12,11 +12,11 @@ from augment.geometry.frames import wrap
 from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import PASSED_WIDTH_M, camera_for
-from augment.render.film import STEPS, film_of
+from augment.render.film import STEPS, make_film
 from augment.scene.entities import Modification, Scene, TrafficAgent
-from augment.scene.motion import motion_of
+from augment.scene.motion import find_motion
 from augment.scene.planned_motion import AtTime, NearEgo, PlannedMotion, PointPath
-from augment.scene.trails import ego_spots, trails_of
+from augment.scene.trails import ego_spots, find_trails
 from tests.moving import cutting_in
 from tests.render.pictures import opened
 from tests.scenes import cone, pedestrian, scene, vehicle
@@ -25,7 +25,7 @@ STREET = scene(agents=(vehicle("Agent2", 20.0, -3.0), pedestrian("Agent3", 25.0,
 
 
 def film(change: Modification, base: Scene = STREET) -> dict[str, object]:
-    document: dict[str, object] = json.loads(film_of(base, change, camera_for(base, change)))
+    document: dict[str, object] = json.loads(make_film(base, change, camera_for(base, change)))
     return document
 
 
@@ -53,7 +53,7 @@ def braking(start: AtTime | NearEgo) -> TrafficAgent:
 def test_a_trail_has_a_spot_each_second_since_it_sets_out(
     start: AtTime | NearEgo, places_m: list[float]
 ) -> None:
-    (trail,) = trails_of(STREET, Modification(added=(braking(start),)))
+    (trail,) = find_trails(STREET, Modification(added=(braking(start),)))
     assert trail.sets_out == bool(places_m)
     assert [spot.x_m for spot in trail.spots] == pytest.approx(places_m)
     # Of one that does not set out, the way that it would take is told from where it is.
@@ -61,7 +61,7 @@ def test_a_trail_has_a_spot_each_second_since_it_sets_out(
 
 
 def test_who_has_no_motion_leaves_no_trail_and_the_ego_is_followed_for_six_seconds() -> None:
-    assert trails_of(STREET, Modification(added=(cone("New1", 9.0, 0.0),))) == ()
+    assert find_trails(STREET, Modification(added=(cone("New1", 9.0, 0.0),))) == ()
     assert [spot.x_m for spot in ego_spots(STREET)] == pytest.approx(
         [8.0 * n for n in range(1, 7)]
     )
@@ -70,7 +70,7 @@ def test_who_has_no_motion_leaves_no_trail_and_the_ego_is_followed_for_six_secon
 def test_the_window_holds_the_way_near_the_ego_and_has_films() -> None:
     change = Modification(added=(cutting_in(0.5),))
     camera = camera_for(STREET, None, (change,))
-    for spot in (*ego_spots(STREET), *trails_of(STREET, change)[0].spots):
+    for spot in (*ego_spots(STREET), *find_trails(STREET, change)[0].spots):
         if np.hypot(*spot.box.corners_m.T).max() <= 60.0:
             assert camera.x_min_m <= spot.x_m <= camera.x_max_m
             assert camera.y_min_m <= spot.y_m <= camera.y_max_m
@@ -100,8 +100,8 @@ def test_a_film_names_nobody_and_is_the_same_whatever_they_are_called() -> None:
         added=tuple(replace(one, id=f"X{9 - n}") for n, one in enumerate(cars))[::-1]
     )
     renamed = scene(agents=tuple(replace(one, id=f"R{one.id}") for one in STREET.agents))
-    shown = film_of(STREET, change, camera)
-    assert film_of(renamed, other, camera) == shown
+    shown = make_film(STREET, change, camera)
+    assert make_film(renamed, other, camera) == shown
     assert not any(name in shown.decode() for name in ("New", "Agent", "Lane"))
     assert len(shown) < 5_000
 
@@ -110,7 +110,7 @@ def test_a_film_says_where_everybody_is_when() -> None:
     car = cutting_in(0.5)
     change = Modification(added=(car,))
     camera = camera_for(STREET, change)
-    document = json.loads(film_of(STREET, change, camera))
+    document = json.loads(make_film(STREET, change, camera))
     assert (document["steps"], document["step_s"]) == (STEPS, 0.1) == (61, 0.1)
     mark, first, last, values = document["movers"][-1]  # what is changed is painted last
     assert palette.CHANGED_MARK.fill in {
@@ -118,7 +118,7 @@ def test_a_film_says_where_everybody_is_when() -> None:
     }
     assert (first, last) == (0, 60)
     poses = np.array(values, dtype=float).reshape(-1, 3).cumsum(axis=0)
-    motion = motion_of(replace(STREET, agents=(car,))).others[0].states[:STEPS]
+    motion = find_motion(replace(STREET, agents=(car,))).others[0].states[:STEPS]
     assert poses[:, :2] / 10.0 == pytest.approx(camera.to_pixels(motion[:, :2]), abs=0.051)
     turns = [
         wrap(-math.radians(turn) - heading)

@@ -9,7 +9,7 @@ import pytest
 from django.core import serializers
 from django.urls import reverse
 
-from arena.exports.formats import csv_of
+from arena.exports.formats import make_csv
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     VERSION,
@@ -106,7 +106,7 @@ def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
         page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab]))
         assert page.status_code == 200, tab
     results = snapshot.results
-    raters = csv_of(writers.RATERS, results.trust.raters)
+    raters = make_csv(writers.RATERS, results.trust.raters)
     files = {
         "pairs.csv": writers._pairs_csv(results),
         "types.csv": writers._types_csv(results),

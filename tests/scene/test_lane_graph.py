@@ -8,7 +8,7 @@ from augment.errors import UnknownName
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Lane, LaneConnector, Scene, TrafficSide, TurnType
-from augment.scene.lane_graph import LaneGraph, traffic_side_of, turn_type_of
+from augment.scene.lane_graph import LaneGraph, classify_turn, find_traffic_side
 from augment.variants.pose_tool import PoseTool
 from tests.scenes import EGO, curve, junction, scene
 
@@ -168,21 +168,21 @@ def arc(turn_rad: float) -> Polyline:
     ],
 )
 def test_a_line_turns_as_far_as_its_bends_together(turn_deg: float, turn_type: TurnType) -> None:
-    assert turn_type_of(arc(math.radians(turn_deg))) is turn_type
+    assert classify_turn(arc(math.radians(turn_deg))) is turn_type
 
 
 def test_people_drive_where_oncoming_lanes_are_on_the_other_side() -> None:
     lanes = scene().lanes
-    assert traffic_side_of(lanes) is TrafficSide.RIGHT
+    assert find_traffic_side(lanes) is TrafficSide.RIGHT
     mirrored = [
         replace(lane, centerline=Polyline(lane.centerline.points_m * np.array([1.0, -1.0])))
         for lane in lanes
     ]
-    assert traffic_side_of(mirrored) is TrafficSide.LEFT
+    assert find_traffic_side(mirrored) is TrafficSide.LEFT
 
 
 def test_a_one_way_street_does_not_tell() -> None:
-    assert traffic_side_of(curve().lanes) is None
+    assert find_traffic_side(curve().lanes) is None
 
 
 def route_of(where: Scene) -> EgoRoute:

@@ -19,13 +19,13 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficDensity,
 )
-from augment.scene.motion import MotionSource, motion_of
+from augment.scene.motion import MotionSource, find_motion
 from tests.formats.cells import recorded_street
 from tests.scenes import EGO, curve, junction, pedestrian, scene, vehicle
 
 
 def test_without_a_recording_people_hold_their_speed_along_the_lane() -> None:
-    motion = motion_of(curve())
+    motion = find_motion(curve())
     assert motion.ego.source is MotionSource.HELD_SPEED
     turned = motion.ego.states[60]  # 48 m on: 10 m straight, then 38 m of a circle of 40 m
     assert turned[2] == pytest.approx(38.0 / 40.0, abs=0.02)
@@ -36,7 +36,7 @@ def test_without_a_recording_people_hold_their_speed_along_the_lane() -> None:
 
 def test_past_the_map_the_ego_stands_and_others_are_gone() -> None:
     ahead = replace(vehicle("Agent2", 60.0, 0.0), speed_mps=10.0, lane_id="Lane2")
-    motion = motion_of(replace(junction(), agents=(ahead,)))
+    motion = find_motion(replace(junction(), agents=(ahead,)))
     assert motion.others[0].is_present.tolist() == [True] * 41 + [False] * 110
     assert motion.ego.is_present.all()
     assert motion.ego.states[-1, 3] == 0.0
@@ -44,10 +44,10 @@ def test_past_the_map_the_ego_stands_and_others_are_gone() -> None:
 
 def test_whoever_was_recorded_does_what_was_recorded_unless_moved() -> None:
     before, recording = recorded_street()
-    kept = motion_of(before, recording=recording, with_later=True)
+    kept = find_motion(before, recording=recording, with_later=True)
     assert [one.agent.id for one in kept.others] == ["Agent2", "Agent3"]
     assert kept.others[0].states[10, 0] == pytest.approx(30.0)
-    moved = motion_of(before, recording=recording, replaced=frozenset({"Agent2"}))
+    moved = find_motion(before, recording=recording, replaced=frozenset({"Agent2"}))
     assert [one.source for one in moved.others] == [MotionSource.HELD_SPEED]
 
 
@@ -59,7 +59,7 @@ def test_uneven_times_are_read_between_two_that_were_recorded() -> None:
         ego=recording.ego[::2],
         tracks=tuple(replace(one, states=one.states[::2]) for one in recording.tracks),
     )
-    motion = motion_of(before, recording=thin)
+    motion = find_motion(before, recording=thin)
     assert motion.ego.states[:, 0] == pytest.approx(8.0 * motion.times_s)
     assert motion.others[0].is_present.tolist() == [True] * 19 + [False] * 12
 
@@ -67,7 +67,7 @@ def test_uneven_times_are_read_between_two_that_were_recorded() -> None:
 def test_a_walk_starts_when_the_ego_is_near_and_ends_where_it_should() -> None:
     near = pedestrian("Agent2", 10.0, -3.0, (10.0, 6.0))
     far = replace(pedestrian("Agent3", 90.0, -3.0, (90.0, 6.0)), speed_mps=1.5)
-    motion = motion_of(scene(agents=(near, far)))
+    motion = find_motion(scene(agents=(near, far)))
     walk = motion.others[0].states
     assert walk[0].tolist()[:2] == [10.0, -3.0]
     assert walk[150, :2] == pytest.approx((10.0, 6.0))
@@ -80,7 +80,7 @@ def test_a_walk_starts_when_the_ego_is_near_and_ends_where_it_should() -> None:
 def test_nobody_sets_out_where_the_ego_never_comes() -> None:
     before = replace(scene(), ego=replace(scene().ego, speed_mps=0.0))
     far = pedestrian("Agent3", 90.0, -3.0, (90.0, 6.0))
-    assert motion_of(replace(before, agents=(far,))).others[0].stands
+    assert find_motion(replace(before, agents=(far,))).others[0].stands
 
 
 def two_way(speed_mps: float = 8.0) -> Scene:

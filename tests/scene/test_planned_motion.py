@@ -14,7 +14,7 @@ from augment.scene.codec import (
     scene_to_document,
 )
 from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
-from augment.scene.motion import MotionSource, Movement, motion_of
+from augment.scene.motion import MotionSource, Movement, find_motion
 from augment.scene.planned_motion import (
     AtPlace,
     AtTime,
@@ -55,7 +55,7 @@ def with_motion(
 
 
 def moved(base: Scene, agent: TrafficAgent) -> Movement:
-    return motion_of(replace(base, agents=(agent,))).others[0]
+    return find_motion(replace(base, agents=(agent,))).others[0]
 
 
 def test_a_car_cuts_in_when_the_ego_is_15_m_away() -> None:
@@ -114,7 +114,7 @@ def test_a_pedestrian_runs_out_once_the_trigger_fires(
     )
     walker = with_motion(pedestrian("Agent2", 40.0, -4.0), motion)
     other = replace(vehicle("Agent3", 10.0, 3.5), speed_mps=4.0, lane_id="Lane2")
-    walk = motion_of(replace(two_lanes(), agents=(walker, other))).others[0]
+    walk = find_motion(replace(two_lanes(), agents=(walker, other))).others[0]
     assert walk.started_s == (None if since_s is None else pytest.approx(since_s))
     if since_s is not None:
         steps = round(since_s / 0.1) + np.array([0, 10, 40, 60])

@@ -17,7 +17,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-from augment.scene.motion import Movement, motion_of
+from augment.scene.motion import Movement, find_motion
 from augment.scene.planned_motion import (
     AtPlace,
     AtTime,
@@ -71,7 +71,7 @@ def car(
 
 
 def driven(base: Scene, agent: TrafficAgent) -> Movement:
-    return motion_of(replace(base, agents=(agent,))).others[0]
+    return find_motion(replace(base, agents=(agent,))).others[0]
 
 
 def test_a_cut_in_takes_its_time_and_ends_in_the_egos_lane() -> None:
@@ -159,7 +159,7 @@ def test_who_runs_a_red_light_meets_the_ego_in_the_crossing() -> None:
     assert agent.motion.path == LanePath(lane_ids=("Lane8", "Connector1", "Lane9"))
     # 12 m at 3 m/s^2 up to 8 m/s: 2.67 s for 10.68 m, 1.32 m more at 8 m/s; the ego goes 22.4 m.
     assert agent.motion.start == AtPlace(x_m=40.0, y_m=0.0, within_m=22.4)
-    both = motion_of(replace(crossing(), agents=(agent,)))
+    both = find_motion(replace(crossing(), agents=(agent,)))
     apart = both.ego.states[:, :2] - both.others[0].states[:, :2]
     assert np.nanmin(np.hypot(*apart.T)) < 1.5
     with pytest.raises(CannotPlace, match="its light at Connector1 is green"):

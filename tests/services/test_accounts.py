@@ -4,7 +4,7 @@ import pytest
 from django.contrib.auth.models import Group, User
 from pytest_django import DjangoAssertNumQueries
 
-from arena.people.queries import AccountBackend, has_admin, role_of
+from arena.people.queries import AccountBackend, has_admin, top_role
 from arena.people.services import create_person
 
 pytestmark = pytest.mark.django_db
@@ -19,7 +19,7 @@ def test_an_account_comes_with_its_role_by_two_queries(
         found = AccountBackend().get_user(person.pk)
         assert found == person
         assert found is not None
-        assert role_of(found) == role
+        assert top_role(found) == role
 
 
 def test_of_several_roles_the_most_powerful_counts() -> None:
@@ -27,7 +27,7 @@ def test_of_several_roles_the_most_powerful_counts() -> None:
     person.groups.add(Group.objects.get_or_create(name="researcher")[0])
     found = AccountBackend().get_user(person.pk)
     assert found is not None
-    assert role_of(found) == "researcher"
+    assert top_role(found) == "researcher"
 
 
 def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:
@@ -36,7 +36,7 @@ def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:
     person.save()
     assert AccountBackend().get_user(person.pk) is None
     assert AccountBackend().get_user(person.pk + 1) is None
-    assert role_of(person) is None
+    assert top_role(person) is None
 
 
 def test_a_paused_admin_administrates_nothing() -> None:

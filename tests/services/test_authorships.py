@@ -7,7 +7,7 @@ from django.core.management import CommandError, call_command
 from arena.errors import NotYours
 from arena.models import Authorship, Study
 from arena.people.links import mark_author
-from arena.studies.queries import authors_of
+from arena.studies.queries import author_pairs
 from augment.errors import UnknownName
 from augment.models import Event
 from tests.study_rows import contestant, expert
@@ -26,7 +26,7 @@ def test_a_mark_says_who_made_it_and_when_and_so_does_the_log(study: Study, eva:
     assert (logged.actor, logged.object_code) == (actor, str(study.code))
     assert logged.after == {"expert": str(eva.person.code), "contestant": "ann"}
     assert logged.at >= row.marked_at
-    assert authors_of(study) == {(str(eva.person.code), "ann")}
+    assert author_pairs(study) == {(str(eva.person.code), "ann")}
 
 
 def test_only_who_and_what_takes_part_can_be_marked(study: Study, eva: User) -> None:
@@ -43,7 +43,7 @@ def test_taking_back_is_logged_and_doing_it_twice_changes_nothing_more(
 ) -> None:
     for is_author in (True, True, False, False):
         mark_author(study=study, expert=eva, contestant="ann", is_author=is_author)
-    assert authors_of(study) == frozenset()
+    assert author_pairs(study) == frozenset()
     assert [line.verb for line in Event.objects.filter(verb__in=ACTS).order_by("pk")] == [*ACTS]
 
 
@@ -51,9 +51,9 @@ def test_the_command_marks_and_takes_back(
     study: Study, eva: User, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call_command("mark_author", study.name, "eva", "ann")
-    assert authors_of(study) == {(str(eva.person.code), "ann")}
+    assert author_pairs(study) == {(str(eva.person.code), "ann")}
     call_command("mark_author", study.name, "eva", "ann", "--take-back")
-    assert authors_of(study) == frozenset()
+    assert author_pairs(study) == frozenset()
     assert capsys.readouterr().out.splitlines() == [
         "eva is marked as author of ann.",
         "eva is not marked as author of ann.",

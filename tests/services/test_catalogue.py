@@ -18,7 +18,7 @@ from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import NewScenario, add_scenario, reference_of
+from augment.services.scenarios.scenes import NewScenario, add_scenario, load_reference
 from tests.fixtures.shelf import FOLDER, HARD, MOVING
 from tests.intents import parked
 from tests.scenes import scene, vehicle
@@ -77,7 +77,7 @@ def test_a_folder_becomes_rows_and_lines_in_the_log(folder: Path) -> None:
     assert (scenario.slug, scenario.type) == ("parked-car", "nudge_around_parked_vehicle")
     assert scenario.in_catalogue
     assert scenario.base_scene.source == "authored"
-    assert reference_of(scenario) == PARKED.reference
+    assert load_reference(scenario) == PARKED.reference
     assert set(Event.objects.values_list("actor", "object_kind")) == {
         (ada.pk, "scene"),
         (ada.pk, "scenario"),

@@ -8,7 +8,7 @@ from augment.scene.codec import modification_to_document, recording_to_document
 from augment.scene.entities import Modification
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, Trigger
 from augment.services.judging.analyses import augmentation_lines
-from augment.services.judging.displacement import By, Group, Unmeasured, groups, of_job
+from augment.services.judging.displacement import By, Group, MissingReason, groups, of_job
 from augment.services.judging.metric_scores import metric_scores
 from tests.jobs import rows
 from tests.metrics.test_over_time import recorded_at, starts
@@ -69,9 +69,9 @@ def test_what_cannot_be_measured_says_why_and_counts_nowhere() -> None:
     Augmentation.objects.filter(pk=odd.pk).update(modification={})
     found = of_job(job)
     assert {one.row.scenario.slug: one.why_not for one in found} == {
-        "bare": Unmeasured.NO_REFERENCE,
-        "broken": Unmeasured.UNFINISHED,
-        "odd": Unmeasured.UNREADABLE_ROW,
+        "bare": MissingReason.NO_REFERENCE,
+        "broken": MissingReason.UNFINISHED,
+        "odd": MissingReason.UNREADABLE_ROW,
     }
     assert groups(found, by=By.TYPE) == []
 
@@ -120,4 +120,4 @@ def test_a_motion_that_its_scene_cannot_carry_is_not_measured() -> None:
         vehicle("Agent2", 30.0, 3.5), PlannedMotion(path=LanePath(lane_ids=("Lane9",)))
     )
     ended(job, one, rows.add_kind("ann"), change=Modification(added=(odd,)))
-    assert [found.why_not for found in of_job(job)] == [Unmeasured.UNFIT_MOTION]
+    assert [found.why_not for found in of_job(job)] == [MissingReason.UNFIT_MOTION]

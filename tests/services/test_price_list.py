@@ -3,14 +3,14 @@ from decimal import Decimal
 
 import pytest
 
-from augment.services.endpoints.known_models import listed_price
+from augment.services.endpoints.known_models import find_listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
 OPENAI = "https://api.openai.com/v1"
 
 
 def test_a_listed_model_has_a_price_and_a_source() -> None:
-    found = listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
+    found = find_listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
     assert found is not None
     price, source = found
     assert (price.prompt_usd, price.completion_usd) == (Decimal("2.5"), Decimal(10))
@@ -23,7 +23,8 @@ def test_a_price_is_that_of_its_day() -> None:
     google = "https://generativelanguage.googleapis.com/v1beta/openai"
     later = datetime(2027, 1, 2, tzinfo=UTC)
     prices = [
-        listed_price(base_url=google, model="gemini-3.8-flash", now=day) for day in (NOW, later)
+        find_listed_price(base_url=google, model="gemini-3.8-flash", now=day)
+        for day in (NOW, later)
     ]
     assert [found and found[0].prompt_usd for found in prices] == [Decimal("0.75"), Decimal("1.5")]
 
@@ -38,4 +39,4 @@ def test_a_price_is_that_of_its_day() -> None:
     ],
 )
 def test_what_is_not_listed_is_unknown(base_url: str, model: str) -> None:
-    assert listed_price(base_url=base_url, model=model, now=NOW) is None
+    assert find_listed_price(base_url=base_url, model=model, now=NOW) is None

@@ -13,7 +13,7 @@ from augment.errors import InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
 from augment.services.scenarios import uploads as upload_moments
-from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scene_imports import note_sentences
 from tests.formats.av2_logs import write_log
 
 pytestmark = pytest.mark.django_db
@@ -58,7 +58,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
         assert picture.read(4) == b"\x89PNG"
     assert moment.report is not None
     assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
-    assert any("limit" in note for note in notes_of(moment.report["notes"]))
+    assert any("limit" in note for note in note_sentences(moment.report["notes"]))
     upload_moments.ask_for_moment(row, item="", frame=2, slug="by-the-page", actor=ada)
     upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()

@@ -27,7 +27,7 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.lane_graph import LaneGraph
-from augment.simulation.drive import ExpertKind, expert_of, run
+from augment.simulation.drive import ExpertKind, find_expert, run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
 from augment.simulation.planning import IdmPlanner
 from augment.simulation.road import Road, find_route
@@ -116,7 +116,7 @@ def test_the_drive_ends_where_the_map_does_and_nobody_brakes_for_it() -> None:
     assert drive.at_map_end
     assert drive.boxes[-1, 0] + 2.588 == pytest.approx(40.0, abs=1.0)
     assert drive.states[:, 3].min() > 9.5
-    expert = expert_of(setting, drive.road)
+    expert = find_expert(setting, drive.road)
     assert score_drive(drive, expert).value == pytest.approx(1.0)
 
 
@@ -124,7 +124,7 @@ def test_the_expert_is_an_idm_drive_without_the_change() -> None:
     blocked = DriveSetting(
         scene=street(), modification=Modification(added=(vehicle("A", 20.0, 0.0),))
     )
-    expert = expert_of(blocked, Road(street()), steps=50)
+    expert = find_expert(blocked, Road(street()), steps=50)
     assert expert.kind is ExpertKind.IDM
     assert 40.0 < expert.progress_m < 50.0
 
@@ -164,7 +164,7 @@ def test_half_the_experts_speed_scores_alike_however_long_was_recorded() -> None
     for length_s in (3.0, 6.0, 8.0, 15.0):
         scene, recording = recorded_street(length_s)
         setting = DriveSetting(scene=scene, recording=recording)
-        expert = expert_of(setting, road)
+        expert = find_expert(setting, road)
         assert expert.progress_m == pytest.approx(120.0)
         drive = run(setting, ConstantSpeed(4.0), road=road)
         assert drive.outlasts_recording == (length_s < 15.0)
@@ -188,7 +188,7 @@ def test_by_interplans_rules_a_drive_lasts_30_s_or_until_the_recorded_ego_s_rear
         drive = run(setting, ConstantSpeed(speed_mps))
         lasts_s[name] = drive.duration_s
         duration_s = 15.0 if before is scene else 30.0
-        assert expert_of(setting, drive.road).progress_m == pytest.approx(8.0 * duration_s)
+        assert find_expert(setting, drive.road).progress_m == pytest.approx(8.0 * duration_s)
     assert (lasts_s["as ever"], lasts_s["slow"]) == pytest.approx((15.0, 30.0))
     # Its centre reaches 240 m less 1.461 m and 0.1 m, at 12 m/s after it got there from 8 m/s.
     assert drive.boxes[-2, 0] < 240.0 - 1.561 < drive.boxes[-1, 0]
@@ -211,7 +211,7 @@ def test_who_stands_stays_and_who_moves_goes_on_along_its_lane(reactive: bool) -
 def test_a_recording_of_one_moment_measures_by_an_idm_drive() -> None:
     scene, recording = recorded_street(0.0)
     setting = DriveSetting(scene=scene, recording=recording)
-    expert = expert_of(setting, Road(scene))
+    expert = find_expert(setting, Road(scene))
     assert expert.kind is ExpertKind.IDM
     assert len(run(setting, ConstantSpeed(4.0), steps=5).objects[-1]) == 2
 
@@ -221,12 +221,12 @@ def test_an_expert_who_stops_or_meets_the_end_of_the_map_goes_no_further() -> No
     stopped = recording.ego.copy()
     stopped[20:] = stopped[20]
     setting = DriveSetting(scene=scene, recording=replace(recording, ego=stopped))
-    assert expert_of(setting, Road(scene)).progress_m == pytest.approx(16.0)
+    assert find_expert(setting, Road(scene)).progress_m == pytest.approx(16.0)
     short = replace(scene, lanes=tuple(replace(lane) for lane in scene.lanes))
     road = Road(short)
     road.end_m = float(road.centreline.beside(np.array([[50.0, 0.0]]))[0][0])
     setting = DriveSetting(scene=short, recording=recording)
-    assert expert_of(setting, road).progress_m < 50.0
+    assert find_expert(setting, road).progress_m < 50.0
 
 
 @pytest.mark.realdata
@@ -239,7 +239,7 @@ def test_the_recorded_scene_is_driven_with_replayed_and_with_reactive_traffic(
     # The recorded ego turns left after 65 m; the straightest route would go on.
     ends = recording.ego[~np.isnan(recording.ego).any(axis=1)][[-1], :2]
     assert abs(road.centreline.beside(ends)[1][0]) < 2.0
-    expert = expert_of(setting, road)
+    expert = find_expert(setting, road)
     assert expert.kind is ExpertKind.RECORDED
     assert 60.0 < expert.progress_m < 80.0
     replayed, reactive = (

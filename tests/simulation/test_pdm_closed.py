@@ -28,8 +28,8 @@ from augment.simulation.states import (
     Kind,
     Objects,
     join_objects,
-    objects_of,
     start_state,
+    to_objects,
 )
 from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers
 from tests.fixtures.shelf import entry, shown_scene
@@ -46,7 +46,7 @@ def planner(**options: object) -> PdmClosed:
 
 def planned(agents: list[TrafficAgent], *, speed_mps: float = 8.0, **options: object) -> Plan:
     ego = start_state(street(speed_mps=speed_mps).ego, BODY)
-    situation = Situation(step=0, ego=ego, objects=objects_of(agents))
+    situation = Situation(step=0, ego=ego, objects=to_objects(agents))
     return planner(**options).plan(situation)
 
 
@@ -85,7 +85,7 @@ def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
     ],
 )
 def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: float) -> None:
-    judged = judged_among(states_along(np.full(41, 8.0))[None], objects_of(agents))
+    judged = judged_among(states_along(np.full(41, 8.0))[None], to_objects(agents))
     assert judged.parts["collision"].tolist() == [collision], what
 
 
@@ -105,7 +105,7 @@ def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: f
 def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
     y_m: float, speed: float, drivable: float, direction: float
 ) -> None:
-    judged = judged_among(states_along(np.full(41, speed), y_m=y_m)[None], objects_of([]))
+    judged = judged_among(states_along(np.full(41, speed), y_m=y_m)[None], to_objects([]))
     assert judged.parts["drivable"].tolist() == [drivable]
     assert judged.parts["direction"].tolist() == [direction]
 
@@ -113,13 +113,13 @@ def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
 def test_waiting_scores_more_than_overtaking_on_the_oncoming_lane() -> None:
     # At best half of everything against no progress, but time to collision and comfort in full.
     states = np.stack([states_along(np.zeros(41)), states_along(np.full(41, 1.2), y_m=3.5)])
-    judged = judged_among(states, objects_of([vehicle("A", 12.0, 0.0)]))
+    judged = judged_among(states, to_objects([vehicle("A", 12.0, 0.0)]))
     assert judged.scores == pytest.approx([7.0 / 12.0, 0.5])
 
 
 def test_progress_is_a_share_of_the_best_valid_one() -> None:
     states = np.stack([states_along(np.full(41, speed)) for speed in (2.0, 4.0, 8.0)])
-    parked = objects_of([vehicle("A", 30.0, 0.0)])  # 32 m are too far
+    parked = to_objects([vehicle("A", 30.0, 0.0)])  # 32 m are too far
     judged = judged_among(states, parked)
     assert judged.parts["collision"].tolist() == [1.0, 1.0, 0.0]
     assert judged.parts["progress"].tolist() == pytest.approx([0.5, 1.0, 0.0])
@@ -129,7 +129,7 @@ def test_progress_is_a_share_of_the_best_valid_one() -> None:
 def test_time_to_collision_looks_0_9_s_ahead_of_every_state(gap_m: float, ttc: float) -> None:
     states = states_along(np.full(41, 5.0))
     end_m = 20.0 + 2.588
-    parked = objects_of([vehicle("A", end_m + gap_m + 2.4, 0.0)])
+    parked = to_objects([vehicle("A", end_m + gap_m + 2.4, 0.0)])
     assert judged_among(states[None], parked).parts["ttc"].tolist() == [ttc]
 
 
@@ -141,7 +141,7 @@ def test_of_each_object_the_first_meeting_ahead_of_time_counts(from_m: float, tt
     rim = ((from_m, -3.0), (60.0, -3.0), (60.0, 6.0), (from_m, 6.0))
     area = Area(id="Area1", kind=AreaKind.INTERSECTION, boundary_m=rim)
     road = Road(replace(street(), areas=(area,)))
-    judged = judged_among(states_along(np.full(41, 5.0))[None], objects_of([crossing]), road)
+    judged = judged_among(states_along(np.full(41, 5.0))[None], to_objects([crossing]), road)
     assert judged.parts["ttc"].tolist() == [ttc]
 
 

@@ -15,7 +15,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-from augment.scene.motion import motion_of
+from augment.scene.motion import find_motion
 from augment.scene.planned_motion import NearEgo, PlannedMotion, PointPath
 from augment.scene.recording import Recording
 from augment.simulation.road import Road
@@ -100,7 +100,7 @@ def test_a_planned_motion_is_the_same_in_a_drive_as_without_one() -> None:
     )
     runner = replace(pedestrian("P", 50.0, -4.0), motion=motion)
     setting = with_agents(runner)
-    moves = motion_of(setting.after)
+    moves = find_motion(setting.after)
     driven = after(setting, 80, ego_speed_mps=setting.scene.ego.speed_mps)
     assert moves.others[0].started_s is not None
     for step in range(0, 81, 10):

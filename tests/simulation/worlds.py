@@ -20,7 +20,7 @@ from augment.simulation.states import (
     Objects,
     X,
     Y,
-    objects_of,
+    to_objects,
 )
 from tests.scenes import EGO, scene, vehicle
 
@@ -65,7 +65,7 @@ def driven(
 
 
 def rows(agents: Sequence[TrafficAgent], count: int) -> list[Objects]:
-    start = objects_of(agents)
+    start = to_objects(agents)
     return [replace(start, boxes=start.later(np.array(0.1 * step))) for step in range(count)]
 
 

@@ -4,10 +4,10 @@ import pytest
 
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.queries.votes import Filters, last_vote_id, vote_set
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
-from arena.studies.services.planning import rules_of
+from arena.studies.services.planning import frozen_rules
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
@@ -39,11 +39,11 @@ def pairs_shown(study: Study) -> set[frozenset[str]]:
 def test_pairs_within_the_tolerance_are_ties_that_nobody_sees() -> None:
     study = opened(show_alike=False)
     assert pairs_shown(study) == {frozenset({"ann", "cid"}), frozenset({"bob", "cid"})}
-    again = plan(rules_of(study))
+    again = plan(frozen_rules(study))
     assert len(again.matchups) == study.matchups.count()
     for matchup in study.matchups.all():
         vote(matchup, "left")
-    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
+    found = vote_set(study, filters=Filters(), last=last_vote_id(study))
     ties = [line for line in found.counted if line.kind == "automatic"]
     # Eva judged each of the eight pairs that can be shown once, so she ties each of the four.
     assert {(tie.left, tie.right, tie.outcome) for tie in ties} == {("ann", "bob", "equal")}

@@ -13,9 +13,9 @@ from arena.rating.board_table import table_from_document
 from arena.results.exports.board_files import board_folder
 from arena.results.services.boards import make_board, publish_table
 from arena.results.services.ratings import rate_now
-from arena.studies.queries import finished_scenarios, scenario_sources
+from arena.studies.queries import list_finished, scenario_sources
 from arena.studies.services.opening import cancel_study
-from arena.studies.services.planning import rules_of
+from arena.studies.services.planning import frozen_rules
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
@@ -149,7 +149,7 @@ def test_every_pair_of_a_batch_has_a_newcomer_and_old_answers_are_shown_again(
     }
     assert set(met.values()) == {4}
     assert json.loads(batch.preregistration)["rules"]["challengers"] == ["dot", "eli"]
-    assert rules_of(batch).challengers == ("dot", "eli")
+    assert frozen_rules(batch).challengers == ("dot", "eli")
 
 
 def test_a_later_batch_shows_old_answers_even_where_a_newcomers_job_has_others(
@@ -207,7 +207,7 @@ def test_a_board_over_a_benchmark_shows_just_its_test_split(board: Board) -> Non
     assert (table.benchmark, table.benchmark_sha256) == ("city@1", whole.checksum)
     sources = scenario_sources([])
     assert sources[f"benchmark:{part.code}"] == "Finished, test split of city@2"
-    finished = finished_scenarios(["ann", "bob"], f"benchmark:{part.code}")
+    finished = list_finished(["ann", "bob"], f"benchmark:{part.code}")
     assert sorted(finished) == ["place-1", "place-2"]
 
 

@@ -8,7 +8,7 @@ from django.utils import timezone
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
 from arena.people.services import create_person
-from arena.studies.queries import enrolled_voters, state_of
+from arena.studies.queries import list_voters, state_of
 from arena.studies.services.opening import close_study
 from arena.studies.services.taking_part import drop_silent, enrol, forget_identity, set_enrolment
 from augment.errors import Conflict
@@ -95,9 +95,9 @@ def test_who_read_an_older_text_reads_the_new_one_first(study: Study) -> None:
 
 def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
     voter = join(link(study), "w-1")
-    assert not enrolled_voters(study).get().is_done
+    assert not list_voters(study).get().is_done
     answer(study, voter, 6)
-    assert enrolled_voters(study).get().is_done
+    assert list_voters(study).get().is_done
     assert state_of(voter.enrolment)["done"] == 1
 
 
@@ -123,7 +123,7 @@ def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: S
     second = join(enrolment, "w-2")
     assert study.matchups.filter(expert=first.expert).count() == 2
     assert study.matchups.filter(expert=second.expert).count() == 6
-    told = enrolled_voters(study).get(expert=first.expert)
+    told = list_voters(study).get(expert=first.expert)
     assert (told.dropped_at, told.is_done) == (later, False)
 
 

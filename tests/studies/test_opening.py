@@ -7,7 +7,7 @@ from django.utils import timezone
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.studies.services.planning import rules_of
+from arena.studies.services.planning import frozen_rules
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
 from tests.opening import open_study
@@ -29,7 +29,7 @@ def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> Non
 
 def test_the_stored_rules_give_the_stored_plan_again() -> None:
     study = Study.objects.get(pk=a_study().pk)
-    planned = plan(rules_of(study))
+    planned = plan(frozen_rules(study))
     stored = study.matchups.order_by("expert__username", "position").values_list(
         "expert__username",
         "position",

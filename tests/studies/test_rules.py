@@ -3,7 +3,7 @@
 import pytest
 
 from arena.models import Study
-from arena.studies.services.planning import pictures_of, rules_of
+from arena.studies.services.planning import frozen_pictures, frozen_rules
 from arena.studies.services.taking_part import hand_over
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
@@ -64,16 +64,16 @@ def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
     study = a_study()
     old = ("entries", "experts", "votes_per_expert", "seed", "scenario_gap")
     study.rules = {name: study.rules[name] for name in old}
-    assert (rules_of(study).repeat_share, rules_of(study).checks) == (0.0, ())
+    assert (frozen_rules(study).repeat_share, frozen_rules(study).checks) == (0.0, ())
 
 
 def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:
     study = opened(with_checks(), votes=12, checks=25)
-    shown = {place for place, who in pictures_of(study) if who == "attention-check"}
+    shown = {place for place, who in frozen_pictures(study) if who == "attention-check"}
     assert len(shown) == 8
     for row in Augmentation.objects.filter(contestant__kind="check")[:4]:
         Augmentation.objects.filter(pk=row.pk).update(image=f"bev/1-new/{row.pk}.png")
-    kept = {place for place, who in pictures_of(study) if who == "attention-check"}
+    kept = {place for place, who in frozen_pictures(study) if who == "attention-check"}
     assert len(kept) == 4
     old = study.matchups.filter(expert__username="finn", kind="check")
     had = set(old.values_list("scenario__slug", flat=True))

@@ -5,7 +5,7 @@ import pytest
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.scenarios.services import redraw_pictures
-from arena.studies.services.planning import pictures_of, planned_so_far
+from arena.studies.services.planning import frozen_pictures, list_planned
 from arena.voting.queries.showings import VIEW_OF_OLD, view_shown
 from arena.voting.services.shown_pictures import find_frames
 from augment.models import Augmentation, Scenario
@@ -13,7 +13,12 @@ from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.running import runner
 from augment.services.running.by_hand import keep_correction
-from augment.services.scenarios.pictures import camera_of, original_picture, view_of, window_of
+from augment.services.scenarios.pictures import (
+    camera_key,
+    load_camera,
+    original_picture,
+    picture_view,
+)
 from tests.opening import open_study
 from tests.scenes import cone, pedestrian
 from tests.study_rows import cast_of
@@ -52,11 +57,11 @@ def test_pictures_of_two_windows_are_never_paired() -> None:
     look_otherwise("bob")
     for matchup in opened("redrawn", **cast).matchups.all():
         windows = {
-            window_of(name)
+            camera_key(name)
             for name in (matchup.left_image, matchup.right_image, matchup.original_image)
         }
-        assert windows == {camera_of(matchup.scenario).key}
-        assert view_shown(matchup) == view_of(camera_of(matchup.scenario))
+        assert windows == {load_camera(matchup.scenario).key}
+        assert view_shown(matchup) == picture_view(load_camera(matchup.scenario))
     assert not list(redraw_pictures())
 
 
@@ -70,7 +75,7 @@ def test_a_study_keeps_the_pictures_that_were_shown() -> None:
     assert [number for _, number in redraw_pictures()] == [2, 2]
     assert not Augmentation.objects.filter(image__regex=r"^bev/[^/]+$").exists()
     assert set(study.matchups.values_list("left_image", "right_image", "original_image")) == shown
-    assert {row.image for row in pictures_of(study).values()} == {
+    assert {row.image for row in frozen_pictures(study).values()} == {
         name for pair in shown for name in pair[:2]
     }
 
@@ -115,12 +120,14 @@ def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_o
     runner.AUGMENTATIONS.perform(row.pk)
 
     place.refresh_from_db()
-    assert camera_of(place).y_min_m <= -45.0
+    assert load_camera(place).y_min_m <= -45.0
     names = [place.original_image, *Augmentation.objects.values_list("image", flat=True)]
-    assert {window_of(name) for name in names} == {camera_of(place).key}
-    assert {picture.image for picture in pictures_of(study).values()} == set(shown[:2])
+    assert {camera_key(name) for name in names} == {load_camera(place).key}
+    assert {picture.image for picture in frozen_pictures(study).values()} == set(shown[:2])
     enlarged = study.matchups.get()
-    frame = find_frames(planned_so_far(study)["eva"], pictures_of(study), {place.slug: place}, {})
+    frame = find_frames(
+        list_planned(study)["eva"], frozen_pictures(study), {place.slug: place}, {}
+    )
     assert frame[place.slug].view == view_shown(enlarged)
     assert frame[place.slug].original_image == enlarged.original_image
     cast["contestants"] = ["reference", "by-hand"]

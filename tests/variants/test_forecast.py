@@ -12,7 +12,7 @@ from augment.llm.messages import Reply, Request
 from augment.variants.pipeline import EditTask, run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.respondents import ModelRole, RespondentClient
-from augment.variants.showing import CallRange, calls_of
+from augment.variants.showing import CallRange, call_ranges
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import known
 from tests.variants.memory import MemoryTranscript
@@ -54,7 +54,7 @@ def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
 @pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "vqa", "geo", "fc+tqa"])
 @pytest.mark.parametrize("character", [GOOD, STUBBORN, LOOPING], ids=["good", "stubborn", "loop"])
 def test_no_run_asks_less_or_more_often_than_said(variant: str, character: Character) -> None:
-    said = calls_of(RECIPES[variant])
+    said = call_ranges(RECIPES[variant])
     made = calls_made(variant, character)
     assert set(made) <= set(said)
     for role, count in made.items():
@@ -63,10 +63,10 @@ def test_no_run_asks_less_or_more_often_than_said(variant: str, character: Chara
 
 def test_the_calls_of_the_papers_variants() -> None:
     one = CallRange(least=1, usual=1, most=2)
-    assert calls_of(OTM) == {MODIFIER: one}
+    assert call_ranges(OTM) == {MODIFIER: one}
     # Eight calls, the ninth that is refused, the answer and its re-ask.
-    assert calls_of(FC) == {MODIFIER: CallRange(least=1, usual=2, most=11)}
+    assert call_ranges(FC) == {MODIFIER: CallRange(least=1, usual=2, most=11)}
     three_rounds = CallRange(least=1, usual=1, most=6)
-    assert calls_of(TQA) == {MODIFIER: three_rounds, REVIEWER: three_rounds}
+    assert call_ranges(TQA) == {MODIFIER: three_rounds, REVIEWER: three_rounds}
     twelve = CallRange(least=2, usual=2, most=12)
-    assert calls_of(VQA) == {MODIFIER: three_rounds, ENGINEER: twelve, VIEWER: three_rounds}
+    assert call_ranges(VQA) == {MODIFIER: three_rounds, ENGINEER: twelve, VIEWER: three_rounds}

@@ -10,7 +10,7 @@ from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
 from arena.jobs.exports.faults import COUNTS, FORMATS, fault_table
-from arena.jobs.queries import labelling_of, next_task
+from arena.jobs.queries import labelling_progress, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from augment.errors import Conflict
@@ -81,7 +81,7 @@ def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
     with pytest.raises(NotYours):
         save_label(expert=finn, task_code=tasks_of(labelling, eva)[0].code, faults=frozenset())
     with pytest.raises(NotYours):
-        labelling_of(expert=finn, code=labelling.code)
+        labelling_progress(expert=finn, code=labelling.code)
 
 
 def test_the_database_takes_one_label_per_expert_and_a_whole_guess(
@@ -124,7 +124,7 @@ def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(
         save(second)
     assert save(first, P) == label, "a replay of what was saved in time is no new label"
     assert next_task(labelling=labelling, expert=eva) is None
-    assert labelling_of(expert=eva, code=labelling.code).left == 0
+    assert labelling_progress(expert=eva, code=labelling.code).left == 0
     with pytest.raises(LabellingClosed):
         close_labelling(labelling=labelling)
     event = Event.objects.get(verb="close", object_kind="labelling")

@@ -8,11 +8,11 @@ from django.test.utils import CaptureQueriesContext
 
 from arena.errors import AlreadyDecided, InvalidVote
 from arena.models import Study, Vote
-from arena.results.exports.votes import unrated_votes
+from arena.results.exports.votes import list_unrated
 from arena.results.queries.access import ready_snapshots
-from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.queries.votes import Filters, last_vote_id, vote_set
 from arena.results.services.ratings import rate_now
-from arena.studies.queries import progress_of
+from arena.studies.queries import count_progress
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import own_votes, tallies, upcoming, voting_progress
 from augment.errors import Conflict, UnknownName
@@ -40,7 +40,7 @@ def test_a_pair_comes_until_its_last_question_is_answered() -> None:
     assert seen == [([asked, ASKED[0]], 0, 2) for asked in ASKED]
     (left,) = upcoming(study=study, expert=first.expert, n=2)
     assert (left, left.asked) == (second, ASKED[0])
-    (line,), (tally, _) = progress_of([study], first.expert), tallies(study)
+    (line,), (tally, _) = count_progress([study], first.expert), tallies(study)
     progress = voting_progress(study=study, expert=first.expert)
     for one in (line, tally, progress):
         assert (one.voted, one.skipped, one.left) == (1, 0, 1)
@@ -83,14 +83,14 @@ def test_a_skip_ends_the_pair_and_its_other_answers_do_not_count() -> None:
     assert upcoming(study=study, expert=matchup.expert, n=1) == []
     progress = voting_progress(study=study, expert=matchup.expert)
     assert (progress.voted, progress.skipped, progress.left) == (0, 1, 0)
-    frozen = last_vote_of(study)
+    frozen = last_vote_id(study)
     of_instruction = Filters(question="instruction")
     assert vote_set(study, filters=of_instruction, last=frozen).left_out == {"skip": 1}
     vote(matchup, supersedes=skip.key)
     (again,) = upcoming(study=study, expert=matchup.expert, n=1)
     assert again.asked == "difficulty"
     assert vote_set(study, filters=of_instruction, last=frozen).left_out == {"skip": 1}
-    assert len(vote_set(study, filters=of_instruction, last=last_vote_of(study)).counted) == 1
+    assert len(vote_set(study, filters=of_instruction, last=last_vote_id(study)).counted) == 1
 
 
 def test_each_question_has_a_rating_of_its_own_votes() -> None:
@@ -102,7 +102,7 @@ def test_each_question_has_a_rating_of_its_own_votes() -> None:
     close_study(study=study)
     study.refresh_from_db()
     for question, outcome in outcomes.items():
-        found = vote_set(study, filters=Filters(question=question), last=last_vote_of(study))
+        found = vote_set(study, filters=Filters(question=question), last=last_vote_id(study))
         assert {one.outcome for one in found.counted} == {outcome}
         assert (len(found.counted), found.left_out, len(found.repeats)) == (6, {"repeat": 1}, 1)
     usual, other = (
@@ -114,7 +114,7 @@ def test_each_question_has_a_rating_of_its_own_votes() -> None:
     assert [usual.results.trust.tie_share, other.results.trust.tie_share] == [0.0, 1.0]
     with pytest.raises(UnknownName, match="beauty"):
         rate_now(study=study, filters=Filters(question="beauty"))
-    rows = unrated_votes(study).rows
+    rows = list_unrated(study).rows
     assert [row[-1] for row in rows].count("instruction") == 7
 
 
@@ -125,7 +125,7 @@ def test_checks_are_judged_by_the_primary_question_alone() -> None:
         row.save()
         for question in ASKED:
             vote(row, "left" if question == "realism" else "right", question=question)
-    found = vote_set(study, filters=Filters(question="difficulty"), last=last_vote_of(study))
+    found = vote_set(study, filters=Filters(question="difficulty"), last=last_vote_id(study))
     assert [one.question for one in found.checks] == ["realism", "realism"]
     assert found.left_out == {"check": 2}
 

@@ -14,7 +14,7 @@ from arena.voting.queries.showings import as_shown
 from augment.models import Augmentation, Scenario
 from augment.render.bev import draw, draw_empty
 from augment.render.camera import camera_for
-from augment.render.film import film_of
+from augment.render.film import make_film
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import AgentType, Modification
 from augment.scene.planned_motion import AtTime, PlannedMotion
@@ -120,6 +120,6 @@ def test_a_moving_pair_of_a_busy_street_takes_less_than_300_kb(realdata: Path) -
     change = Modification(moved=tuple(replace(car, motion=motion) for car in cars))
     camera = camera_for(scene, change, recording=recording)
     side = len(draw(scene, change, camera, recording))
-    side += len(film_of(scene, change, camera, recording, keeps_traffic=True))
+    side += len(make_film(scene, change, camera, recording, keeps_traffic=True))
     before = len(draw(scene, Modification(), camera, recording))
     assert 2 * side + before + len(draw_empty(scene, camera)) < 300_000

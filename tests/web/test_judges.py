@@ -10,7 +10,7 @@ from django.urls import reverse
 from pytest_django import DjangoCaptureOnCommitCallbacks
 
 from arena.models import Matchup, Study, Vote
-from arena.results.queries.judges import judge_preferences, judged_pairs, models_of
+from arena.results.queries.judges import judge_preferences, list_judged_pairs, list_models
 from arena.results.services.ratings import rate_now
 from arena.studies.services.opening import close_study
 from augment import tasks
@@ -126,7 +126,7 @@ def test_no_rating_counts_a_judge_and_each_pair_is_asked_about_once(
     study: Study, endpoint: Endpoint, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before, votes = rate_now(study=study, rounds=50, seed=1), Vote.objects.count()
-    pairs = judged_pairs(study, "instruction")
+    pairs = list_judged_pairs(study, "instruction")
     shown = {frozenset(pair) for pair in Matchup.objects.values_list("left", "right")}
     assert sorted(map(sorted, shown)) == sorted(sorted(pair[:2]) for pair in pairs)
     call_command("judge_study", study.name, endpoint="stand-in", model="fake-good")
@@ -168,6 +168,6 @@ def test_preferences_come_with_and_without_the_judges_own_family(
 def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:
     asking = Contestant(model="gpt-4o", roles={"viewer": {"endpoint": "e", "model": "gemini"}})
     sent = Contestant(kind="submission", card={"models": ["Llama 3.1"]})
-    assert [models_of(row) for row in (asking, sent, Contestant())] == [
+    assert [list_models(row) for row in (asking, sent, Contestant())] == [
         *(["gpt-4o", "gemini"], ["Llama 3.1"], [])
     ]

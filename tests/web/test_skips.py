@@ -6,7 +6,7 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena.studies.queries import progress_of
+from arena.studies.queries import count_progress
 from arena.voting.queries.ballots import tallies, voting_progress
 from tests import study_rows
 from tests.web.ballots import page
@@ -25,8 +25,8 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
     study_rows.vote(before.matchup, "skip", reason="other", supersedes=before.key)
 
     def counted() -> tuple[object, ...]:
-        (line,), eva = progress_of([study]), tallies(study)[0]
-        (own,) = progress_of([study], first.expert)
+        (line,), eva = count_progress([study]), tallies(study)[0]
+        (own,) = count_progress([study], first.expert)
         return (
             (line.voted, line.skipped, line.left),
             (eva.voted, eva.skipped, eva.left),

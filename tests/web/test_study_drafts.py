@@ -12,7 +12,7 @@ from django.urls import reverse
 from arena.models import Study, StudyDraft
 from arena.pairing.plan import plan
 from arena.studies.services.drafts import keep_draft
-from arena.studies.services.planning import rules_of
+from arena.studies.services.planning import frozen_rules
 from arena.studies.services.taking_part import forget_identity
 from tests import study_rows
 from tests.opening import open_study
@@ -178,6 +178,6 @@ def test_the_settings_of_a_study_open_another_that_is_planned_the_same(admin: Cl
     apart = {"jobs", "replays"}
     kept = [{k: v for k, v in one.rules.items() if k not in apart} for one in (first, second)]
     assert kept[0] == kept[1]
-    assert plan(rules_of(first)) == plan(rules_of(second))
+    assert plan(frozen_rules(first)) == plan(frozen_rules(second))
     for name in ("allow_both_miss", "allow_replay", "practice", "allow_simulated"):
         assert getattr(first, name) == getattr(second, name), name

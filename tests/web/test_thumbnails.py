@@ -14,7 +14,7 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.render.canvas import shrink_png
 from augment.scene.entities import Modification
-from augment.services.scenarios.pictures import store, thumbnail_of
+from augment.services.scenarios.pictures import shrink, store
 from tests import scenes
 from tests.buckets import Bucket, bucket
 from tests.jobs.rows import add_scenario
@@ -44,15 +44,15 @@ def read(name: str) -> bytes:
 
 def test_a_thumbnail_is_made_once(picture: bytes) -> None:
     name = store(picture)
-    small = thumbnail_of(name, 400)
+    small = shrink(name, 400)
     assert read(small) == shrink_png(picture, 400)
     default_storage.delete(name)
-    assert thumbnail_of(name, 400) == small
-    assert thumbnail_of(name, 800) == ""
+    assert shrink(name, 400) == small
+    assert shrink(name, 800) == ""
 
 
 def test_thumbnails_lie_in_the_bucket_with_the_pictures(picture: bytes, there: Bucket) -> None:
-    small = thumbnail_of(store(picture), 400)
+    small = shrink(store(picture), 400)
     assert read(small) == shrink_png(picture, 400)
     assert f"arena/{small}" in there.names()
 

@@ -1,1 +1,1 @@
-"""How dates and numbers look: the day before the month, and numbers as in the paper's tables."""
+"""Formats of dates and numbers: the day before the month, and numbers as in the paper's tables."""

@@ -13,11 +13,11 @@ from arena.exports.formats import (
     Sheet,
     drawings,
     join_numbers,
-    sheet_of,
+    make_sheet,
     table_formats,
 )
 from arena.results.exports.drawing import MARK, draw_once, house_style, name_lines, write_figure
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     HORIZON_S,
@@ -25,7 +25,7 @@ from augment.services.judging.displacement import (
     By,
     Group,
     groups,
-    objects_of,
+    list_objects,
     of_job,
 )
 from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
@@ -71,27 +71,27 @@ class DisplacementTable:
 
     @property
     def simulated(self) -> bool:
-        """Whether a contestant in it is simulated."""
+        """True if one of its contestants is simulated."""
         return any(group.contestant.is_simulated for group in self.groups)
 
     @property
     def moves(self) -> bool:
-        """Whether something moves in it."""
+        """True if an object moves in it."""
         return any(group.summary.over_time for group in self.groups)
 
     @property
     def has_follow_ups(self) -> bool:
-        """Whether anything was to be left alone."""
+        """True if anything was to be left alone."""
         return any(group.kept for group in self.groups)
 
     @property
     def columns(self) -> int:
-        """How many columns a page shows."""
+        """Number of columns that a page shows."""
         return 7 + 3 * self.moves + 2 * self.has_follow_ups
 
     @property
     def types_text(self) -> str:
-        """Which scenario types count, in words."""
+        """Scenario types that count, in words."""
         if self.types == tuple(ScenarioType):
             return "All five scenario types"
         if len(self.types) > MOST_NAMED:
@@ -137,7 +137,7 @@ KEPT: Columns = {
 
 GROUPS: Columns = {
     "group": ("heading", Dtype.TEXT),
-    "contestant": (lambda group: shown_name(group.contestant), Dtype.TEXT),
+    "contestant": (lambda group: show_name(group.contestant), Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("contestant.is_simulated", Dtype.YES_NO),
     **Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
@@ -167,7 +167,7 @@ def group_sheet(table: DisplacementTable) -> Sheet:
     columns: Columns = {**GROUPS, "types": (lambda group: types, Dtype.TEXT)}
     if table.moves:
         columns = {**columns, **OVER_TIME}
-    return sheet_of(
+    return make_sheet(
         table.groups, columns, name="displacement", key="groups", number=".3f", facts=facts
     )
 
@@ -203,10 +203,10 @@ MATCHES_OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="
 
 def object_sheet(job: GenerationJob) -> Sheet:
     """Return the displacement of a job with one row an object."""
-    name, objects = "displacement-objects", list(objects_of(job))
+    name, objects = "displacement-objects", list(list_objects(job))
     moves = any(one["match"] and one["match"].average_m is not None for one in objects)
     columns = {**OBJECTS, **MATCHES_OVER_TIME} if moves else OBJECTS
-    return sheet_of(objects, columns, name=name, key="objects", number=".4f")
+    return make_sheet(objects, columns, name=name, key="objects", number=".4f")
 
 
 # --- Box plots ---------------------------------------------------------------------------------
@@ -259,8 +259,8 @@ def _stats(group: Group) -> dict[str, Any]:
 
 
 def _name(table: DisplacementTable, group: Group) -> str:
-    """Return what a box is called: its group, and how many objects it stands for."""
-    name = shown_name(group.contestant)
+    """Return the label of a box: its group, and its number of objects."""
+    name = show_name(group.contestant)
     heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
     summary = group.summary
     counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}

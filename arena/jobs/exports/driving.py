@@ -3,10 +3,10 @@
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, escape, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
 from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
 
@@ -42,8 +42,8 @@ def driving_notes(table: DrivingScores) -> list[str]:
     return [*(note for note, holds in notes.items() if holds), *failed]
 
 
-def shown_driving(table: DrivingScores) -> dict[str, Any]:
-    """Return what pages need of the table."""
+def driving_context(table: DrivingScores) -> dict[str, Any]:
+    """Return the table of drives as pages show it."""
     labels = dict(type_choices())
     return {
         "table": table,
@@ -59,12 +59,12 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _percent_of(kind: str, line: DrivingLine) -> float | None:
+def _to_percent(kind: str, line: DrivingLine) -> float | None:
     return _percent(line.by_type[kind])
 
 
 COLUMNS: Columns = {
-    "scenarios": (shown_name, Dtype.TEXT),
+    "scenarios": (show_name, Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("is_simulated", Dtype.YES_NO),
     "score_percent": (lambda line: _percent(line.mean), Dtype.NUMBER),
@@ -84,7 +84,7 @@ def driving_sheet(table: DrivingScores) -> Sheet:
     driven = (kind for line in table.lines for kind in line.by_type)
     kinds = in_type_order([*ScenarioType, *driven])
     types: Columns = {
-        f"{kind}_percent": (partial(_percent_of, kind), Dtype.NUMBER) for kind in kinds
+        f"{kind}_percent": (partial(_to_percent, kind), Dtype.NUMBER) for kind in kinds
     }
     facts = {
         "title": table.title,
@@ -95,13 +95,13 @@ def driving_sheet(table: DrivingScores) -> Sheet:
         "notes": driving_notes(table),
     }
     columns: Columns = {**COLUMNS, **types}
-    return sheet_of(table.lines, columns, name="driving", key="lines", number=".2f", facts=facts)
+    return make_sheet(table.lines, columns, name="driving", key="lines", number=".2f", facts=facts)
 
 
 def driving_latex(table: DrivingScores) -> bytes:
     """Return the paper's table with a second column for the scenes before the change."""
     columns: ValueColumns = {
-        "Scenarios": shown_name,
+        "Scenarios": show_name,
         "Mean Driving Score [%]": lambda line: _percent(line.mean),
         "n": lambda line: line.drives,
         "Before [%]": lambda line: _percent(line.before),

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from django.db.models import Count, Q
 
-from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, latex_values
 from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
 
@@ -92,7 +92,7 @@ COLUMNS: Columns = {
 
 def fault_sheet(table: FaultTable) -> Sheet:
     """Return one row a contestant; counts are empty where nothing was labelled."""
-    return sheet_of(table.lines, COLUMNS, name="faults", facts={"job": table.job})
+    return make_sheet(table.lines, COLUMNS, name="faults", facts={"job": table.job})
 
 
 def fault_latex(table: FaultTable) -> bytes:
@@ -103,8 +103,8 @@ def fault_latex(table: FaultTable) -> bytes:
     comments = [f"{table.job}: {table.labels} labels"]
     comments += [
         f"{line['fault']}: Cohen's kappa of the checks' first guess and the experts "
-        f"{_printed(line['kappa'])} (n={line['n']}), Krippendorff's alpha of the experts among "
-        f"themselves {_printed(line['alpha'])} (pictures={line['pictures']})"
+        f"{_format(line['kappa'])} (n={line['n']}), Krippendorff's alpha of the experts among "
+        f"themselves {_format(line['alpha'])} (pictures={line['pictures']})"
         for line in table.agreement
     ]
     columns: ValueColumns = {
@@ -128,7 +128,7 @@ def _line(
     counted = len(labelled) + missed
     return {
         "name": who.name,
-        "shown_name": shown_name(who),
+        "shown_name": show_name(who),
         "slug": who.slug,
         "is_simulated": who.is_simulated,
         "all": sum(seen.values()) + missed if counted else None,
@@ -167,5 +167,5 @@ def _agreement(
     }
 
 
-def _printed(value: float | None) -> str:
+def _format(value: float | None) -> str:
     return "undefined" if value is None else f"{value:.2f}"

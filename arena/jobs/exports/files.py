@@ -17,8 +17,8 @@ from arena.results.services.vote_files import describe_files
 from arena.results.services.written_files import FileWork, MadeFile
 from arena.studies.services.opening import product_version
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.scenario_export import Exported, export_job
-from augment.services.running.transcript_records import record_of, tries_by_augmentation
+from augment.services.judging.scenario_export import Archive, export_job
+from augment.services.running.transcript_records import make_record, tries_by_augmentation
 
 MANIFEST = "manifest.json"
 WARNING = "WARNING.txt"
@@ -26,7 +26,7 @@ WRITTEN_WITH = ("numpy", "scenariogeneration", "shapely", "PyYAML")
 """What the bytes of the files depend on besides our own code."""
 
 
-def scenario_zip(exported: Exported) -> bytes:
+def scenario_zip(exported: Archive) -> bytes:
     """The zip; the same rows always give the same bytes."""
     files = dict(exported.written.files)
     if exported.warnings:
@@ -38,7 +38,7 @@ def scenario_zip(exported: Exported) -> bytes:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
+def _manifest(exported: Archive, files: dict[str, bytes]) -> bytes:
     written = exported.written
     document = {
         "format": "scenario-arena/scenarios",
@@ -66,13 +66,13 @@ class ScenarioFiles(FileWork[ScenarioFile]):
     def make(self, row: ScenarioFile, folder: Path) -> MadeFile:
         """Return all scenarios of the job in the format."""
         exported = export_job(row.job, file_format=row.format)
-        return made_of(exported, slugify(row.job.name) or str(row.job.code))
+        return pack_scenarios(exported, slugify(row.job.name) or str(row.job.code))
 
 
 SCENARIO_FILES = ScenarioFiles()
 
 
-def made_of(exported: Exported, slug: str) -> MadeFile:
+def pack_scenarios(exported: Archive, slug: str) -> MadeFile:
     """Return scenarios as a zip; its name marks data that must not be used commercially."""
     marked = any(source.is_non_commercial for source in exported.sources)
     return MadeFile(
@@ -96,7 +96,7 @@ def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
         tries = tries_by_augmentation(part)
         chosen = rows.filter(pk__in=part)
         for row in chosen.select_related("job", "scenario", "contestant__endpoint"):
-            record = record_of(row, tries.get(row.pk, []))
+            record = make_record(row, tries.get(row.pk, []))
             record["images"] = sorted(record["images"])
             yield (json.dumps(record, ensure_ascii=False) + "\n").encode()
 

@@ -3,10 +3,10 @@
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from augment.models import GenerationJob
 from augment.services.judging.realism import (
     RANDOM_DRAWS,
@@ -35,8 +35,8 @@ def realism_notes(table: RealismTable) -> list[str]:
     return [note for note, holds in notes.items() if holds]
 
 
-def shown_realism(job: GenerationJob) -> dict[str, Any]:
-    """Return what the job's page needs: the answer in a sentence, and the table."""
+def realism_context(job: GenerationJob) -> dict[str, Any]:
+    """Return the answer in a sentence and the table, as the job's page shows them."""
     table = realism_of_job(job)
     return {
         "answer": answer_in_words(table),
@@ -54,7 +54,7 @@ def answer_in_words(table: RealismTable) -> str:
         return "No contestant placed anything that could be judged."
     recorded = "--" if best.recorded is None else f"{best.recorded:.2f}"
     return (
-        f"The most realistic is {shown_name(best)} with {best.mean:.2f} over {best.changes} "
+        f"The most realistic is {show_name(best)} with {best.mean:.2f} over {best.changes} "
         f"changes; recorded traffic has {recorded} in the same scenes."
     )
 
@@ -65,7 +65,7 @@ def _score(name: str, line: RealismLine) -> float | None:
 
 COLUMNS: Columns = {
     "row": ("subject", Dtype.TEXT),
-    "name": (shown_name, Dtype.TEXT),
+    "name": (show_name, Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("is_simulated", Dtype.YES_NO),
     "realism": ("mean", Dtype.NUMBER),
@@ -84,13 +84,13 @@ def realism_sheet(table: RealismTable) -> Sheet:
         "notes": realism_notes(table),
     }
     columns: Columns = {**COLUMNS, "version": (lambda line: table.version, Dtype.WHOLE)}
-    return sheet_of(table.lines, columns, name="realism", key="lines", number=".4f", facts=facts)
+    return make_sheet(table.lines, columns, name="realism", key="lines", number=".4f", facts=facts)
 
 
 def realism_latex(table: RealismTable) -> bytes:
     """Return the same as a LaTeX table."""
     columns: ValueColumns = {
-        "Changes": shown_name,
+        "Changes": show_name,
         "Realism": lambda line: line.mean,
         "Recorded there": lambda line: line.recorded,
         **{name.capitalize(): partial(_score, name) for name in SCORES},

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arena.exports.formats import Columns, Dtype, Sheet, drawings, sheet_of, table_formats
+from arena.exports.formats import Columns, Dtype, Sheet, drawings, make_sheet, table_formats
 from arena.results.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
-from augment.services.judging.thresholds import SweepResult, driver_of
+from augment.services.judging.thresholds import SweepResult, driver_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +20,7 @@ _KEPT = "#a35a00"
 def sweep_sheet(result: SweepResult) -> Sheet:
     """Return one row a drive, and one for a value that fits nowhere."""
     lines = [
-        {"line": line, "drive": drive, "driver": drive and driver_of(drive), "lawful": is_lawful}
+        {"line": line, "drive": drive, "driver": drive and driver_name(drive), "lawful": is_lawful}
         for line in result.lines
         for drive, is_lawful in line.cells or [(None, None)]
     ]
@@ -37,12 +37,12 @@ def sweep_sheet(result: SweepResult) -> Sheet:
     facts = {
         "scenario": sweep.scenario.slug,
         "number": sweep.number,
-        "tested": driver_of(sweep),
+        "tested": driver_name(sweep),
         "reactive": sweep.is_reactive,
         "verdict": result.verdict,
         "hardest_solved": None if result.hardest is None else result.hardest.value,
     }
-    return sheet_of(lines, columns, name="sweep", digits=6, facts=facts)
+    return make_sheet(lines, columns, name="sweep", digits=6, facts=facts)
 
 
 def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
@@ -56,7 +56,7 @@ def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
             axes.axvspan(min(good, bad), max(good, bad), color=MARK, alpha=0.15, linewidth=0)
         if result.hardest is not None:
             axes.axvline(result.hardest.value, color=_KEPT, label="hardest solved")
-        tested = driver_of(result.sweep)
+        tested = driver_name(result.sweep)
         others = [driver for driver in result.drivers if driver != tested]
         for driver, stroke in zip(others, ("--", ":", "-."), strict=False):
             _draw_curve(axes, result, driver, SOFT, stroke)

@@ -5,15 +5,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, sheet_of
+from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, make_sheet
 from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
 from augment.services.judging.analyses import (
     ANALYSES,
     SEED,
-    answers_of,
     augmentation_lines,
+    read_answers,
     repeatability,
 )
 from augment.services.judging.displacement import By
@@ -24,7 +24,7 @@ from augment.services.running.progress import tool_calls
 
 
 def _count(name: str) -> Callable[[Any], int | None]:
-    """Return what counts matched, missing or surplus objects of a line."""
+    """Return a function that counts matched, missing or surplus objects of a line."""
 
     def count(line: Any) -> int | None:
         return None if line.displacement is None else len(getattr(line.displacement, name))
@@ -110,25 +110,25 @@ def augmentation_sheet(job: GenerationJob) -> Sheet:
     if any(line.displacement and line.displacement.over_time for line in lines):
         columns = {**columns, **OVER_TIME}
     columns = {**columns, "sends": (lambda line: _json(line.row.contestant.sends), Dtype.TEXT)}
-    return sheet_of(lines, columns, name=name, key=name)
+    return make_sheet(lines, columns, name=name, key=name)
 
 
 def repeat_sheet(job: GenerationJob) -> Sheet:
-    """Return what varies between the samples of a job, one row a contestant."""
-    return sheet_of(repeatability(job), REPEATS, digits=6, name="repeats", key="repeats")
+    """Return the variation between the samples of a job, one row a contestant."""
+    return make_sheet(repeatability(job), REPEATS, digits=6, name="repeats", key="repeats")
 
 
 def tool_call_sheet(job: GenerationJob) -> Sheet:
     """Return the calls of a job's contestants to their function, one row an augmentation."""
     lines = tool_calls(job)
-    return sheet_of(lines, TOOL_CALLS, name="tool-calls", key="augmentations")
+    return make_sheet(lines, TOOL_CALLS, name="tool-calls", key="augmentations")
 
 
 def analysis_sheet(job: GenerationJob, *, part: str) -> Sheet:
     """Return one part of a job's analysis; its bootstrap has a seed, which JSON names."""
-    lines, facts = ANALYSES[part](answers_of(job)), {"part": part, "seed": SEED}
+    lines, facts = ANALYSES[part](read_answers(job)), {"part": part, "seed": SEED}
     columns = ANALYSIS_COLUMNS[part]
-    return sheet_of(lines, columns, digits=6, name="analysis", number="g", facts=facts)
+    return make_sheet(lines, columns, digits=6, name="analysis", number="g", facts=facts)
 
 
 JOB_TABLES = {

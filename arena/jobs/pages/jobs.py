@@ -9,11 +9,11 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
-from arena.jobs.exports.realism import shown_realism
+from arena.jobs.exports.realism import realism_context
 from arena.jobs.pages.measures import ask_to_measure, displacement_section, driving_section
 from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.site.forms import CapsForm
 from arena.site.listing import choice_asked, page_asked, read_listing, read_page, search_asked
@@ -44,7 +44,7 @@ def jobs_page(request: HttpRequest) -> HttpResponse:
     rows = GenerationJob.objects.select_related("launched_by__person")
     rows = listing.narrow(rows, "name", by=["state"]).order_by("-created_at", "-pk")
     if listing.chosen("by"):
-        rows = rows.filter(launched_by=user_of(request))
+        rows = rows.filter(launched_by=get_user(request))
     page = read_page(request, rows, size=JOBS_AT_ONCE)
     counted = progress.count_each(list(page.object_list))
     context: Context = {"jobs": counted, "page": page, "listing": listing}
@@ -58,7 +58,7 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
     """Show one part of a job; without a name the one that answers first."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
     counts = progress.count_rows(job)
-    tabs = _tabs_of(counts)
+    tabs = _list_tabs(counts)
     shown = tab or _first_tab(counts, tabs)
     if shown not in TABS:
         raise Http404
@@ -79,7 +79,7 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
     return render(request, "jobs/job.html", context)
 
 
-def _tabs_of(counts: JobCounts) -> list[str]:
+def _list_tabs(counts: JobCounts) -> list[str]:
     """Return the names of the parts that have something to show."""
     job, left_out = counts.job, set()
     if not any(counts.by_state[state] for state in progress.GROUPED):
@@ -135,7 +135,7 @@ TABS: dict[str, tuple[str, Callable[[HttpRequest, JobCounts], Context]]] = {
     "failures": ("Failures", _show_failures),
     "money": ("Money", lambda _request, counts: {"unpriced": count_unpriced(counts.job)}),
     "displacement": ("Displacement", _show_displacement),
-    "realism": ("Realism", lambda _asked, of: {"realism": shown_realism(of.job)}),
+    "realism": ("Realism", lambda _asked, of: {"realism": realism_context(of.job)}),
     "driving": ("Driving", lambda asked, of: {"driving": driving_section(asked, of.job)}),
     "files": ("Files", _show_files),
 }
@@ -148,7 +148,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> None:
     """Queue again what failed."""
     job = get_object_or_404(GenerationJob, code=code)
     with transaction.atomic():
-        jobs.retry_failed(job=job, actor=user_of(request))
+        jobs.retry_failed(job=job, actor=get_user(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What failed is queued again.")
 
@@ -157,7 +157,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> None:
 def pause_job(request: HttpRequest, code: uuid.UUID) -> None:
     """Start nothing new; what is in flight ends."""
     job = get_object_or_404(GenerationJob, code=code)
-    jobs.pause(job, actor=user_of(request))
+    jobs.pause(job, actor=get_user(request))
     messages.success(request, "Paused: nothing new is started; what is in flight ends.")
 
 
@@ -170,7 +170,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> None:
         messages.error(request, "A cap is a number; nothing was changed.")
         return
     with transaction.atomic():
-        jobs.resume(job, higher=read_request(Caps, form.cleaned_data), actor=user_of(request))
+        jobs.resume(job, higher=read_request(Caps, form.cleaned_data), actor=get_user(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What is left is queued again.")
 
@@ -181,7 +181,7 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     if is_sure(request):
         with refusals_told(request):
-            jobs.cancel(job=job, actor=user_of(request))
+            jobs.cancel(job=job, actor=get_user(request))
             messages.success(request, "Cancelled. What is done stays.")
     elif job.state in jobs.OPEN:
         return ask(request, _cancelling(job))
@@ -199,10 +199,10 @@ def _cancelling(job: GenerationJob) -> Confirmation:
         ),
         button="Cancel the job",
         back=reverse("job", args=[job.code]),
-        crumbs=crumbs_of(job),
+        crumbs=job_crumbs(job),
     )
 
 
-def crumbs_of(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+def job_crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
     """Return the way to a job's page: names and addresses."""
     return (("Jobs", reverse("jobs")), (job.name, reverse("job", args=[job.code])))

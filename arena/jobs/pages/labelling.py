@@ -15,11 +15,11 @@ from django.views.decorators.cache import never_cache
 from arena.errors import AlreadyLabelled, LabellingClosed, NotYours
 from arena.jobs import queries
 from arena.jobs.exports.faults import fault_table
-from arena.jobs.pages.jobs import crumbs_of
+from arena.jobs.pages.jobs import job_crumbs
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
-from arena.people.queries import by_pseudonym, experts, role_of
-from arena.site.access import ADMIN, EXPERT, STAFF, form_for, user_of
+from arena.people.queries import by_pseudonym, experts, top_role
+from arena.site.access import ADMIN, EXPERT, STAFF, form_for, get_user
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
 from arena.site.forms import offer
 from arena.voting.queries.showings import original_beside
@@ -37,7 +37,7 @@ class LabelForm(forms.Form):
     note = forms.CharField(required=False, max_length=2000)
 
     def faults(self) -> frozenset[FaultClass]:
-        """Return what was ticked, once the form is valid."""
+        """Return the ticked classes of a valid form."""
         return frozenset(fault for fault in FaultClass if self.cleaned_data[fault.value])
 
 
@@ -58,9 +58,9 @@ class LabellingForm(forms.Form):
 @never_cache
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the next picture; a label is saved and followed by a redirect."""
-    expert = user_of(request)
+    expert = get_user(request)
     try:
-        progress = queries.labelling_of(expert=expert, code=code)
+        progress = queries.labelling_progress(expert=expert, code=code)
         if request.method == "POST":
             _save(request, expert)
             return redirect("label", code=code)
@@ -91,7 +91,7 @@ def _save(request: HttpRequest, expert: User) -> None:
 
 
 def _guess(label: FaultLabel) -> str:
-    """Return what the checks had guessed, told only now."""
+    """Return the first guess of the checks, revealed only after the label."""
     if label.guessed_position is None:
         return "The automatic checks could not look at that picture."
     guessed = [fault.value for fault in FaultClass if getattr(label, f"guessed_{fault.value}")]
@@ -103,11 +103,11 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what was labelled in a job, and the form that opens a labelling."""
     job = get_object_or_404(GenerationJob, code=code)
     form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
-    if request.method == "POST" and role_of(request.user) != ADMIN:
+    if request.method == "POST" and top_role(request.user) != ADMIN:
         raise PermissionDenied
     if form.is_bound and form.is_valid():
         with refusals_in(form):
-            labelling = open_labelling(job=job, **form.cleaned_data, actor=user_of(request))
+            labelling = open_labelling(job=job, **form.cleaned_data, actor=get_user(request))
             messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
             return redirect("faults", code=job.code)
     context = {
@@ -125,7 +125,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
     if is_sure(request):
         with refusals_told(request):
-            close_labelling(labelling=labelling, actor=user_of(request))
+            close_labelling(labelling=labelling, actor=get_user(request))
             messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
     elif labelling.closed_at is None:
         return ask(request, _closing(labelling))
@@ -145,5 +145,5 @@ def _closing(labelling: LabellingRound) -> Confirmation:
         ),
         button="Close the labelling",
         back=back,
-        crumbs=(*crumbs_of(labelling.job), ("Fault labels", back)),
+        crumbs=(*job_crumbs(labelling.job), ("Fault labels", back)),
     )

@@ -14,16 +14,16 @@ from django.shortcuts import redirect, render
 
 from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
-from arena.site.access import ADMIN, form_for, user_of
+from arena.site.access import ADMIN, form_for, get_user
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
 from augment.services.endpoints.contestants import OPTION_INPUTS
-from augment.services.inputs import inputs_of, read_request, read_values
+from augment.services.inputs import read_request, read_values, to_inputs
 from augment.services.running.choosing import can_run, find_obstacle
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.matrix import add_cells, find_cells, matrix_of
+from augment.services.running.matrix import add_cells, find_cells, make_matrix
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -34,14 +34,14 @@ USUAL_CALLS = 5_000
 class LaunchForm(ChoiceForm, OptionsForm):
     """A new job: cells of the matrix, contestants, scenarios and caps."""
 
-    inputs = inputs_of(JobRequest) + OPTION_INPUTS
+    inputs = to_inputs(JobRequest) + OPTION_INPUTS
     contestants = forms.MultipleChoiceField(required=False)
     cells = forms.MultipleChoiceField(required=False)
 
     def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.models = models
-        self.matrix = matrix_of(models)
+        self.matrix = make_matrix(models)
         keys = [cell.key for row in self.matrix for cell in row.cells if not cell.obstacle]
         offer(self, "cells", [(key, key) for key in keys])
         self.fields["samples"].required = False
@@ -68,7 +68,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         return [Offer(row=row, obstacle=find_obstacle(row)) for row in self.offered]
 
     def usual(self) -> dict[str, Any]:
-        """Return what is filled in at first: all that can run on every scenario, within a cap."""
+        """Return the initial choice: all that can run on every scenario, within a cap."""
         shown = [row.pk for group in self.groups for row in group.scenarios]
         where = Scenario.objects.filter(pk__in=shown).only("slug", "reference")
         ready = [
@@ -102,7 +102,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         return list({row.slug: row for row in rows}.values())
 
     def estimated(self) -> JobEstimate | None:
-        """Return what the job would use, as far as it is chosen, without a name or caps."""
+        """Return the job's estimate from the fields chosen so far, without a name or caps."""
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
             self.errors.pop(name, None)
@@ -119,7 +119,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
     if not form.is_bound:
         form.initial = _like(request) or form.usual()
     if "estimate" in request.POST:
-        return _estimated(request, form)
+        return _show_estimate(request, form)
     if form.is_bound and form.is_valid():
         with refusals_in(form), transaction.atomic():
             job = _launch(request, form)
@@ -169,7 +169,7 @@ def _like(request: HttpRequest) -> dict[str, Any]:
     return like | (job.full_plan or {}) if is_all else like
 
 
-def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+def _show_estimate(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     """Show the form as it came in, with what the job would use; nothing is launched."""
     more: dict[str, Any] = {}
     with refusals_in(form):
@@ -180,13 +180,13 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     """Launch the job; of one that tries first, one scenario with a memory of the rest."""
     given = dict(form.cleaned_data)
-    made = add_cells(form.cells_chosen, actor=user_of(request))
+    made = add_cells(form.cells_chosen, actor=get_user(request))
     given["contestants"] = [*given["contestants"], *made]
     asked_for = read_request(JobRequest, given)
     if "try" in request.POST:
         plan = {
             name: str(value) if isinstance(value, Decimal) else value
-            for name, value in read_values(inputs_of(JobRequest), form.cleaned_data).items()
+            for name, value in read_values(to_inputs(JobRequest), form.cleaned_data).items()
             if name != "contestants"
         }
         asked_for = replace(
@@ -196,4 +196,4 @@ def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
             samples=1,
             full_plan=plan,
         )
-    return launch(asked_for, user_of(request))
+    return launch(asked_for, get_user(request))

@@ -1,4 +1,4 @@
-"""What a job is measured by: drives, displacement, analyses, and its files."""
+"""Pages of a job's measures: drives, displacement, analyses, and its files."""
 
 import uuid
 from typing import Any
@@ -24,15 +24,15 @@ from arena.exports.formats import TABLE_FORMATS, download
 from arena.jobs.exports import displacement, driving
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
 from arena.jobs.exports.tables import JOB_FILES
-from arena.jobs.queries import before_of
+from arena.jobs.queries import find_unmodified_drive
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, allow_only, page_for, user_of
+from arena.site.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.site.acts import looks_again, refusals_told, send_later
 from arena.site.listing import choice_asked, read_page
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import driving_scores, simulations
-from augment.services.judging.analyses import ANALYSES, SEED, answers_of, count_unmeasured
+from augment.services.judging.analyses import ANALYSES, SEED, count_unmeasured, read_answers
 from augment.services.judging.displacement import By
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
@@ -85,7 +85,7 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one drive, beside the same scene before the change."""
     row = _driven(code)
-    before = before_of(row)
+    before = find_unmodified_drive(row)
     metrics, old = _metrics(row), {one["name"]: one["value"] for one in _metrics(before)}
     context = {
         "drive": row,
@@ -118,7 +118,7 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
         words = (planner, offsets, "reactive" if way.is_reactive else "")
         ways.append(" · ".join(filter(None, words)))
     return {
-        **driving.shown_driving(table),
+        **driving.driving_context(table),
         "forms": driving.FORMATS,
         "ways": ways,
         "driven": chosen,
@@ -189,7 +189,7 @@ def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     if ask_to_measure(request, job):
         return redirect("job-tab", code=code, tab="displacement")
-    answers = answers_of(job)
+    answers = read_answers(job)
     parts = {part: analyse(answers) for part, analyse in ANALYSES.items()}
     context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), **parts}
     return render(request, "jobs/analyses.html", context)
@@ -203,7 +203,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
     if form not in FORMATS:
         raise Http404
     with refusals_told(request), transaction.atomic():
-        row = ask_for_file(job=job, file_format=form, actor=user_of(request))
+        row = ask_for_file(job=job, file_format=form, actor=get_user(request))
         send_later(request, tasks.send_scenario_file, row.pk)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     return redirect("job-tab", code=code, tab="files")

@@ -13,7 +13,7 @@ from arena.management.commands.serve import INTERRUPTED
 from arena.models import Snapshot
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
-from arena.site.demo import JOB, scenarios_of
+from arena.site.demo import JOB, list_slugs
 from arena.tasks import send_charts
 from augment.services.terminal import TerminalCommand, at_least
 
@@ -53,7 +53,7 @@ class Command(TerminalCommand):
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
-        scenarios = [*scenarios_of(per_type), *scenarios_of(1, "moving")]
+        scenarios = [*list_slugs(per_type), *list_slugs(1, "moving")]
         supervisor = Supervisor([*background(concurrency=4), *server], self._keep)
         with supervisor.signals():
             try:
@@ -89,7 +89,7 @@ class Command(TerminalCommand):
 
     @staticmethod
     def _keep(name: str, line: str) -> None:
-        """What the children say goes to a file; the demo's own lines stay readable."""
+        """Append a child's line to its own log, so that the demo's lines stay readable."""
         folder = settings.VAR_DIR / "log"
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / f"{name}.log").open("a") as log:

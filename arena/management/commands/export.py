@@ -24,7 +24,7 @@ class Command(TerminalCommand):
     help = "Write results to files; the same snapshot or job always gives the same bytes."
 
     def add_arguments(self, parser: CommandParser) -> None:
-        """What to export, of which study or job, where to."""
+        """Add the kinds of export, the study or job, and the target."""
         kinds = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
         add_kinds(kinds)
         whole = kinds.add_parser("study", help="a whole study")

@@ -8,7 +8,7 @@ from arena.rating.agreement import share_text
 from arena.results.queries.judges import judge_lines
 from arena.results.services.judges import judge_agreement, start_judge
 from arena.studies.queries import study_named
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.inputs import add_options, read_request, to_inputs
 from augment.services.running.judge_runs import JUDGEMENTS, JudgeRequest
 from augment.services.terminal import TerminalCommand
 
@@ -22,12 +22,12 @@ class Command(TerminalCommand):
     )
 
     def add_arguments(self, parser: CommandParser) -> None:
-        """Which study, and an option for all that a judge needs."""
+        """Add the study and an option for each field of a judge run."""
         parser.add_argument("study", help="its name or its code")
         names = ("endpoint", "model")
         for name in names:
             parser.add_argument(f"--{name}", required=True)
-        add_options(parser, [one for one in inputs_of(JudgeRequest) if one.name not in names])
+        add_options(parser, [one for one in to_inputs(JudgeRequest) if one.name not in names])
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask about one pair after the other; workers may help."""

@@ -23,7 +23,7 @@ ADVISORY_LOCK = 7_264_101
 
 
 class Command(TerminalCommand):
-    """What has to be done once after every update, before anything is served."""
+    """Do once after every update what must precede serving."""
 
     help = (
         "Apply migrations, add contestants that ask no model, collect the static files, compile "

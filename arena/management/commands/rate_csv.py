@@ -18,7 +18,7 @@ class Command(TerminalCommand):
     requires_system_checks = []
 
     def add_arguments(self, parser: CommandParser) -> None:
-        """Which file, and how."""
+        """Add the file and the rules of rating."""
         rate_csv.add_arguments(parser)
 
     def handle(self, *args: Any, **options: Any) -> None:

@@ -1,8 +1,8 @@
-"""Which metric agrees with experts, as a table in files."""
+"""Agreement of metrics with experts, as a table in files."""
 
 from collections.abc import Sequence
 
-from arena.exports.formats import Columns, Dtype, Sheet, formats, sheet_of, table_formats
+from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import escape, latex_table
 from arena.models import Question, Snapshot
 from arena.rating.agreement import AgreementLine, LineRole, agreement_sentence, share_text
@@ -52,7 +52,7 @@ def agreement_sheet(snapshot: Snapshot) -> Sheet:
         "method": METHOD,
     }
     lines = snapshot.results.agreement
-    return sheet_of(lines, COLUMNS, name="agreement", key="raters", number=".4f", facts=facts)
+    return make_sheet(lines, COLUMNS, name="agreement", key="raters", number=".4f", facts=facts)
 
 
 def agreement_latex(snapshot: Snapshot) -> bytes:
@@ -94,7 +94,7 @@ def _counts(line: AgreementLine) -> tuple[object, ...]:
 
 
 def _caption(lines: Sequence[AgreementLine]) -> str:
-    """What is shown, on how many votes and clusters, beside experts with each other and a coin."""
+    """Return the caption: numbers of votes and clusters, experts' own agreement, a coin's."""
     experts, coin = (
         next(line for line in lines if line.role is role)
         for role in (LineRole.EXPERTS, LineRole.COIN)

@@ -15,7 +15,7 @@ from django.template.loader import render_to_string
 
 from arena.exports.cells import Columns, Dtype
 from arena.exports.files import write_whole
-from arena.exports.formats import json_bytes, sheet_csv, sheet_of
+from arena.exports.formats import json_bytes, make_sheet, sheet_csv
 from arena.exports.leaderboard import BOARD, file_columns
 from arena.models import Board
 from arena.rating.board_table import BoardTableDocument
@@ -28,20 +28,20 @@ STYLE, INDEX = "board.css", "index.html"
 
 def write_table(table: BoardTableDocument) -> dict[str, str]:
     """Write the files of a table, by their endings."""
-    rows = rows_of(table)
+    rows = table_rows(table)
     simulated = " (simulated)" if table.includes_simulated else ""
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
     remarks: Columns = {"remarks": (lambda _: " ".join(table.notes), Dtype.TEXT)}
     columns = {**file_columns(BOARD), **remarks}
     return {
         "json": json_bytes(asdict(table)).decode(),
-        "csv": sheet_csv(sheet_of(table.lines, columns, name="board-table")).decode(),
+        "csv": sheet_csv(make_sheet(table.lines, columns, name="board-table")).decode(),
         "svg": chart.decode(),
-        "html": render_to_string("boards/frozen.html", _shown(table)),
+        "html": render_to_string("boards/frozen.html", _table_context(table)),
     }
 
 
-def rows_of(table: BoardTableDocument) -> list[Row]:
+def table_rows(table: BoardTableDocument) -> list[Row]:
     """Return the lines as pages and charts of ratings take them."""
     names = ["slug", "kind", "is_simulated", *(field.name for field in fields(Line))]
     return [Row(**{name: getattr(line, name) for name in names}) for line in table.lines]
@@ -52,7 +52,7 @@ def board_folder(board: Board) -> dict[str, bytes]:
     tables = list(board.tables.all())
     page = {"title": board.name, "tables": tables}
     if tables:
-        page = _shown(tables[0].document) | page
+        page = _table_context(tables[0].document) | page
     files = {
         f"table-{table.number}.{form}": text.encode()
         for table in tables
@@ -75,7 +75,7 @@ def write_folder(files: Mapping[str, bytes], out: Path) -> None:
         write_whole(out / name, content)
 
 
-def _shown(table: BoardTableDocument) -> dict[str, Any]:
-    """What the template needs of a table; its chart is a file of its own."""
-    rows = list(zip(rows_of(table), table.lines, repeat(None)))
+def _table_context(table: BoardTableDocument) -> dict[str, Any]:
+    """Return the table as the template shows it; its chart is a file of its own."""
+    rows = list(zip(table_rows(table), table.lines, repeat(None)))
     return {"title": table.board, "table": table, "rows": rows}

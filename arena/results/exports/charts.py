@@ -84,11 +84,11 @@ def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
         by_name["pairs"] = partial(heat_chart, table.rows, results.pairs)
     if results.types:
         by_name["types"] = partial(type_charts, results.types, table.rows)
-    scatters = scatters_of(snapshot, table)
+    scatters = make_scatters(snapshot, table)
     return by_name | {name: partial(scatter_chart, plot) for name, plot in scatters.items()}
 
 
-def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatter]:
+def make_scatters(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatter]:
     """Return the scatter charts that have points, by name."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}

@@ -1,4 +1,4 @@
-"""Which rows a study is made of, and how people stand in them."""
+"""Rows that belong to a study, and the accounts that they name."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ from arena.models import (
     Vote,
     VoteFile,
 )
-from arena.results.services.stored_rows import columns_of, label_of, read_values
+from arena.results.services.stored_rows import model_label, read_values, stored_columns
 from augment.models import (
     Attempt,
     Augmentation,
@@ -70,12 +70,12 @@ class Closure:
 
     @property
     def contestants(self) -> Rows:
-        """Who takes part in the study or in its jobs."""
+        """Contestants of the study and of its jobs."""
         return self._of("contestants", Contestant)
 
     @property
     def named_scenarios(self) -> Rows:
-        """What is shown and worked on."""
+        """Scenarios that the study shows and its jobs work on."""
         return self._of("scenarios", Scenario)
 
     @property
@@ -119,7 +119,7 @@ class Closure:
         return {**self.study.rules, **renamed}
 
     def _of(self, name: str, model: type[models.Model]) -> Rows:
-        """What the study names or its jobs work on.
+        """Return the rows that the study names or its jobs work on.
 
         Through their keys: a join with the jobs would give one of two jobs twice.
         """
@@ -174,7 +174,7 @@ _CHOSEN: dict[type[models.Model], Callable[[Closure], Q]] = {
 }
 """Which rows of each table belong to a study."""
 
-TRAVELLING = frozenset(map(label_of, _CHOSEN))
+TRAVELLING = frozenset(map(model_label, _CHOSEN))
 """The tables of a study; a folder that brings others is none of ours."""
 
 
@@ -205,7 +205,7 @@ def close_over(study: Study) -> Closure:
 
 
 def _people(closure: Closure) -> set[int]:
-    """Who votes, labels, has written or has looked; whoever only administered stays at home."""
+    """Return the people who vote, label, wrote or looked; mere administrators stay out."""
     columns: dict[type[models.Model], str] = {
         Study.experts.through: "user",
         LabellingRound.experts.through: "user",
@@ -222,7 +222,7 @@ def _people(closure: Closure) -> set[int]:
 def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
     """The rows of one table without names of accounts, machines or addresses of people."""
     model = rows.model
-    columns = columns_of(model)
+    columns = stored_columns(model)
     names = [column.attname for column in columns]
     accounts = [
         column.attname

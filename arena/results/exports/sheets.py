@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from django.core.files.storage import default_storage
 
 from arena.results.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from augment.errors import check_names
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.running.progress import cells_of
+from augment.services.running.progress import list_cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def find_cells(
     Raises:
         UnknownName: The job has no such scenario, contestant or sample.
     """
-    cells = list(cells_of(job).filter(sample=sample))
+    cells = list(list_cells(job).filter(sample=sample))
     for kind, names, known in (
         ("sample of this job", [str(sample)], {str(n + 1) for n in range(job.samples)}),
         ("contestant of this job", contestants, {cell.contestant.slug for cell in cells}),
@@ -100,7 +100,7 @@ def _sample_tile(contestant: Contestant, cell: Augmentation | None) -> Tile:
             pixels = imread(io.BytesIO(file.read()), format="png")
     word = _explain(cell)
     return Tile(
-        title=shown_name(contestant),
+        title=show_name(contestant),
         is_simulated=contestant.is_simulated,
         pixels=pixels,
         word=word,

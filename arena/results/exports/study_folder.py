@@ -14,7 +14,7 @@ from django.template.loader import render_to_string
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
 from arena.exports.files import new_folder
-from arena.exports.formats import Value, csv_of, read_value, sheet_csv
+from arena.exports.formats import Value, make_csv, read_value, sheet_csv
 from arena.jobs.exports.displacement import object_sheet
 from arena.models import Snapshot, Study
 from arena.results.exports.closure import Closure, close_over, travelling_rows
@@ -25,7 +25,7 @@ from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.analyses import measure_job
-from augment.services.running.transcript_records import record_of, tries_by_augmentation
+from augment.services.running.transcript_records import make_record, tries_by_augmentation
 from augment.services.scenarios.pictures import film_document, film_name
 
 File = tuple[str, bytes]
@@ -162,7 +162,7 @@ class _Folder:
 
     def write_rows(self, closure: Closure, rows: Any) -> int:
         """Write the rows of a table and note the pictures that they name; how many there are."""
-        columns = enumerate(stored_rows.columns_of(rows.model))
+        columns = enumerate(stored_rows.stored_columns(rows.model))
         places = [place for place, column in columns if column.attname in PICTURE_COLUMNS]
         written = []
 
@@ -175,7 +175,7 @@ class _Folder:
                 written.append(len(line))
                 yield line
 
-        self.write(f"{ROWS}{stored_rows.label_of(rows.model)}.jsonl", lines())
+        self.write(f"{ROWS}{stored_rows.model_label(rows.model)}.jsonl", lines())
         return len(written)
 
 
@@ -187,7 +187,7 @@ def _fill(study: Study, root: Path, say: Callable[[str], None]) -> None:
     _refuse_unfinished(closure)
     folder = _Folder(root)
     counts = {
-        stored_rows.label_of(rows.model): folder.write_rows(closure, rows)
+        stored_rows.model_label(rows.model): folder.write_rows(closure, rows)
         for rows in closure.tables()
     }
     say(f"rows: {sum(counts.values())} of {len(counts)} tables")
@@ -235,7 +235,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
         },
         "product": product_version(),
         "packages": {name: version(name) for name in PACKAGES},
-        "migrations": stored_rows.applied_migrations(),
+        "migrations": stored_rows.list_migrations(),
         "rows": counts,
         "members": digests,
     }
@@ -249,7 +249,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
         rows.select_related("job", "scenario__base_scene", "contestant__endpoint")
     )
     yield "pairs.csv", _pairs(study)
-    yield "augmentations.csv", csv_of(AUGMENTATIONS, augmentations)
+    yield "augmentations.csv", make_csv(AUGMENTATIONS, augmentations)
     contestants = sorted(
         closure.contestants.select_related("endpoint"), key=lambda row: str(row.slug)
     )
@@ -266,7 +266,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
     for job in GenerationJob.objects.filter(pk__in=jobs).order_by("pk"):
         yield f"objects/{job.code}.csv", sheet_csv(object_sheet(job))
     for start in range(0, len(augmentations), _AT_ONCE):
-        yield from _made(augmentations[start : start + _AT_ONCE])
+        yield from _contestant_files(augmentations[start : start + _AT_ONCE])
     ready = study.snapshots.filter(state=Snapshot.State.READY).order_by("made_at", "pk")
     for snapshot in ready:
         for name, content in sorted(bundle_files(snapshot).items()):
@@ -274,8 +274,8 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
                 yield f"ratings/{snapshot.code}/{name}", content
 
 
-def _made(augmentations: list[Augmentation]) -> Iterator[File]:
-    """What each has made, and the transcript of whom a model was asked for.
+def _contestant_files(augmentations: list[Augmentation]) -> Iterator[File]:
+    """Yield each contestant's results, and the transcripts of those that asked a model.
 
     Transcripts come without their pictures, which stand under media, and without a machine.
     """
@@ -284,7 +284,7 @@ def _made(augmentations: list[Augmentation]) -> Iterator[File]:
         yield f"modifications/{augmentation.code}.json", _json(augmentation.modification)
         own = tries.get(augmentation.pk, [])
         if any(step.call for attempt in own for step in attempt.steps):
-            document = record_of(augmentation, own)
+            document = make_record(augmentation, own)
             for attempt in document["attempts"]:
                 attempt["worker"] = ""
             yield f"transcripts/{augmentation.code}.json", _json(document)

@@ -10,14 +10,14 @@ from typing import Any
 from django.db.models import F
 
 from arena.models import Question, Snapshot, Standing
-from arena.models.ratings import stored_values
+from arena.models.ratings import snapshot_values
 from arena.rating.lines import Line, hide_ranks, notes_by_reason, says_no_order, votes_text
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.rating.snapshot_document import BoardRemarks
 from arena.results.queries.votes import LeftOut
 from arena.studies.services.opening import preregistration_sha256
-from arena.studies.services.plan import Answered, answer_hypotheses
+from arena.studies.services.plan import HypothesisAnswer, answer_hypotheses
 
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
@@ -26,18 +26,18 @@ APART = -1
 """The part of those who are rated with nobody."""
 
 
-def shown_name(who: Any) -> str:
+def show_name(who: Any) -> str:
     """Return the name of a contestant or a line, with "(simulated)" where that is so."""
     return f"{who.name}{SIMULATED if who.is_simulated else ''}"
 
 
 def is_closed_form(rating: Snapshot) -> bool:
-    """Whether its intervals come from a formula and not from resampled rounds."""
+    """Return whether its intervals come from a formula and not from resampled rounds."""
     return bool(rating.intervals == Intervals.CLOSED_FORM.value)
 
 
 def method_text(rating: Snapshot) -> str:
-    """How its numbers came about, in one line."""
+    """Return the method behind its numbers, in one line."""
     # Earlier ratings could be adjusted for what was shown.
     adjusted = f", adjusted for {', '.join(rating.covariates)}" if rating.covariates else ""
     unit = UNIT_TEXTS[rating.resampling_unit]
@@ -80,7 +80,7 @@ class Row(Line):
     @property
     def model(self) -> str:
         """The name, with "(simulated)" where that is so."""
-        return shown_name(self)
+        return show_name(self)
 
     @property
     def votes_cast(self) -> int:
@@ -109,16 +109,16 @@ class LeaderboardTable:
     left_out: dict[str, int]
     reasons: tuple[str, ...] = ()
     preregistration: str = ""
-    hypotheses: tuple[Answered, ...] = ()
+    hypotheses: tuple[HypothesisAnswer, ...] = ()
 
     @property
     def votes_text(self) -> str:
-        """How many votes count, and apart from them the ties of pairs that nobody was shown."""
+        """Number of counted votes and, apart from it, of ties on pairs that were not shown."""
         return votes_text(self.snapshot.votes_cast, self.snapshot.settled_ties)
 
     @property
     def method_text(self) -> str:
-        """How the numbers came about, in one line."""
+        """Method behind the numbers, in one line."""
         return method_text(self.snapshot)
 
     @property
@@ -131,22 +131,22 @@ class LeaderboardTable:
 
     @property
     def notes(self) -> list[str]:
-        """What else the method has to say about these votes."""
+        """Further remarks of the method on these votes."""
         return list(filter(None, self.snapshot.results.board.warnings))
 
     @property
     def frozen_text(self) -> str:
-        """What was frozen before the first vote, in one line; empty without."""
+        """Preregistered rules in one line; empty without any."""
         return f"preregistered: sha256 {self.preregistration}" if self.preregistration else ""
 
     @property
     def missing(self) -> list[str]:
-        """What is missing in which lines and why, for files."""
+        """Missing values with their lines and reasons, for files."""
         return notes_by_reason((row.model, row.note) for row in self.rows)
 
     @property
     def has_parts(self) -> bool:
-        """Whether there are groups that can't be compared with each other."""
+        """True if there are groups that can't be compared with each other."""
         return len({row.part for row in self.rows if row.rating is not None}) > 1
 
 
@@ -198,5 +198,5 @@ def _row(standing: Standing, board: BoardRemarks) -> Row:
         options=json.dumps(options, sort_keys=True) if options else "",
         sends=json.dumps(sends, sort_keys=True) if sends else "",
         card=who.card if who else None,
-        **stored_values(standing),
+        **snapshot_values(standing),
     )

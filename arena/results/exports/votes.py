@@ -7,9 +7,9 @@ from arena.exports.formats import Dtype, Sheet, formats, sheet_csv, sheet_parque
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
-from arena.results.queries.votes import RATED, Filters, Judged, current_votes, last_vote_of
+from arena.results.queries.votes import RATED, Filters, RatedVote, current_votes, last_vote_id
 from arena.results.services import vote_files
-from arena.results.services.ratings import votes_of, votes_version_of
+from arena.results.services.ratings import read_votes, votes_version
 
 _KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
@@ -26,13 +26,13 @@ def vote_table(snapshot: Snapshot) -> Sheet:
     Raises:
         Conflict: They are not what they were.
     """
-    rows = vote_files.vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
-    return _sheet(rows, votes_version_of(snapshot))
+    rows = vote_files.vote_rows(read_votes(snapshot).counted, snapshot.results.judges)
+    return _sheet(rows, votes_version(snapshot))
 
 
-def unrated_votes(study: Study) -> Sheet:
+def list_unrated(study: Study) -> Sheet:
     """Return the votes of a study that nobody rates, repeats and checks too; no skips."""
-    last = last_vote_of(study)
+    last = last_vote_id(study)
     asked = [Filters(question=question) for question in study.questions]
     current = [vote for filters in asked for vote in current_votes(study, filters, last)]
     decided = [vote for vote in current if vote.outcome in RATED]
@@ -56,7 +56,7 @@ def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
 
 def _list_row(line: ListedVote) -> tuple[object, ...]:
     vote = line.given
-    if isinstance(vote, Judged):  # whoever the tie counts for has not judged it
+    if isinstance(vote, RatedVote):  # whoever the tie counts for has not judged it
         return (*next(vote_files.vote_rows([vote], {vote.judge: ""})), line.mark, None, None)
     left, right, matchup = vote.shown_left, vote.shown_right, vote.matchup
     return (

@@ -19,13 +19,13 @@ from arena.exports.formats import (
     Format,
     Sheet,
     Value,
-    csv_of,
     download,
     drawings,
     formats,
     json_bytes,
+    make_csv,
+    make_sheet,
     read_value,
-    sheet_of,
     table_formats,
 )
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
@@ -39,7 +39,7 @@ from arena.results.exports.tables import LeaderboardTable, Row, is_closed_form, 
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
-from arena.studies.services.plan import Answered
+from arena.studies.services.plan import HypothesisAnswer
 from augment.errors import UnknownName, check_names
 
 MANIFEST = "manifest.json"
@@ -55,7 +55,7 @@ def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
         for column in _columns_in(table, COLUMNS)
         if column.name
     }
-    return sheet_of(table.rows, columns, name="leaderboard", digits=None, number=".2f")
+    return make_sheet(table.rows, columns, name="leaderboard", digits=None, number=".2f")
 
 
 def leaderboard_json(table: LeaderboardTable) -> bytes:
@@ -66,7 +66,7 @@ def leaderboard_json(table: LeaderboardTable) -> bytes:
 
 
 def _document(table: LeaderboardTable) -> dict[str, Any]:
-    """Return what JSON files say of a rating beside its lines."""
+    """Return the part of a JSON file beside the lines of a rating."""
     rating, settled = table.snapshot, table.snapshot.results.board.settled_ties
     # Older ratings had no word for resamples.
     notes: dict[str, Any] = {"intervals": rating.intervals} if is_closed_form(rating) else {}
@@ -185,13 +185,13 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     }
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
-    files["raters.csv"] = csv_of(RATERS, results.trust.raters)
+    files["raters.csv"] = make_csv(RATERS, results.trust.raters)
     if results.agreement:
         files["agreement.csv"] = AGREEMENT_FORMATS["csv"].write(snapshot)
     if frozen := snapshot.study.preregistration.encode():
         files[FILE_NAME] = frozen
     if table.hypotheses:
-        files["hypotheses.csv"] = csv_of(HYPOTHESES, table.hypotheses)
+        files["hypotheses.csv"] = make_csv(HYPOTHESES, table.hypotheses)
     files["statistics.json"] = json_bytes(_statistics(results), sort_keys=True)
     files[MANIFEST] = json_bytes(_manifest(table, files), sort_keys=True)
     return files
@@ -272,7 +272,7 @@ def _latex_name(row: Row) -> str:
     return rf"{escape(before)}\texttt{{{escape(row.variant)}}}{escape(after)}"
 
 
-def _hypothesis(answer: Answered) -> dict[str, Any]:
+def _hypothesis(answer: HypothesisAnswer) -> dict[str, Any]:
     above = answer.hypothesis.above
     return {
         "hypothesis": answer.hypothesis.text,
@@ -283,7 +283,7 @@ def _hypothesis(answer: Answered) -> dict[str, Any]:
     }
 
 
-def _hypothesis_line(answer: Answered) -> str:
+def _hypothesis_line(answer: HypothesisAnswer) -> str:
     text = f"Hypothesis: {answer.hypothesis.text}"
     if answer.verdict is None:
         return text

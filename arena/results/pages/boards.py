@@ -16,16 +16,16 @@ from arena.exports.files import CONTENT_TYPE, zip_bytes
 from arena.exports.formats import attach
 from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
-from arena.results.exports.board_files import board_folder, rows_of, write_table
+from arena.results.exports.board_files import board_folder, table_rows, write_table
 from arena.results.pages.plots import plot
 from arena.results.queries.access import refuse_open_judge
 from arena.results.services.boards import LONGEST_NAME, make_board, publish_table, share_board
-from arena.site.access import ADMIN, STAFF, act_for, form_for, keep_secret, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, keep_secret, page_for
 from arena.site.acts import refusals_in, tell_errors
 from arena.site.forms import RequestForm, offer
 from arena.studies.services.batches import BatchRequest, open_batch, possible_newcomers
 from augment.models import Benchmark
-from augment.services.inputs import inputs_of, read_request
+from augment.services.inputs import read_request, to_inputs
 from augment.services.scenarios.benchmarks import list_remarks
 
 DATA = {"csv": "text/csv; charset=utf-8", "json": "application/json"}
@@ -61,7 +61,7 @@ class BoardForm(forms.Form):
 class BatchForm(RequestForm):
     """A new batch; experts and votes are at first those of the newest study."""
 
-    inputs = inputs_of(BatchRequest)
+    inputs = to_inputs(BatchRequest)
 
     def __init__(self, data: Any = None, *, board: Board) -> None:
         newest = board.studies.order_by("-opened_at", "-pk")[0]
@@ -85,7 +85,7 @@ def boards_page(request: HttpRequest) -> HttpResponse:
     form = BoardForm(request.POST or None)
     if form.is_valid():
         with refusals_in(form):
-            board = make_board(**form.cleaned_data, actor=user_of(request))
+            board = make_board(**form.cleaned_data, actor=get_user(request))
             return redirect("board", code=board.code)
     boards = Board.objects.prefetch_related("tables", "studies")
     return render(request, "boards/list.html", {"boards": boards, "form": form})
@@ -95,7 +95,7 @@ def boards_page(request: HttpRequest) -> HttpResponse:
 def board_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The newest table or that which the address names; the studies, and what can be done."""
     board = get_object_or_404(Board, code=code)
-    context = _shown(request, board) | {"form": BatchForm(board=board)}
+    context = _context(request, board) | {"form": BatchForm(board=board)}
     context["studies"] = studies = board.studies.order_by("opened_at", "pk")
     published = context["tables"][0].document.studies if context["tables"] else ()
     closed = {str(row.code) for row in studies if row.state == Study.State.CLOSED}
@@ -127,7 +127,7 @@ def board_export(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def publish(request: HttpRequest, code: uuid.UUID) -> None:
     """Rate all votes and publish the next table."""
     board = get_object_or_404(Board, code=code)
-    table = publish_table(board, write=write_table, actor=user_of(request))
+    table = publish_table(board, write=write_table, actor=get_user(request))
     messages.success(request, f"Table {table.number} is published.")
 
 
@@ -140,7 +140,7 @@ def start_batch(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
         tell_errors(request, form)
         return None
     asked = read_request(BatchRequest, form.cleaned_data)
-    study = open_batch(board, asked, actor=user_of(request))
+    study = open_batch(board, asked, actor=get_user(request))
     return redirect("study", code=study.code)
 
 
@@ -148,7 +148,7 @@ def start_batch(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
 def share(request: HttpRequest, code: uuid.UUID, *, is_shared: bool) -> None:
     """Make the link by which anybody reads the tables, or take it back."""
     board = get_object_or_404(Board, code=code)
-    share_board(board, is_shared=is_shared, actor=user_of(request))
+    share_board(board, is_shared=is_shared, actor=get_user(request))
 
 
 # --- For whoever has the link ------------------------------------------------------------------
@@ -156,29 +156,29 @@ def share(request: HttpRequest, code: uuid.UUID, *, is_shared: bool) -> None:
 
 @login_not_required
 @require_safe
-def shared_board(request: HttpRequest, token: str) -> HttpResponse:
+def show_board(request: HttpRequest, token: str) -> HttpResponse:
     """The same tables without the studies behind them."""
-    board = _shared(request, token)
-    return keep_secret(render(request, "boards/shared.html", _shown(request, board)))
+    board = _find_board(request, token)
+    return keep_secret(render(request, "boards/shared.html", _context(request, board)))
 
 
 @login_not_required
 @require_safe
-def shared_board_file(request: HttpRequest, token: str, number: int, form: str) -> HttpResponse:
+def send_table(request: HttpRequest, token: str, number: int, form: str) -> HttpResponse:
     """A table as it was published."""
-    return keep_secret(_file(_shared(request, token), number, form))
+    return keep_secret(_file(_find_board(request, token), number, form))
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _shared(request: HttpRequest, token: str) -> Board:
+def _find_board(request: HttpRequest, token: str) -> Board:
     board = get_object_or_404(Board, token=token)
     refuse_open_judge(request.user, board.studies.all())
     return board
 
 
-def _shown(request: HttpRequest, board: Board) -> dict[str, Any]:
+def _context(request: HttpRequest, board: Board) -> dict[str, Any]:
     """The table that the address names, the newest unless it does."""
     tables = list(board.tables.defer("files"))
     asked = request.GET.get("table")
@@ -190,7 +190,7 @@ def _shown(request: HttpRequest, board: Board) -> dict[str, Any]:
     if not shown:
         return context
     table = shown[0].document
-    drawn = plot(rows_of(table))
+    drawn = plot(table_rows(table))
     rows = [
         (one["row"], line, one["mark"])
         for one, line in zip(drawn["lines"], table.lines, strict=True)

@@ -15,7 +15,7 @@ from arena.site.access import STAFF, page_for
 
 
 class OtherStudyForm(forms.Form):
-    """Which rated study stands beside this one."""
+    """Choice of the rated study beside this one."""
 
     other = forms.ModelChoiceField(
         Study.objects.none(), label="Compare with", to_field_name="code", empty_label=None

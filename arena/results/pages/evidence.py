@@ -12,7 +12,7 @@ from django.utils.text import slugify
 
 from arena.models import Matchup, Snapshot, Study
 from arena.people.queries import natural_order
-from arena.results.exports.tables import shown_name
+from arena.results.exports.tables import show_name
 from arena.results.exports.votes import vote_list_csv
 from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import vote_page
@@ -20,7 +20,7 @@ from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSea
 from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
 from arena.site.access import STAFF, page_for
 from arena.site.listing import page_asked
-from arena.site.pictures import sized_picture_response
+from arena.site.pictures import resize_picture
 from arena.voting.queries.showings import picture_of_side
 from augment.services.scenarios.scenes import type_choices
 
@@ -49,20 +49,20 @@ class VoteSearchForm(forms.Form):
         data = {name: query.get(name, "") for name in self.base_fields}
         super().__init__(data | {"mark": data["mark"] or COUNTED})
         lines = snapshot.standings.order_by("name")
-        shown = [(line.slug, shown_name(line)) for line in lines]
+        shown = [(line.slug, show_name(line)) for line in lines]
         fields: dict[str, Any] = self.fields
         fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
         fields["expert"].choices = [_ALL, *_experts(snapshot)]
 
     def search(self) -> VoteSearch:
-        """What is looked for; everything that counts where the form is not valid."""
+        """Return the search; everything that counts if the form is not valid."""
         return VoteSearch.of_query(self.cleaned_data) if self.is_valid() else VoteSearch()
 
 
 @page_for(*STAFF)
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One page of the votes that the address looks for, with their pictures."""
-    snapshot, form, context = _asked(request, code)
+    snapshot, form, context = _read_search(request, code)
     if not form.is_valid():
         return render(request, "results/votes.html", context, status=422)
     context["page"] = vote_page(snapshot, form.search(), page_asked(request))
@@ -72,7 +72,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @page_for(*STAFF)
 def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
     """All votes that the address looks for, as CSV."""
-    snapshot, form, context = _asked(request, code)
+    snapshot, form, context = _read_search(request, code)
     if not form.is_valid():
         return render(request, "results/votes.html", context, status=422)
     name = f"{slugify(snapshot.study.name) or 'study'}-votes-list.csv"
@@ -84,7 +84,7 @@ def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
 
 
 @page_for(*STAFF)
-def shown_picture(
+def show_vote_picture(
     request: HttpRequest, code: uuid.UUID, matchup: uuid.UUID, side: str
 ) -> HttpResponseBase:
     """A picture as an expert of the study was shown it, left or right."""
@@ -95,13 +95,13 @@ def shown_picture(
     shown = get_object_or_404(rows, study=study, code=matchup)
     if side not in ("left", "right"):
         raise Http404
-    return sized_picture_response(request, picture_of_side(shown, side))
+    return resize_picture(request, picture_of_side(shown, side))
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _asked(
+def _read_search(
     request: HttpRequest, code: uuid.UUID
 ) -> tuple[Snapshot, VoteSearchForm, dict[str, Any]]:
     """The rating, what is looked for, and what the page needs of them; no votes from a file."""

@@ -20,7 +20,7 @@ from arena.results.pages.ratings import get_readable_study
 from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines
 from arena.results.queries.votes import is_imported
 from arena.results.services.judges import estimate_study_judge, judge_agreement, start_judge
-from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, get_user, page_for
 from arena.site.acts import (
     Confirmation,
     ask,
@@ -32,7 +32,7 @@ from arena.site.acts import (
 )
 from arena.site.forms import RequestForm, offer
 from augment.models import EndpointModel, JudgeRun
-from augment.services.inputs import inputs_of, read_request
+from augment.services.inputs import read_request, to_inputs
 from augment.services.running.judge_runs import JudgeEstimate, JudgeRequest, cancel_judge
 from augment.tasks import enqueue_judge
 
@@ -43,9 +43,9 @@ CAPS = {"cap_usd": "USD at most", "cap_calls": "Calls at most"}
 
 
 class JudgeForm(RequestForm):
-    """Which model is asked what, and what it may use."""
+    """Model, question and caps of a judge run."""
 
-    inputs = tuple(one for one in inputs_of(JudgeRequest) if one.name in CAPS)
+    inputs = tuple(one for one in to_inputs(JudgeRequest) if one.name in CAPS)
     judge = forms.ChoiceField(label="Model")
     question = forms.ChoiceField(label="Question", required=False)
 
@@ -101,7 +101,7 @@ def judge_start(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     if not is_sure(request):
         return ask(request, _starting(study, asked, expected))
     with transaction.atomic():
-        run = start_judge(study, asked, user_of(request))
+        run = start_judge(study, asked, get_user(request))
         send_later(request, enqueue_judge, run.pk)
     messages.success(request, f"{run} is asked about {expected.pairs} pairs.")
     return None
@@ -110,7 +110,7 @@ def judge_start(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
 @act_for(ADMIN, back="results-judges")
 def judge_cancel(request: HttpRequest, code: uuid.UUID, judge: uuid.UUID) -> None:
     """Ask nothing more; what was answered stays."""
-    cancel_judge(_judge(request, code, judge), user_of(request))
+    cancel_judge(_judge(request, code, judge), get_user(request))
 
 
 @page_for(*STAFF)

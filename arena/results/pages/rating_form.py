@@ -15,7 +15,7 @@ from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
 from arena.site.acts import send_later
 from arena.site.forms import RequestForm, offer
-from augment.services.inputs import inputs_of
+from augment.services.inputs import to_inputs
 from augment.services.scenarios.scenes import type_choices
 
 
@@ -23,14 +23,14 @@ class AnyOf(forms.MultipleChoiceField):
     """Codes of experts; rating itself refuses those that do not occur."""
 
     def valid_value(self, value: Any) -> bool:
-        """Whatever was ticked."""
+        """Accept any ticked value."""
         return True
 
 
 class RatingForm(RequestForm):
     """Method, resampling and which votes count; experts are offered as a rating names them."""
 
-    inputs = inputs_of(RatingRequest)
+    inputs = to_inputs(RatingRequest)
     experts = AnyOf(required=False)
 
     def __init__(

@@ -13,23 +13,23 @@ from arena import tasks
 from arena.errors import NoSnapshot
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
-from arena.people.queries import role_of
-from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
+from arena.people.queries import top_role
+from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHART_FORMATS, download_rating
 from arena.results.pages.rating_form import RatingForm, rate_or_send
 from arena.results.pages.tabs import FOR_EXPERTS, TABS, describe
 from arena.results.queries.access import (
     ResultsAccess,
+    list_snapshots,
     results_access,
     snapshot_to_export,
-    snapshots_of,
     votes_in,
 )
 from arena.results.queries.votes import is_imported
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
 from arena.results.services.sharing import share_rating, stop_sharing
-from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, page_for, user_of
+from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, get_user, page_for
 from arena.site.acts import refusals_told, tell_errors, wait_for_workers
 from arena.studies.pages.studies import export_place
 from augment.services.inputs import read_request
@@ -42,8 +42,8 @@ SHOWN = 12
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    user = user_of(request)
-    role = role_of(user)
+    user = get_user(request)
+    role = top_role(user)
     access = results_access(user=user, study=study, role=role)
     if access is ResultsAccess.NONE:
         raise PermissionDenied
@@ -55,8 +55,8 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         raise Http404
     if tab not in FOR_EXPERTS and not is_staff:
         raise PermissionDenied
-    ratings = list(snapshots_of(study).defer("results")[:SHOWN])
-    snapshot = _chosen(request, study, ratings)
+    ratings = list(list_snapshots(study).defer("results")[:SHOWN])
+    snapshot = _choose_snapshot(request, study, ratings)
     context = {
         "study": study,
         "imported": is_imported(study),
@@ -93,7 +93,7 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> None:
         tell_errors(request, form)
         return
     choices = read_request(RatingRequest, form.cleaned_data).choices()
-    choices |= {"early": study.state == Study.State.OPEN, "actor": user_of(request)}
+    choices |= {"early": study.state == Study.State.OPEN, "actor": get_user(request)}
     rate_or_send(request, study, **choices)
 
 
@@ -122,7 +122,7 @@ def unshare(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpRes
 def open_results_early(request: HttpRequest, code: uuid.UUID) -> None:
     """The explicit, logged act; who votes in the study votes no longer."""
     study = get_object_or_404(Study, code=code)
-    open_early(study=study, actor=user_of(request))
+    open_early(study=study, actor=get_user(request))
 
 
 @page_for(ADMIN, RESEARCHER, EXPERT)
@@ -133,12 +133,12 @@ def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> 
     cancelled study, which has no rating, staff get the votes.
     """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    is_staff = role_of(request.user) in STAFF
+    is_staff = top_role(request.user) in STAFF
     if form not in CHART_FORMATS and not is_staff:
         raise PermissionDenied
     if study.state == Study.State.CANCELLED and name == "votes":
         stem = f"{slugify(study.name) or 'study'}-votes"
-        return download(VOTE_FORMATS, form, stem, unrated_votes(study))
+        return download(VOTE_FORMATS, form, stem, list_unrated(study))
     snapshot = get_snapshot(request, get_readable_study(request, code))
     with refusals_told(request):
         return download_rating(snapshot, name, form)
@@ -155,7 +155,7 @@ def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
         PermissionDenied: They may not, or not without opening them early first.
     """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    if results_access(user=user_of(request), study=study) is not ResultsAccess.FULL:
+    if results_access(user=get_user(request), study=study) is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
 
@@ -167,7 +167,7 @@ def get_snapshot(request: HttpRequest, study: Study) -> Snapshot:
         Http404: There is none.
     """
     try:
-        return snapshot_to_export(study, _asked_rating(request))
+        return snapshot_to_export(study, _rating_code(request))
     except NoSnapshot as error:
         raise Http404 from error
 
@@ -176,11 +176,11 @@ def _change_link(
     request: HttpRequest, code: uuid.UUID, rating: uuid.UUID, change: Callable[..., object]
 ) -> HttpResponse:
     study = get_readable_study(request, code)
-    change(snapshot_to_export(study, rating), actor=user_of(request))
+    change(snapshot_to_export(study, rating), actor=get_user(request))
     return redirect(f"{reverse('results', args=[code])}?rating={rating}")
 
 
-def _asked_rating(request: HttpRequest) -> uuid.UUID | None:
+def _rating_code(request: HttpRequest) -> uuid.UUID | None:
     wanted = request.GET.get("rating")
     try:
         return uuid.UUID(wanted) if wanted else None
@@ -188,11 +188,13 @@ def _asked_rating(request: HttpRequest) -> uuid.UUID | None:
         raise Http404 from None
 
 
-def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snapshot | None:
+def _choose_snapshot(
+    request: HttpRequest, study: Study, ratings: list[Snapshot]
+) -> Snapshot | None:
     """The rating that the address names, else the first of `ready_snapshots`; with its results."""
     ready = [rating for rating in ratings if rating.state == Snapshot.State.READY]
     ready.sort(key=lambda rating: rating.question != study.questions[0])
-    code = _asked_rating(request) or next((rating.code for rating in ready), None)
+    code = _rating_code(request) or next((rating.code for rating in ready), None)
     if code is None:
         return None
     rows = Snapshot.objects.select_related("study__vote_file", "made_by__person", "shared")

@@ -19,9 +19,9 @@ DATA = {form: FORMATS[form] for form in ("csv", "json")}
 
 @login_not_required
 @require_safe
-def shared_page(request: HttpRequest, token: str) -> HttpResponse:
+def show_shared(request: HttpRequest, token: str) -> HttpResponse:
     """The sentence, the table, how it came about, and links to its data."""
-    snapshot = _shared(request, token)
+    snapshot = _find_snapshot(request, token)
     told = describe(snapshot, is_staff=False)
     context = {"study": snapshot.study, "snapshot": snapshot, "token": token}
     context |= told | fill_table(snapshot, told["table"])
@@ -30,15 +30,15 @@ def shared_page(request: HttpRequest, token: str) -> HttpResponse:
 
 @login_not_required
 @require_safe
-def shared_file(request: HttpRequest, token: str, form: str) -> HttpResponse:
+def send_shared(request: HttpRequest, token: str, form: str) -> HttpResponse:
     """The data of the page, as CSV or JSON."""
-    snapshot = _shared(request, token)
+    snapshot = _find_snapshot(request, token)
     stem = f"{slugify(snapshot.study.name) or 'study'}-leaderboard"
     table = for_experts(leaderboard_table(snapshot))
     return keep_secret(download(DATA, form, stem, table))
 
 
-def _shared(request: HttpRequest, token: str) -> Snapshot:
+def _find_snapshot(request: HttpRequest, token: str) -> Snapshot:
     """The rating of a link that holds; of a study that is closed, as it was when it was shared."""
     refuse_open_judge(request.user, Study.objects.filter(snapshots__shared__token=token))
     rows = Snapshot.objects.select_related("study__vote_file")

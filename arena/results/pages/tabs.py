@@ -8,8 +8,8 @@ from typing import Any
 
 from django.db.models.fields.json import KT
 
-from arena.jobs.exports.driving import shown_driving
-from arena.jobs.queries import shown_augmentations
+from arena.jobs.exports.driving import driving_context
+from arena.jobs.queries import list_shown_ids
 from arena.models import Question, Snapshot
 from arena.people.queries import natural_order
 from arena.rating.agreement import agreement_sentence
@@ -17,7 +17,7 @@ from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import BoardRemarks, PairRecord, PanelRater
 from arena.results.exports.agreement import agreement_by_question
-from arena.results.exports.charts import key_rows, scatters_of
+from arena.results.exports.charts import key_rows, make_scatters
 from arena.results.exports.tables import (
     EARLY_LOOK,
     LeaderboardTable,
@@ -25,7 +25,7 @@ from arena.results.exports.tables import (
     leaderboard_table,
 )
 from arena.results.pages.plots import PlacedInterval, plot
-from arena.results.queries.access import log_of, names_in_log, snapshots_of
+from arena.results.queries.access import list_events, list_snapshots, names_in_log
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
 from arena.results.services.analysis import FEW_VOTES
@@ -40,7 +40,7 @@ LOG_LINES = 200
 
 
 def describe(snapshot: Snapshot, *, is_staff: bool) -> Context:
-    """What every tab shows of a rating: its table, and what this says in one sentence."""
+    """Return the common part of all tabs of a rating: its table, and its meaning in a sentence."""
     table = leaderboard_table(snapshot)
     if not is_staff:
         table = for_experts(table)
@@ -172,7 +172,7 @@ def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 def _counts(rater: PanelRater) -> Context:
-    """How many votes the shares of an expert stand for; of the favourites only where all do."""
+    """Return the vote counts behind an expert's shares; of favourites only if all have them."""
     ties, left = round(rater.ties * rater.votes), rater.left.value
     decided = rater.votes - ties
     return {
@@ -183,7 +183,7 @@ def _counts(rater: PanelRater) -> Context:
 
 
 def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Which metric agrees with experts: each question's decided votes, and by scenario type."""
+    """Return the agreement of metrics: each question's decided votes, and by scenario type."""
     labels = {part.type: part.label for part in snapshot.results.types}
     return {
         "questions": [
@@ -208,7 +208,7 @@ def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     lines = _keyed(table, {line.slug: line for line in snapshot.results.displacement})
     return {
         "lines": lines,
-        "has_chart": "displacement" in scatters_of(snapshot, table),
+        "has_chart": "displacement" in make_scatters(snapshot, table),
         "moves": any(line.at_t0_m is not None for line in snapshot.results.displacement),
     }
 
@@ -217,12 +217,12 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The drives of the augmentations that the study shows."""
     if not Simulation.objects.exists():
         return {"drivings": []}
-    ids = shown_augmentations(snapshot.study)
+    ids = list_shown_ids(snapshot.study)
     found = [
         scores_of_augmentations(ids, title=snapshot.study.name, options=Options(), score=score)
         for score in SCORES
     ]
-    return {"drivings": [shown_driving(one) for one in found if one.lines]}
+    return {"drivings": [driving_context(one) for one in found if one.lines]}
 
 
 def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -239,19 +239,19 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
             }
             for line in lines
         ],
-        "has_chart": "elo-usd" in scatters_of(snapshot, table),
+        "has_chart": "elo-usd" in make_scatters(snapshot, table),
     }
 
 
 def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """What was done to the study, and every rating of it."""
+    """Return the events of the study, and every rating of it."""
     study = snapshot.study
-    rows = snapshots_of(study).defer("results").annotate(settled=KT("results__board__settled"))
+    rows = list_snapshots(study).defer("results").annotate(settled=KT("results__board__settled"))
     ratings = list(rows.select_related("made_by__person"))
     for row in ratings:  # of their results that alone, not a document for each
         row.settled_ties = BoardRemarks(settled=json.loads(row.settled or "null")).settled_ties
     return {
-        "events": log_of(study, most=LOG_LINES),
+        "events": list_events(study, most=LOG_LINES),
         "names": {row.slug: row.model for row in table.rows} | names_in_log(study),
         "most": LOG_LINES,
         "ratings": ratings,

@@ -1,1 +1,1 @@
-"""Which votes count, who may read results, and the evidence behind a number."""
+"""Votes that count, readers of results, and the evidence behind a number."""

@@ -1,4 +1,4 @@
-"""Who may see results, and which."""
+"""Access to results."""
 
 from enum import StrEnum
 from uuid import UUID
@@ -9,14 +9,14 @@ from django.db.models import Case, Q, QuerySet, When
 
 from arena.errors import NoSnapshot, NotYours, StudyStillOpen
 from arena.models import EarlyLook, Question, Snapshot, Study
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from augment.models import Event
 
 STAFF = ("admin", "researcher")
 
 
 class ResultsAccess(StrEnum):
-    """How far somebody may look at a study's results.
+    """Extent to which an account may see a study's results.
 
     Attributes:
         FULL: At any time.
@@ -30,7 +30,7 @@ class ResultsAccess(StrEnum):
 
 
 def results_access(*, user: User, study: Study, role: str | None = None) -> ResultsAccess:
-    """What the user may see.
+    """Return the user's access to the results.
 
     Staff may open the results of an open study on purpose; if they vote in it, that ends their
     voting. An expert who still judges the same contestants in another study waits until that one
@@ -41,7 +41,7 @@ def results_access(*, user: User, study: Study, role: str | None = None) -> Resu
         study: What for.
         role: Theirs, where somebody has looked it up already.
     """
-    staff = (role or role_of(user)) in STAFF
+    staff = (role or top_role(user)) in STAFF
     if study.state == Study.State.CLOSED:
         this = Study.objects.filter(pk=study.pk)
         reads = staff or (votes_in(user, study) and not _still_judges(user, this))
@@ -67,7 +67,7 @@ def must_read_results(*, user: User, study: Study) -> None:
 
 
 def votes_in(user: User, study: Study) -> bool:
-    """Whether somebody is an expert of the study."""
+    """Return whether the user is an expert of the study."""
     return study.experts.filter(pk=user.pk).exists()
 
 
@@ -84,7 +84,7 @@ def ready_snapshots(study: Study) -> QuerySet[Snapshot]:
     return study.snapshots.filter(state=Snapshot.State.READY).order_by(rank, "-made_at", "-pk")
 
 
-def snapshots_of(study: Study) -> QuerySet[Snapshot]:
+def list_snapshots(study: Study) -> QuerySet[Snapshot]:
     """All ratings, the newest first."""
     return study.snapshots.order_by("-made_at", "-pk")
 
@@ -105,8 +105,8 @@ def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
     return snapshot
 
 
-def log_of(study: Study, *, most: int) -> list[Event]:
-    """What was done to a study, the newest first; one query."""
+def list_events(study: Study, *, most: int) -> list[Event]:
+    """Return the events of a study, the newest first; one query."""
     about = Q(object_kind="study", object_code=str(study.code))
     rows = Event.objects.filter(about).select_related("actor__person")
     return list(rows.order_by("-at", "-pk")[:most])
@@ -127,11 +127,11 @@ def refuse_open_judge(user: User | AnonymousUser, studies: QuerySet[Study]) -> N
     Raises:
         PermissionDenied: An expert, signed in, still judges a contestant of theirs.
     """
-    if isinstance(user, User) and role_of(user) not in STAFF and _still_judges(user, studies):
+    if isinstance(user, User) and top_role(user) not in STAFF and _still_judges(user, studies):
         raise PermissionDenied
 
 
 def _still_judges(user: User, studies: QuerySet[Study]) -> bool:
-    """Whether an open study of this expert has a contestant of these."""
+    """Return whether an open study of this expert has a contestant of these."""
     is_open = user.studies.filter(state=Study.State.OPEN)
     return is_open.filter(contestants__in=studies.values("contestants")).exists()

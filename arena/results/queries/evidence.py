@@ -14,11 +14,11 @@ from arena.results.queries.scores import Pair, VoteScore, scores_of_pairs, sort_
 from arena.results.queries.search import VoteSearch, is_found
 from arena.results.queries.votes import (
     Filters,
-    Judged,
-    counted_votes,
+    RatedVote,
     current_votes,
     is_imported,
-    settled_ties,
+    list_ties_unshown,
+    select_counted_votes,
 )
 from augment.models import Augmentation
 
@@ -39,7 +39,7 @@ class ListedVote:
         pair: The votes on both pictures that count, as one of the two sees them.
     """
 
-    given: Vote | Judged
+    given: Vote | RatedVote
     mark: str
     judge: str = ""
     names: tuple[str, ...] = ()
@@ -52,7 +52,7 @@ class ListedVote:
 
     @property
     def sides(self) -> list[tuple[str, Augmentation]]:
-        """What a vote was given on, with the place of each."""
+        """Augmentations of a vote, with the side of each."""
         vote = self.vote
         return [("left", vote.shown_left), ("right", vote.shown_right)] if vote else []
 
@@ -81,24 +81,26 @@ def count_settled(snapshot: Snapshot) -> int:
     is_possible = snapshot.study.rules.get("identical") and not is_imported(snapshot.study)
     if not is_possible or Filters.of_document(snapshot.filters).leave_out_settled:
         return 0
-    return snapshot.votes_counted - counted_votes(snapshot).count()
+    return snapshot.votes_counted - select_counted_votes(snapshot).count()
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _find_all(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str] | Judged]:
+def _find_all(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str] | RatedVote]:
     """Keys and marks of the rows, then the ties on pairs that nobody was shown."""
     study, filters = snapshot.study, Filters.of_document(snapshot.filters)
-    ties: list[Judged] = []
+    ties: list[RatedVote] = []
     if study.rules.get("identical"):
         votes = current_votes(study, filters, snapshot.last_vote)
-        ties = [tie for tie in settled_ties(study, votes, filters) if is_found(tie, search)]
+        ties = [tie for tie in list_ties_unshown(study, votes, filters) if is_found(tie, search)]
     return [*sort_votes(snapshot, search), *ties]
 
 
 def _list_votes(
-    found: Sequence[tuple[int, str] | Judged], snapshot: Snapshot, scores: Mapping[Pair, VoteScore]
+    found: Sequence[tuple[int, str] | RatedVote],
+    snapshot: Snapshot,
+    scores: Mapping[Pair, VoteScore],
 ) -> list[ListedVote]:
     """Votes in their order; two queries."""
     related = (
@@ -110,8 +112,8 @@ def _list_votes(
         *("matchup__scenario__follows__reference", "matchup__scenario__follows__intent"),
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
-    ties = [one for one in found if isinstance(one, Judged)]
-    keys = [one for one in found if not isinstance(one, Judged)]
+    ties = [one for one in found if isinstance(one, RatedVote)]
+    keys = [one for one in found if not isinstance(one, RatedVote)]
     rows = Vote.objects.select_related(*related).defer(*unread).in_bulk([pk for pk, _ in keys])
     names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
     return [

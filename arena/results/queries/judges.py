@@ -1,4 +1,4 @@
-"""What models that judge said of a study's pairs. They are no experts: no rating counts them."""
+"""Judge models' answers about a study's pairs. They are no experts: no rating counts them."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -8,10 +8,10 @@ from django.db.models import Count, F, Q, QuerySet, Sum
 from django.db.models.functions import Coalesce
 
 from arena.models import Matchup, Study
-from arena.results.queries.votes import COUNTED, Filters, current_votes, is_imported, last_vote_of
+from arena.results.queries.votes import COUNTED, Filters, current_votes, is_imported, last_vote_id
 from augment.models import Contestant, JudgeRun, ModelCall, PairJudgement
-from augment.services.endpoints.known_models import family_of
-from augment.services.running.judge_runs import Exchange, ShownPair, exchange, preference_of
+from augment.services.endpoints.known_models import vendor_family
+from augment.services.running.judge_runs import Exchange, ShownPair, combine_answers, exchange
 
 State = PairJudgement.State
 
@@ -24,7 +24,7 @@ Preferences = Mapping[tuple[str, str], int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgeLine:
-    """What came of one judge.
+    """Summary of one judge.
 
     Attributes:
         name: Says as well whether it is the simulated stand-in.
@@ -69,11 +69,11 @@ class JudgeLine:
         return self.first / self.answers if self.answers else None
 
 
-def judged_pairs(study: Study, question: str) -> list[ShownPair]:
+def list_judged_pairs(study: Study, question: str) -> list[ShownPair]:
     """Return the main pairs on which votes of experts count, each once, as it was first shown."""
     if is_imported(study):
         return []
-    votes = current_votes(study, Filters(question=question), last_vote_of(study))
+    votes = current_votes(study, Filters(question=question), last_vote_id(study))
     shown = {vote.matchup for vote in votes if vote.mark == COUNTED and vote.matchup is not None}
     rows = Matchup.objects.select_related("left", "right").only(
         *("left_image", "right_image", "left__image", "right__image")
@@ -92,14 +92,14 @@ def judge_lines(study: Study) -> list[JudgeLine]:
 
 
 def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
-    """Return what each judge prefers, by its name; of runs alike the newest that has answers.
+    """Return each judge's preferences by its name; of equal runs the newest that has answers.
 
     Where contestants ask a model of the judge's own family, it comes once more without them.
     """
     found: dict[str, Preferences] = {}
     runs = study.judges.filter(question=question).select_related("endpoint")
     for run in runs.order_by("-pk"):
-        name, rows = judge_name(run), answers_of(run)
+        name, rows = judge_name(run), answered_pairs(run)
         if name in found or not rows:
             continue
         own = set(_own_family(study, run))
@@ -119,7 +119,7 @@ def judge_name(run: JudgeRun) -> str:
     return f"Judge {run}{' (simulated)' if run.endpoint.is_simulated else ''}"
 
 
-def models_of(contestant: Contestant) -> list[str]:
+def list_models(contestant: Contestant) -> list[str]:
     """Return the models that a contestant asks, in any role, or that its card names."""
     asked = [contestant.model, *(role["model"] for role in contestant.roles.values())]
     if contestant.card is not None:
@@ -127,7 +127,7 @@ def models_of(contestant: Contestant) -> list[str]:
     return [model for model in asked if model]
 
 
-def answers_of(run: JudgeRun) -> list[PairJudgement]:
+def answered_pairs(run: JudgeRun) -> list[PairJudgement]:
     """Return the pairs with both answers, with their contestants and scenarios."""
     rows: QuerySet[PairJudgement] = run.judgements.filter(state=State.DONE).order_by("pk")
     return list(
@@ -142,7 +142,7 @@ def answers_of(run: JudgeRun) -> list[PairJudgement]:
 
 
 def _line(study: Study, run: JudgeRun) -> JudgeLine:
-    rows = answers_of(run)
+    rows = answered_pairs(run)
     became = Counter(exchange(row.first, row.second) for row in rows)
     single = Counter(answer for row in rows for answer in (row.first, row.second))
     states = run.judgements.order_by().values_list("state").annotate(Count("pk"))
@@ -162,7 +162,7 @@ def _line(study: Study, run: JudgeRun) -> JudgeLine:
 
 
 def _usd_per_pair(run: JudgeRun, pairs: int) -> float | None:
-    """Return what a pair cost; an answer from the store counts as what it had cost once."""
+    """Return the cost of a pair; an answer from the store counts at its original cost."""
     calls = ModelCall.objects.filter(
         Q(sent_at__isnull=False) | Q(served_from__isnull=False), judgement__run=run
     ).exclude(served_from__judgement=F("judgement"))  # a second worker's copy of the first's
@@ -175,16 +175,16 @@ def _usd_per_pair(run: JudgeRun, pairs: int) -> float | None:
 
 def _own_family(study: Study, run: JudgeRun) -> dict[str, str]:
     """Return names of the contestants, by slug, that use a model of the judge's family."""
-    family = family_of(run.model)
+    family = vendor_family(run.model)
     return {
         row.slug: row.name
         for row in study.contestants.order_by("name")
-        if family in map(family_of, models_of(row))
+        if family in map(vendor_family, list_models(row))
     }
 
 
 def _preferences(rows: list[PairJudgement]) -> dict[tuple[str, str], int]:
     return {
-        (str(row.left.code), str(row.right.code)): preference_of(row.first, row.second)
+        (str(row.left.code), str(row.right.code)): combine_answers(row.first, row.second)
         for row in rows
     }

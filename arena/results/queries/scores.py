@@ -1,4 +1,4 @@
-"""What the votes of a rating say of its pictures and pairs, and which votes come first by that."""
+"""Scores of a rating's pictures and pairs by their votes, and an order of votes by them."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from django.db.models import Count, F, Max, QuerySet, Value
 
 from arena.models import Snapshot, Vote
 from arena.results.queries.search import VoteSearch, find_votes
-from arena.results.queries.votes import counted_votes
+from arena.results.queries.votes import select_counted_votes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class Pair(NamedTuple):
 def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:
     """The votes of a rating by pair, as seen from the lower contestant; one query."""
     pairs: defaultdict[Pair, VoteScore] = defaultdict(VoteScore)
-    for count in _count_votes(counted_votes(snapshot), snapshot):
+    for count in _count_votes(select_counted_votes(snapshot), snapshot):
         pair = Pair.of(count.scenario, count.sample, count.left, count.right)
         pairs[pair] = count.add_to(pairs[pair], pair.low)
     return dict(pairs)
@@ -72,7 +72,7 @@ def sort_votes(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str]]:
         return -score.disagreement, -score.votes, slug, pair, pk
 
     columns = rows.values_list(
-        *("pk", F("mark"), "matchup__scenario__slug", "matchup__scenario", _sample_of(snapshot)),
+        *("pk", F("mark"), "matchup__scenario__slug", "matchup__scenario", _sample(snapshot)),
         *("shown_left__contestant", "shown_right__contestant"),
     )
     return [(pk, mark) for pk, mark, *_ in sorted(columns, key=place)]
@@ -103,12 +103,12 @@ class _Count(NamedTuple):
 
 def _count_votes(rows: QuerySet[Vote], snapshot: Snapshot) -> Iterator[_Count]:
     grouped = rows.values_list(
-        *("matchup__scenario", _sample_of(snapshot)),
+        *("matchup__scenario", _sample(snapshot)),
         *("shown_left__contestant", "shown_right__contestant", "outcome"),
     )
     return map(_Count._make, grouped.annotate(number=Count("pk"), shown=Max("matchup")))
 
 
-def _sample_of(snapshot: Snapshot) -> F | Value:
-    """Which sample both sides show where every one is judged on its own, else 0."""
+def _sample(snapshot: Snapshot) -> F | Value:
+    """Return the sample of both sides where each one is judged on its own, else 0."""
     return F("matchup__right__sample") if snapshot.study.shows_all_samples else Value(0)

@@ -1,4 +1,4 @@
-"""Which votes of a rating somebody looks for: what stands in an address, and the rows it finds."""
+"""Search in a rating's votes: its form in an address, and the matching rows."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -43,7 +43,7 @@ MARKS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoteSearch:
-    """What is looked for; empty is all.
+    """Search for votes; an empty one finds all.
 
     Attributes:
         contestant, opponent: Slugs of who was shown.
@@ -66,23 +66,23 @@ class VoteSearch:
     order: str = ""
 
     def as_query(self) -> dict[str, str]:
-        """What an address says of it: nothing of what is left as it is."""
+        """Return the search as an address has it, without fields at their default."""
         values = {name: getattr(self, name) for name in _DEFAULTS}
         return {name: text for name, text in values.items() if text != _DEFAULTS[name]}
 
     @classmethod
     def of_query(cls, query: Mapping[str, str]) -> Self:
-        """What `as_query` wrote; other words of the address are somebody else's."""
+        """Return the search from `as_query`; other words of the address are ignored."""
         return cls(**{name: query[name] for name in _DEFAULTS if query.get(name)})
 
 
 def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     """The rows of a study of matchups, each with its `mark`; no order."""
-    rows: QuerySet[Vote] = _by_mark(votes.marked_votes(snapshot), search.mark)
+    rows: QuerySet[Vote] = _by_mark(votes.mark_votes(snapshot), search.mark)
     if search.expert == votes.AUTOMATIC:
         return rows.none()
     if search.expert:
-        rows = rows.filter(expert__in=votes.users_of([search.expert]).values())
+        rows = rows.filter(expert__in=votes.find_users([search.expert]).values())
     words = {"matchup__scenario__slug": search.scenario, "matchup__scenario__type": search.type}
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
@@ -91,8 +91,8 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     return _PARTS[search.part](rows, snapshot) if search.part else rows
 
 
-def is_found(tie: votes.Judged, search: VoteSearch) -> bool:
-    """Whether a tie on a pair that nobody can tell apart is looked for."""
+def is_found(tie: votes.RatedVote, search: VoteSearch) -> bool:
+    """Return whether it looks for a tie on a pair that nobody can tell apart."""
     if search.part:
         return False
     marks = {EVERY: True, LEFT_OUT: tie.mark not in (votes.COUNTED, votes.AUTOMATIC_TIE)}
@@ -127,7 +127,7 @@ def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
 
 
 def _shows(search: VoteSearch) -> Q:
-    """Who was shown, on either side, and how it came out as seen from the contestant."""
+    """Return the condition on the shown contestant and on the outcome as seen from it."""
     left, right = "shown_left__contestant__slug", "shown_right__contestant__slug"
     wanted = {"won": ("left", "right"), "lost": ("right", "left")}
     on_left, on_right = wanted.get(search.outcome, (search.outcome, search.outcome))
@@ -147,7 +147,7 @@ def _shows(search: VoteSearch) -> Q:
 def _repeats(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
     decided = rows.filter(matchup__kind=REPEAT, outcome__in=votes.RATED)
     current = decided.exclude(Q(mark=votes.LeftOut.SUPERSEDED.value))
-    counted = votes.marked_votes(snapshot).filter(Q(mark=votes.COUNTED))
+    counted = votes.mark_votes(snapshot).filter(Q(mark=votes.COUNTED))
     return current.filter(Exists(counted.filter(matchup=OuterRef("matchup__repeat_of"))))
 
 

@@ -15,7 +15,7 @@ from django.db.models.fields import CharField
 
 from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
+from arena.pairing.rules import Entry, draw_ties, make_grid, scenario_at
 from augment.errors import check_names
 from augment.models import Contestant
 from augment.services.scenarios.scenes import ScenarioType
@@ -70,7 +70,7 @@ REASONS: dict[str, str] = {
 """The same in words."""
 
 
-class Judged(NamedTuple):
+class RatedVote(NamedTuple):
     """One current vote.
 
     Attributes:
@@ -120,7 +120,7 @@ class Judged(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Competitor:
-    """Who competes; `contestant` is None for names from a file."""
+    """Contestant of a rating; `contestant` is None for names from a file."""
 
     slug: str
     name: str
@@ -132,7 +132,7 @@ class Competitor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filters:
-    """Which votes are asked for.
+    """Filters of votes.
 
     Attributes:
         types: Of scenarios; empty is all.
@@ -155,7 +155,7 @@ class Filters:
     question: str = ""
 
     def is_own(self, judge: str, left: str, right: str) -> bool:
-        """Whether a judge is marked author of one of the two."""
+        """Return whether a judge is marked author of one of the two."""
         return (judge, left) in self.authors or (judge, right) in self.authors
 
     def as_document(self) -> dict[str, Any]:
@@ -172,7 +172,7 @@ class Filters:
 
     @classmethod
     def of_document(cls, document: dict[str, Any]) -> Self:
-        """What `as_document` wrote.
+        """Return the filters from `as_document`.
 
         Older snapshots left settled pairs out, and were made when studies asked one question.
         """
@@ -189,7 +189,7 @@ class Filters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VoteSet:
-    """What is rated, in the order in which it was decided.
+    """Votes of a rating, in the order of their decisions.
 
     Attributes:
         competitors: By slug.
@@ -201,19 +201,19 @@ class VoteSet:
     """
 
     competitors: tuple[Competitor, ...]
-    counted: tuple[Judged, ...]
-    repeats: tuple[Judged, ...]
-    checks: tuple[Judged, ...]
+    counted: tuple[RatedVote, ...]
+    repeats: tuple[RatedVote, ...]
+    checks: tuple[RatedVote, ...]
     references: frozenset[str]
     left_out: dict[str, int]
 
 
 def is_imported(study: Study) -> bool:
-    """Whether the votes came from a file."""
+    """Return whether the votes came from a file."""
     return hasattr(study, "vote_file")
 
 
-def last_vote_of(study: Study) -> int | None:
+def last_vote_id(study: Study) -> int | None:
     """The row of the newest vote, so that later ones can be told apart."""
     votes: QuerySet[Any] = (
         ImportedVote.objects.filter(file__study=study)
@@ -225,7 +225,7 @@ def last_vote_of(study: Study) -> int | None:
 
 
 def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
-    """The votes of a study up to a row, see `last_vote_of`; None for none at all.
+    """The votes of a study up to a row, see `last_vote_id`; None for none at all.
 
     Raises:
         UnknownName: A filter names a type, a judge, a kind or a question that does not occur.
@@ -233,14 +233,14 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     votes = current_votes(study, filters, last)
     given = len(votes)
     if not filters.leave_out_settled:
-        votes += settled_ties(study, votes, filters)
+        votes += list_ties_unshown(study, votes, filters)
     _check_names(study, filters, votes)
     left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
     if not is_imported(study):
         everything = _votes_asked(study, filters, last).count()
         left_out[LeftOut.SUPERSEDED.value] = everything - given
     primary = votes
-    if question_of(study, filters) != study.questions[0]:
+    if filtered_question(study, filters) != study.questions[0]:
         primary = current_votes(study, replace(filters, question=""), last)
     checks = tuple(vote for vote in primary if vote.mark == LeftOut.CHECK)
     references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
@@ -254,18 +254,18 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     )
 
 
-def question_of(study: Study, filters: Filters) -> str:
+def filtered_question(study: Study, filters: Filters) -> str:
     """The question whose votes are asked for."""
     return filters.question or str(study.questions[0])
 
 
-def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judged]:
+def current_votes(study: Study, filters: Filters, last: int | None) -> list[RatedVote]:
     """The votes that were current at a row, oldest first, with their marks."""
     if is_imported(study):
-        lines = marked_lines(study, filters, last).order_by("line")
+        lines = mark_imported_votes(study, filters, last).order_by("line")
         names = ("first", "second", "outcome", "judge", "item", F("mark"))
         return [
-            Judged(
+            RatedVote(
                 judge=judge,
                 judge_name=judge,
                 item=item,
@@ -297,11 +297,13 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
             left_code=str(vote.left_code),
             right_code=str(vote.right_code),
         )
-        for vote in map(Judged._make, current.values_list(*columns))
+        for vote in map(RatedVote._make, current.values_list(*columns))
     ]
 
 
-def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> list[Judged]:
+def list_ties_unshown(
+    study: Study, votes: Iterable[RatedVote], filters: Filters
+) -> list[RatedVote]:
     """Ties on the pairs that the study settled without showing; see arena.pairing.rules.
 
     Args:
@@ -312,7 +314,7 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
     settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
     if not settled:
         return []
-    by_judge: dict[str, list[Judged]] = {}
+    by_judge: dict[str, list[RatedVote]] = {}
     for vote in votes:
         if vote.kind == MAIN and vote.outcome in RATED:
             by_judge.setdefault(vote.judge, []).append(vote)
@@ -323,14 +325,14 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
     drawn = draw_ties(
         settled,
         {judge: len(own) for judge, own in by_judge.items()},
-        showable=int(grid_of(entries, alike, challengers).showable.sum()),
+        showable=int(make_grid(entries, alike, challengers).showable.sum()),
         seed=study.seed,
     )
     simulated = {row.slug for row in study.contestants.all() if row.is_simulated}
     ties = []
     for (place, left, right), judge in drawn:
-        item, first = scenario_of(place), by_judge[judge][0]
-        tie = Judged(
+        item, first = scenario_at(place), by_judge[judge][0]
+        tie = RatedVote(
             judge=judge,
             judge_name=first.judge_name,
             item=item,
@@ -341,7 +343,7 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
             outcome=Vote.Outcome.EQUAL.value,
             both_miss=False,
             is_simulated=first.is_simulated,
-            question=question_of(study, filters),
+            question=filtered_question(study, filters),
         )
         is_asked_for = (
             MAIN in filters.kinds
@@ -357,7 +359,7 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
     return ties
 
 
-def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+def mark_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     """All votes up to a rating with their `mark`: the first reason that fits, or COUNTED.
 
     At most three queries beside its own: who is simulated, who was asked for, who is author.
@@ -366,12 +368,14 @@ def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     return _mark_votes(snapshot.study, filters, snapshot.last_vote)
 
 
-def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+def select_counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     """The rows that the rating is made of, without those of pairs that nobody was shown."""
-    return marked_votes(snapshot).filter(Q(mark=COUNTED))
+    return mark_votes(snapshot).filter(Q(mark=COUNTED))
 
 
-def marked_lines(study: Study, filters: Filters, last: int | None) -> QuerySet[ImportedVote]:
+def mark_imported_votes(
+    study: Study, filters: Filters, last: int | None
+) -> QuerySet[ImportedVote]:
     """The votes of a study's file up to a row, each with its `mark`."""
     is_other = Q()
     if filters.types or MAIN not in filters.kinds:
@@ -384,7 +388,7 @@ def marked_lines(study: Study, filters: Filters, last: int | None) -> QuerySet[I
 
 def own_votes(filters: Filters) -> Q:
     """Votes of authors on their own contestants; one query."""
-    users = users_of({judge for judge, _ in filters.authors})
+    users = find_users({judge for judge, _ in filters.authors})
     own = Q(pk=None)
     for judge, slug in sorted(filters.authors):
         shown = Q(shown_left__contestant__slug=slug) | Q(shown_right__contestant__slug=slug)
@@ -392,7 +396,7 @@ def own_votes(filters: Filters) -> Q:
     return own
 
 
-def users_of(codes: Collection[str]) -> dict[str, int]:
+def find_users(codes: Collection[str]) -> dict[str, int]:
     """Accounts by the codes of their people, whatever else is among the codes; one query."""
     people = Person.objects.values_list("code", "user_id")
     return {str(code): user for code, user in people if str(code) in codes}
@@ -401,8 +405,8 @@ def users_of(codes: Collection[str]) -> dict[str, int]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _competitors(study: Study, votes: Iterable[Judged]) -> tuple[Competitor, ...]:
-    """Who competes, by slug: a study's contestants, or who occurs in the votes of a file."""
+def _competitors(study: Study, votes: Iterable[RatedVote]) -> tuple[Competitor, ...]:
+    """Return competitors by slug: a study's contestants, or the names in a file's votes."""
     if is_imported(study):
         names = {name for vote in votes for name in (vote.left, vote.right)}
         return tuple(Competitor(slug=name, name=name) for name in sorted(names))
@@ -419,12 +423,12 @@ def _competitors(study: Study, votes: Iterable[Judged]) -> tuple[Competitor, ...
     )
 
 
-def _check_names(study: Study, filters: Filters, votes: Sequence[Judged]) -> None:
+def _check_names(study: Study, filters: Filters, votes: Sequence[RatedVote]) -> None:
     judges = {vote.judge for vote in votes}
     types = {*(one.value for one in ScenarioType), *(vote.type for vote in votes)}
     for what, names, known in (
         ("kind of vote", filters.kinds, list(KINDS)),
-        ("question of this study", (question_of(study, filters),), study.questions),
+        ("question of this study", (filtered_question(study, filters),), study.questions),
         ("scenario type", filters.types, sorted(types)),
         ("expert", filters.experts, sorted(judges)),
     ):
@@ -439,7 +443,7 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
     if REPEAT not in filters.kinds:
         reasons.append((LeftOut.REPEAT, Q(matchup__kind=REPEAT)))
     reasons.append((LeftOut.SKIP, ~Q(outcome__in=RATED)))
-    if question_of(study, filters) != study.questions[0]:
+    if filtered_question(study, filters) != study.questions[0]:
         reasons.append((LeftOut.SKIP, Q(_skip_of_pair(last))))
     if not study.allow_simulated:
         reasons.append((LeftOut.SIMULATED, Q(is_simulated=True)))
@@ -450,7 +454,7 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
     if filters.types:
         reasons.append((LeftOut.FILTERED, ~Q(matchup__scenario__type__in=filters.types)))
     if filters.experts:
-        users = list(users_of(filters.experts).values())
+        users = list(find_users(filters.experts).values())
         reasons.append((LeftOut.FILTERED, ~Q(expert__in=users)))
     if MAIN not in filters.kinds:
         reasons.append((LeftOut.FILTERED, Q(matchup__kind=MAIN)))
@@ -461,11 +465,11 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
 
 def _votes_asked(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
     rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
-    return rows.filter(question=question_of(study, filters))
+    return rows.filter(question=filtered_question(study, filters))
 
 
 def _skip_of_pair(last: int | None) -> Exists:
-    """Whether the pair was skipped whole after an answer to another question."""
+    """Return the condition that the pair was skipped whole after an answer to another question."""
     skips = Vote.objects.filter(
         matchup=OuterRef("matchup"), outcome=Vote.Outcome.SKIP, pk__lte=last or 0
     )

@@ -1,13 +1,13 @@
-"""Which metrics and judge models agree with the votes of a study."""
+"""Agreement of metrics and judge models with the votes of a study."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 
-from arena.jobs.queries import shown_augmentations
+from arena.jobs.queries import list_shown_ids
 from arena.models import Snapshot, Study
 from arena.rating import agreement
 from arena.results.queries.judges import judge_preferences
-from arena.results.queries.votes import COUNTED, Filters, Judged, current_votes, is_imported
+from arena.results.queries.votes import COUNTED, Filters, RatedVote, current_votes, is_imported
 from arena.results.services.analysis import SCORES
 from augment.services.judging.metric_scores import metric_scores
 
@@ -33,7 +33,7 @@ def rater_agreement(snapshot: Snapshot) -> tuple[agreement.AgreementLine, ...]:
     return tuple(lines)
 
 
-def pair_votes(votes: Iterable[Judged]) -> list[agreement.PairVote]:
+def pair_votes(votes: Iterable[RatedVote]) -> list[agreement.PairVote]:
     """Return the votes that count."""
     return [
         agreement.PairVote(
@@ -53,7 +53,7 @@ def study_raters(study: Study) -> list[agreement.NamedRater]:
     """Return the metrics by which one augmentation of a study is better than another."""
     return [
         agreement.rater_by_scores(scores.name, scores.by_code, tolerance=scores.tolerance)
-        for scores in metric_scores(shown_augmentations(study))
+        for scores in metric_scores(list_shown_ids(study))
     ]
 
 

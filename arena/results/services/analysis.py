@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from django.db.models import Count
 
-from arena.jobs.queries import model_classes, shown_augmentations, spent_on
+from arena.jobs.queries import list_shown_ids, model_classes, spent_on
 from arena.models import Matchup, Study, Vote
 from arena.rating.comparisons import (
     LOSS,
@@ -30,7 +30,7 @@ from arena.rating.snapshot_document import (
     TypeRating,
     TypeStanding,
 )
-from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, Judged, is_imported
+from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote, is_imported
 from augment.services.judging.displacement import of_rows, summarise
 from augment.services.scenarios.scenes import in_type_order, type_label
 
@@ -60,7 +60,7 @@ class VoteArrays:
     ms: FloatArray
 
 
-def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[Judged]) -> VoteArrays:
+def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[RatedVote]) -> VoteArrays:
     """Number everything, in the order in which it occurs.
 
     Args:
@@ -102,7 +102,7 @@ TYPE_ROUNDS = 2000
 
 
 def pairs(
-    comparisons: Comparisons, votes: Sequence[Judged], planned: Counter[frozenset[str]]
+    comparisons: Comparisons, votes: Sequence[RatedVote], planned: Counter[frozenset[str]]
 ) -> tuple[PairRecord, ...]:
     """Wins, ties, losses of every pair that met or should have, from the first one's view."""
     wins, ties = count_wins(comparisons)
@@ -128,8 +128,8 @@ def pairs(
     )
 
 
-def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
-    """How often each pair was to be judged, by the same filters; nothing for votes of a file."""
+def count_planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
+    """Return the planned number of each pair by the same filters; empty for votes of a file."""
     if is_imported(study):
         return Counter()
     rows = study.matchups.filter(kind__in=[Matchup.Kind(kind).value for kind in filters.kinds])
@@ -145,14 +145,14 @@ def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
     return planned
 
 
-def count_settled_ties(votes: Iterable[Judged]) -> Counter[str]:
+def count_settled_ties(votes: Iterable[RatedVote]) -> Counter[str]:
     """Return how many ties on pairs that nobody was shown count for whom, sorted by slug."""
     ties = [(vote.left, vote.right) for vote in votes if vote.kind == AUTOMATIC]
     return Counter(sorted(chain.from_iterable(ties)))
 
 
 def by_type(
-    arrays: VoteArrays, votes: Sequence[Judged], board: Leaderboard
+    arrays: VoteArrays, votes: Sequence[RatedVote], board: Leaderboard
 ) -> tuple[TypeRating, ...]:
     """The rating of every scenario type on its own, as the board's, in the catalogue's order.
 
@@ -206,9 +206,9 @@ def _rate_type(
 
 
 def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
-    """How far each contestant's shown augmentations are from the references."""
+    """Return each contestant's distance of shown augmentations from the references."""
     by_slug: dict[str, list[Any]] = {}
-    for row in of_rows(shown_augmentations(study)):
+    for row in of_rows(list_shown_ids(study)):
         if row.displacement is not None:
             by_slug.setdefault(row.row.contestant.slug, []).append(row.displacement)
     totals = ((slug, summarise(found)) for slug, found in sorted(by_slug.items()))
@@ -229,11 +229,11 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
 
 
 def cost(study: Study, competitors: Sequence[Competitor]) -> tuple[ScenarioCost, ...]:
-    """What each contestant that asks a language model takes per scenario."""
+    """Return the average use for a scenario of each contestant that asks a language model."""
     rows = [
         competitor.contestant for competitor in competitors if competitor.contestant is not None
     ]
-    spent = spent_on(shown_augmentations(study))
+    spent = spent_on(list_shown_ids(study))
     classes = model_classes(rows)
     return tuple(
         ScenarioCost(

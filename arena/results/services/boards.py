@@ -23,14 +23,14 @@ from arena.results.queries.votes import (
     Competitor,
     Filters,
     VoteSet,
-    last_vote_of,
+    last_vote_id,
     vote_set,
 )
 from arena.results.services.analysis import count_settled_ties, vote_arrays
 from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
-from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
-from arena.studies.queries import authors_of
+from arena.results.services.vote_files import sha256_hex, vote_rows, votes_csv
+from arena.studies.queries import author_pairs
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, Scenario
@@ -72,7 +72,7 @@ def make_board(
     board.studies.add(study)
     require_poolable(board, but_open=True)
     # Asked once: a benchmark may be retired, and its scenarios changed, while the board goes on.
-    if benchmark is not None and _scenarios_of(study) != _test_split(benchmark):
+    if benchmark is not None and _frozen_scenarios(study) != _test_split(benchmark):
         raise Conflict(
             f"'{study.name}' does not show just the scenarios and instructions of the test split "
             f"of {benchmark}: its votes can't be rated on this board."
@@ -156,11 +156,11 @@ def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
     if not studies:
         raise Conflict("All studies of the board were cancelled: nothing can be rated.")
     first = studies[0]
-    wanted = _scenarios_of(first)
+    wanted = _frozen_scenarios(first)
     for study in studies:
         if study.state == Study.State.OPEN and not but_open:
             raise StudyStillOpen(study.name)
-        if _scenarios_of(study) != wanted:
+        if _frozen_scenarios(study) != wanted:
             raise Conflict(
                 f"'{study.name}' does not show just the scenarios and instructions of "
                 f"'{first.name}': its votes can't be rated on this board."
@@ -191,7 +191,7 @@ def make_document(
         now: When it is made.
     """
     found = [
-        vote_set(study, filters=Filters(authors=authors_of(study)), last=last_vote_of(study))
+        vote_set(study, filters=Filters(authors=author_pairs(study)), last=last_vote_id(study))
         for study in studies
     ]
     votes = [vote for one in found for vote in one.counted]
@@ -222,10 +222,10 @@ def make_document(
         method=_method_text(rated),
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
-        studies=tuple(map(_pooled, studies, found)),
+        studies=tuple(map(_pool, studies, found)),
         founders=founders,
         votes=cast,
-        votes_sha256=digest_of(votes_csv(vote_rows(votes, judges))),
+        votes_sha256=sha256_hex(votes_csv(vote_rows(votes, judges))),
         left_out=dict(sorted(sum((Counter(x.left_out) for x in found), Counter[str]()).items())),
         notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
         versions={name: str(version) for name, version in software_versions().items()},
@@ -246,8 +246,8 @@ def _method_text(rated: Leaderboard) -> str:
 _SHOWN = ("slug", "type", "instruction")
 
 
-def _scenarios_of(study: Study) -> list[tuple[str, ...]]:
-    """What the study shows: scenarios with types and instructions, as frozen at its opening.
+def _frozen_scenarios(study: Study) -> list[tuple[str, ...]]:
+    """Return the study's scenarios with types and instructions, as frozen at its opening.
 
     Raises:
         Conflict: Nothing was frozen.
@@ -259,13 +259,13 @@ def _scenarios_of(study: Study) -> list[tuple[str, ...]]:
 
 
 def _test_split(benchmark: Benchmark) -> list[tuple[str, ...]]:
-    """What a study shows of a benchmark: references of the other split are known to all."""
+    """Return the study's scenarios of a benchmark's test split; other references are public."""
     items = benchmark.items.filter(split=Split.TEST)
     scenarios = Scenario.objects.filter(benchmark_items__in=items).order_by("slug")
     return list(scenarios.values_list(*_SHOWN))
 
 
-def _pooled(study: Study, votes: VoteSet) -> PooledStudy:
+def _pool(study: Study, votes: VoteSet) -> PooledStudy:
     return PooledStudy(
         name=study.name,
         code=str(study.code),

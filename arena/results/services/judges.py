@@ -7,8 +7,8 @@ from django.db import transaction
 
 from arena.models import Study
 from arena.rating.agreement import AgreementLine, measure_agreement
-from arena.results.queries.judges import judged_pairs
-from arena.results.queries.votes import Filters, current_votes, last_vote_of
+from arena.results.queries.judges import list_judged_pairs
+from arena.results.queries.votes import Filters, current_votes, last_vote_id
 from arena.results.services.agreement import judge_raters, pair_votes
 from augment.errors import check_names
 from augment.models import JudgeRun
@@ -22,7 +22,7 @@ from augment.services.running.judge_runs import (
 
 
 def estimate_study_judge(study: Study, request: JudgeRequest) -> JudgeEstimate:
-    """Return what a judge of all pairs that experts judged would use.
+    """Return the estimate of a judge of all pairs that experts judged.
 
     Raises:
         UnknownName: No such endpoint, or the study does not ask that question.
@@ -55,11 +55,11 @@ def judge_agreement(study: Study, question: str) -> Mapping[str, AgreementLine]:
     raters = judge_raters(study, question)
     if not raters:
         return {}
-    votes = current_votes(study, Filters(question=question), last_vote_of(study))
+    votes = current_votes(study, Filters(question=question), last_vote_id(study))
     lines = measure_agreement(pair_votes(votes), raters)
     return {line.rater: line for line in lines if not line.type}
 
 
 def _pairs(study: Study, question: str) -> list[ShownPair]:
     check_names("question of this study", [question], study.questions)
-    return judged_pairs(study, question)
+    return list_judged_pairs(study, question)

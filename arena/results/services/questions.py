@@ -11,12 +11,12 @@ import numpy as np
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
-from arena.models.ratings import stored_values
+from arena.models.ratings import snapshot_values
 from arena.rating.agreement import two_way_share
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import Line
-from arena.results.queries.access import snapshots_of
-from arena.results.queries.votes import Filters, counted_votes
+from arena.results.queries.access import list_snapshots
+from arena.results.queries.votes import Filters, select_counted_votes
 
 FEWEST = 3
 """Fewer contestants have no correlation worth a number."""
@@ -26,7 +26,7 @@ DECIDED = ("left", "right")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoQuestions:
-    """How the answers to two questions hang together.
+    """Dependence between the answers to two questions.
 
     Attributes:
         spearman: Of the ratings of the contestants that both rate, None for fewer than three or
@@ -67,14 +67,14 @@ def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
     if len(questions) == 1:
         return None
     found = {snapshot.question: snapshot}
-    for one in snapshots_of(snapshot.study).filter(state=Snapshot.State.READY).defer("results"):
+    for one in list_snapshots(snapshot.study).filter(state=Snapshot.State.READY).defer("results"):
         if _rates_alike(one) == _rates_alike(snapshot):
             found.setdefault(one.question, one)
     ratings = {question: found.get(question) for question in questions}
     rows = Standing.objects.filter(snapshot__in=found.values())
     by_rating: dict[int, dict[str, Line]] = {one.pk: {} for one in found.values()}
     for row in rows.order_by(F("rating").desc(nulls_last=True), "slug"):
-        by_rating[row.snapshot_id][row.slug] = Line(name=row.name, **stored_values(row))
+        by_rating[row.snapshot_id][row.slug] = Line(name=row.name, **snapshot_values(row))
     standings = {key: by_rating[one.pk] if one else {} for key, one in ratings.items()}
     return RatedQuestions(
         ratings=ratings,
@@ -126,7 +126,7 @@ def _link(
 
 def _preferences(snapshot: Snapshot) -> dict[int, tuple[str, int, int]]:
     """Return the better side with expert and scenario, by matchup; ties are left out."""
-    votes = counted_votes(snapshot).filter(outcome__in=DECIDED)
+    votes = select_counted_votes(snapshot).filter(outcome__in=DECIDED)
     rows = votes.values_list("matchup", "outcome", "expert", "matchup__scenario")
     return {matchup: (outcome, expert, scenario) for matchup, outcome, expert, scenario in rows}
 

@@ -1,4 +1,4 @@
-"""How a new rating is asked for: what form, body and services share."""
+"""Request for a new rating, shared by form, API and services."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -14,7 +14,7 @@ from django.utils import timezone
 
 from arena.errors import StudyStillOpen
 from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
-from arena.models.ratings import stored_values
+from arena.models.ratings import snapshot_values
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import (
@@ -32,11 +32,11 @@ from arena.results.queries.access import votes_in
 from arena.results.services import analysis
 from arena.results.services.agreement import rater_agreement
 from arena.results.services.analysis import VoteArrays, vote_arrays
-from arena.results.services.settled import settled_remark
+from arena.results.services.settled import remark_on_ties
 from arena.results.services.trust import board_remarks, trust
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
-from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
-from arena.studies.queries import authors_of
+from arena.results.services.vote_files import sha256_hex, vote_rows, votes_csv
+from arena.studies.queries import author_pairs
 from arena.studies.services.opening import product_version
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, check_names
@@ -52,7 +52,7 @@ Word = TypeVar("Word", bound=StrEnum)
 
 
 class Choices(TypedDict, total=False):
-    """How to rate; `plan_snapshot` says what each means and what holds where it is left out."""
+    """Choices of a rating; `plan_snapshot` defines each one and its default."""
 
     method: str
     rounds: int
@@ -65,8 +65,8 @@ class Choices(TypedDict, total=False):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Computed:
-    """What came out beside that which the snapshot itself has: its lines."""
+class ComputedRating:
+    """Results beside the snapshot's own fields: its lines."""
 
     board: Leaderboard
     competitors: tuple[vote_queries.Competitor, ...]
@@ -82,7 +82,7 @@ def rate_now(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     errors are those of `plan_snapshot`; after an error nothing is kept. Nothing is written before
     all is computed, so that votes come in meanwhile.
     """
-    snapshot = _planned(study, choices)
+    snapshot = _plan(study, choices)
     computed = compute(snapshot, lambda percent: None)
     with in_turn(), transaction.atomic():
         snapshot.save()
@@ -114,7 +114,7 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
             does not occur.
         Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
-    snapshot = _planned(study, choices)
+    snapshot = _plan(study, choices)
     snapshot.save()
     _log(snapshot)
     return snapshot
@@ -149,7 +149,7 @@ RATINGS = PlannedRatings()
 
 
 def is_big(study: Study) -> bool:
-    """Whether rating takes longer than a person should wait for a page."""
+    """Return whether rating takes longer than a person should wait for a page."""
     if vote_queries.is_imported(study):
         return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
     return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
@@ -178,7 +178,7 @@ def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
 # --- Computing and keeping ---------------------------------------------------------------------
 
 
-def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
+def compute(snapshot: Snapshot, report: Callable[[int], None]) -> ComputedRating:
     """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
 
     Args:
@@ -193,7 +193,7 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     report(60)
     snapshot.results = results = _results(snapshot, votes, arrays, board)
     report(90)
-    snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, results.judges)))
+    snapshot.votes_sha256 = sha256_hex(votes_csv(vote_rows(votes.counted, results.judges)))
     snapshot.votes_counted = len(votes.counted)
     snapshot.votes_left_out = votes.left_out
     snapshot.versions = software_versions()
@@ -203,11 +203,11 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     snapshot.includes_simulated = any(
         one.is_simulated for one in votes.competitors + votes.counted
     )
-    return Computed(board=board, competitors=votes.competitors)
+    return ComputedRating(board=board, competitors=votes.competitors)
 
 
 @transaction.atomic
-def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
+def keep(snapshot: Snapshot, computed: ComputedRating) -> Snapshot:
     """Store what was computed."""
     snapshot.state = Snapshot.State.READY
     snapshot.progress = 100
@@ -223,14 +223,14 @@ def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
             variant=competitor.variant,
             kind=competitor.kind,
             is_simulated=competitor.is_simulated,
-            **stored_values(line),
+            **snapshot_values(line),
         )
         for competitor, line in zip(computed.competitors, computed.board.lines, strict=True)
     )
     return snapshot
 
 
-def votes_of(snapshot: Snapshot) -> vote_queries.VoteSet:
+def read_votes(snapshot: Snapshot) -> vote_queries.VoteSet:
     """The votes that a snapshot is made of, read again.
 
     Raises:
@@ -238,7 +238,7 @@ def votes_of(snapshot: Snapshot) -> vote_queries.VoteSet:
     """
     votes = _vote_set(snapshot)
     rows = vote_rows(votes.counted, snapshot.results.judges)
-    if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
+    if sha256_hex(votes_csv(rows, votes_version(snapshot))) != snapshot.votes_sha256:
         raise Conflict(
             f"The votes of '{snapshot.study.name}' are not those of this rating any more. "
             "Rate again."
@@ -246,7 +246,7 @@ def votes_of(snapshot: Snapshot) -> vote_queries.VoteSet:
     return votes
 
 
-def votes_version_of(snapshot: Snapshot) -> int:
+def votes_version(snapshot: Snapshot) -> int:
     """The version of the columns that its file of votes has; older ones had no word for it."""
     return int(snapshot.versions.get("votes", 1))
 
@@ -266,7 +266,7 @@ def software_versions() -> dict[str, str | int]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _planned(study: Study, choices: Choices) -> Snapshot:
+def _plan(study: Study, choices: Choices) -> Snapshot:
     rounds, seed = choices.get("rounds", DEFAULT_ROUNDS), choices.get("seed", 0)
     unit, intervals = choices.get("unit"), choices.get("intervals")
     if study.state == Study.State.CANCELLED:
@@ -301,9 +301,11 @@ def _planned(study: Study, choices: Choices) -> Snapshot:
         intervals=rules.intervals,
         seed=seed,
         filters=replace(
-            filters, authors=authors_of(study), question=vote_queries.question_of(study, filters)
+            filters,
+            authors=author_pairs(study),
+            question=vote_queries.filtered_question(study, filters),
         ).as_document(),
-        last_vote=vote_queries.last_vote_of(study),
+        last_vote=vote_queries.last_vote_id(study),
         votes_counted=0,
         is_early=is_early,
         made_by=choices.get("actor"),
@@ -358,9 +360,9 @@ def _results(
     study = snapshot.study
     from_file = vote_queries.is_imported(study)
     filters = vote_queries.Filters.of_document(snapshot.filters)
-    planned = analysis.planned_pairs(study, filters)
+    planned = analysis.count_planned_pairs(study, filters)
     settled = dict(analysis.count_settled_ties(votes.counted))
-    remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
+    remark = remark_on_ties(study, votes, left_out=filters.leave_out_settled)
     return Results(
         version=RESULTS_VERSION,
         board=replace(board_remarks(board, arrays, *filter(None, [remark])), settled=settled),

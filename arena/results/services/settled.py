@@ -1,14 +1,14 @@
-"""What a rating says of pairs that nobody can tell apart."""
+"""Statements of a rating on pairs that nobody can tell apart."""
 
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
-from arena.pairing.rules import scenario_of
+from arena.pairing.rules import scenario_at
 from arena.rating.lines import whole_percent
 from arena.results.queries.votes import AUTOMATIC, VoteSet
 
 
-def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
-    """Return what the table estimates where pairs were settled, empty where none was.
+def remark_on_ties(study: Study, votes: VoteSet, *, left_out: bool) -> str:
+    """Return the table's estimand if pairs are counted as ties unshown, else an empty text.
 
     Args:
         study: What was planned.
@@ -33,7 +33,7 @@ def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
 def _on_those_shown(study: Study, votes: VoteSet) -> str:
     """The tie share of alike pairs that experts were shown all the same."""
     shown = {
-        (scenario_of(place), frozenset((one, other)))
+        (scenario_at(place), frozenset((one, other)))
         for place, one, other in study.rules.get("alike_shown", ())
     }
     given = [

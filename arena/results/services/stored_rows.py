@@ -41,7 +41,7 @@ the backup's in its place."""
 AT_ONCE = 500
 
 
-def applied_migrations() -> list[str]:
+def list_migrations() -> list[str]:
     """The migrations of this release, as app.name."""
     return sorted(f"{app}.{name}" for app, name in MigrationLoader(connection).disk_migrations)
 
@@ -52,12 +52,12 @@ def find_tables() -> list[type[models.Model]]:
     kept = (
         model
         for model in tables
-        if model._meta.managed and not model._meta.proxy and label_of(model) not in LEFT_OUT
+        if model._meta.managed and not model._meta.proxy and model_label(model) not in LEFT_OUT
     )
-    return sorted(kept, key=label_of)
+    return sorted(kept, key=model_label)
 
 
-def label_of(model: type[models.Model]) -> str:
+def model_label(model: type[models.Model]) -> str:
     """Its name in a backup, for example arena.vote."""
     return model._meta.label_lower
 
@@ -81,8 +81,8 @@ def frozen_rows() -> Iterator[None]:
 
 
 def read_values(found: QuerySet[Any]) -> Iterator[list[Any]]:
-    """Each row as plain values, in the order of `columns_of` and of their keys."""
-    columns = columns_of(found.model)
+    """Each row as plain values, in the order of `stored_columns` and of their keys."""
+    columns = stored_columns(found.model)
     names = [field.attname for field in columns]
     for row in found.order_by("pk").values_list(*names).iterator(chunk_size=AT_ONCE):
         yield [_plain(field, value) for field, value in zip(columns, row, strict=True)]
@@ -93,7 +93,7 @@ def as_line(values: list[Any]) -> bytes:
     return json.dumps(values, ensure_ascii=False, sort_keys=True).encode() + b"\n"
 
 
-def columns_of(model: type[models.Model]) -> list[models.Field[Any, Any]]:
+def stored_columns(model: type[models.Model]) -> list[models.Field[Any, Any]]:
     """The columns that are stored, as Django orders them."""
     return [field for field in model._meta.local_concrete_fields if not field.generated]
 
@@ -111,7 +111,7 @@ def write_rows(
     Raises:
         ValueError: A line does not fit the table, or was refused; it is named by its number.
     """
-    columns = columns_of(model)
+    columns = stored_columns(model)
     largest = max(1, connection.ops.bulk_batch_size(columns, [None] * AT_ONCE))
     waiting = enumerate(lines, start=1)
     number = 0
@@ -135,17 +135,17 @@ def find_filled_tables() -> list[str]:
     """The tables that keep an installation from being an empty one."""
     there = connection.introspection.table_names()
     return [
-        label_of(model)
+        model_label(model)
         for model in find_tables()
         if model._meta.db_table in there
-        and label_of(model) not in MADE_BY_MIGRATING
+        and model_label(model) not in MADE_BY_MIGRATING
         and model._base_manager.exclude(
-            pk__in=prepared_rows() if model is Contestant else ()
+            pk__in=list_prepared_rows() if model is Contestant else ()
         ).exists()
     ]
 
 
-def prepared_rows() -> QuerySet[Contestant]:
+def list_prepared_rows() -> QuerySet[Contestant]:
     """Return the contestants that `prepare` makes, which a restore brings itself."""
     return Contestant.objects.filter(slug__in=BUILTIN)
 
@@ -167,11 +167,11 @@ def _row(
     model: type[models.Model], columns: list[models.Field[Any, Any]], values: list[Any]
 ) -> models.Model:
     if not isinstance(values, list) or len(values) != len(columns):
-        raise ValueError(f"{label_of(model)}: {len(columns)} values are needed in each line")
+        raise ValueError(f"{model_label(model)}: {len(columns)} values are needed in each line")
     row = model()
     for field, value in zip(columns, values, strict=True):
         try:
-            setattr(row, field.attname, _parsed(field, value))
+            setattr(row, field.attname, _parse(field, value))
             _check_column(row, field, value)
         except REFUSALS as error:
             raise ValueError(f"{field.name}: {_sentence(error)}") from error
@@ -210,11 +210,11 @@ def _plain(field: models.Field[Any, Any], value: Any) -> Any:
             return value
 
 
-def _parsed(field: models.Field[Any, Any], value: Any) -> Any:
+def _parse(field: models.Field[Any, Any], value: Any) -> Any:
     if value is None or isinstance(field, models.JSONField):
         return value
     if isinstance(field, models.BinaryField):
         return base64.b64decode(value)
     if isinstance(field, models.ForeignKey):
-        return _parsed(field.target_field, value)
+        return _parse(field.target_field, value)
     return field.to_python(value)

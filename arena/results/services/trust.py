@@ -1,4 +1,4 @@
-"""How far a rating can be trusted: agreement, sides, repeats, and the panel of experts."""
+"""Trustworthiness of a rating: agreement, sides, repeats, and the panel of experts."""
 
 from collections import Counter
 from dataclasses import fields, replace
@@ -53,7 +53,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
 
 
 def board_remarks(board: Leaderboard, arrays: VoteArrays, *more_warnings: str) -> BoardRemarks:
-    """What a rating says beside its lines; nothing of pairs where votes hang together unseen."""
+    """Return the remarks of a rating; none on pairs if votes have unknown clusters."""
     names = [line.name for line in board.lines]
     known = {"expert": {*arrays.judges} - {""}, "scenario": {*arrays.items} - {""}}
     unseen = [kind for kind in known if known[kind] and kind not in board.unit.kinds]

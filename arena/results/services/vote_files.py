@@ -17,7 +17,7 @@ from arena.errors import VotesUnreadable
 from arena.exports.cells import csv_text
 from arena.models import ImportedVote, Study, Vote, VoteFile
 from arena.rating import votes_file
-from arena.results.queries.votes import Judged
+from arena.results.queries.votes import RatedVote
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_change
@@ -67,7 +67,7 @@ def vote_columns(version: int) -> tuple[str, ...]:
     return COLUMNS[: _WIDTHS[version]]
 
 
-def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row]:
+def vote_rows(votes: Iterable[RatedVote], names: Mapping[str, str]) -> Iterator[Row]:
     """One row a vote, in the order of COLUMNS.
 
     Args:
@@ -103,7 +103,7 @@ def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:
     return csv_text(names, (row[: len(names)] for row in rows)).encode()
 
 
-def digest_of(content: bytes) -> str:
+def sha256_hex(content: bytes) -> str:
     """SHA-256 of a file, in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
 
@@ -111,7 +111,7 @@ def digest_of(content: bytes) -> str:
 def describe_files(files: Mapping[str, bytes]) -> dict[str, Any]:
     """Return the hash and the size of each file, for a manifest."""
     return {
-        name: {"sha256": digest_of(content), "bytes": len(content)}
+        name: {"sha256": sha256_hex(content), "bytes": len(content)}
         for name, content in files.items()
     }
 
@@ -123,7 +123,7 @@ AT_ONCE = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedVotes:
-    """What was read, for whoever asked."""
+    """Result of an import of votes."""
 
     study: Study
     votes: int

@@ -35,7 +35,7 @@ SHOWS_RESULTS = (Kind.STUDY, Kind.RATING)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MadeFile:
-    """What is to be stored.
+    """Content of a file, ready to be stored.
 
     Attributes:
         name: What it is called for people.
@@ -156,6 +156,6 @@ def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) ->
     return ask_for(StudyFile(study=study, kind=kind, asked_by=actor), study, file=kind)
 
 
-def study_files_of(study: Study) -> dict[str, StudyFile]:
+def newest_study_files(study: Study) -> dict[str, StudyFile]:
     """The newest row of each kind."""
     return {row.kind: row for row in study.files.order_by("pk")}

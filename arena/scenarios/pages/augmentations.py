@@ -6,31 +6,36 @@ import uuid
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.contestants.queries import asking_of
+from arena.contestants.queries import show_options
 from arena.scenarios.queries import modification_lines, step_changes
-from arena.site.access import ADMIN, STAFF, act_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, get_user, page_for
 from arena.site.acts import send_later, tell_errors, wait_for_workers
 from arena.site.forms import RequestForm
-from arena.site.pictures import picture_response, sized_picture_response
+from arena.site.pictures import picture_response, resize_picture
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
-from augment.services.inputs import inputs_of, read_request
+from augment.services.inputs import read_request, to_inputs
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, steps_to
-from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
+from augment.services.running.transcript_records import full_transcript, list_tries, sum_totals
 from augment.services.scenarios import pictures
-from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
+from augment.services.scenarios.prompts import (
+    ShownPrompt,
+    list_recipes,
+    preview_prompt,
+    prompt_version,
+)
 from augment.tasks import enqueue_augmentation
 
 State = Augmentation.State
 
 
 class FollowUpForm(RequestForm):
-    """What to change next, within which caps."""
+    """Next instruction of a conversation, and its caps."""
 
-    inputs = inputs_of(FollowUpRequest)
+    inputs = to_inputs(FollowUpRequest)
 
 
 @page_for(*STAFF)
@@ -38,7 +43,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
     can_go_on = augmentation.state == State.DONE and augmentation.contestant.endpoint is not None
-    tries, checked = tries_of(augmentation), check_augmentation(augmentation)
+    tries, checked = list_tries(augmentation), check_augmentation(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
@@ -52,8 +57,8 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "measured": of_augmentation(augmentation),
         "checked": checked,
         "tries": tries,
-        "asking": asking_of(augmentation.contestant, augmentation.options),
-        "totals": totals_of(tries),
+        "asking": show_options(augmentation.contestant, augmentation.options),
+        "totals": sum_totals(tries),
     }
     return render(request, "jobs/augmentation.html", context)
 
@@ -66,7 +71,7 @@ def follow_up(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
         tell_errors(request, form)
         return None
     wish = read_request(FollowUpRequest, form.cleaned_data)
-    made = ask_follow_up(_augmentation(code), wish, actor=user_of(request))
+    made = ask_follow_up(_augmentation(code), wish, actor=get_user(request))
     send_later(request, enqueue_augmentation, made.pk)
     return redirect("augmentation", code=made.code)
 
@@ -93,7 +98,8 @@ def _augmentation(code: uuid.UUID) -> Augmentation:
 def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with the whole record of an augmentation as one JSON file."""
     answer = JsonResponse(
-        transcript_of(_augmentation(code)), json_dumps_params={"indent": 2, "ensure_ascii": False}
+        full_transcript(_augmentation(code)),
+        json_dumps_params={"indent": 2, "ensure_ascii": False},
     )
     answer["Content-Disposition"] = f'attachment; filename="transcript-{code}.json"'
     answer["Cache-Control"] = "private, no-store"
@@ -101,7 +107,7 @@ def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @page_for(*STAFF)
-def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
+def show_asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     """Answer with an image that a language model was shown, by the hash in its request."""
     if not re.fullmatch(r"[0-9a-f]{64}", digest):
         raise Http404
@@ -119,7 +125,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case "augmentation":
             name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
         case "labelled":
-            return _labelled_picture(code)
+            return _draw_labels(code)
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
@@ -129,10 +135,10 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
             name = pictures.scene_picture(scene, pictures.SceneView(kind))
         case _:
             raise Http404
-    return sized_picture_response(request, name)
+    return resize_picture(request, name)
 
 
-def _labelled_picture(code: uuid.UUID) -> HttpResponse:
+def _draw_labels(code: uuid.UUID) -> HttpResponse:
     try:
         png = pictures.draw_with_ids(_augmentation(code))
     except AugmentError as error:
@@ -187,7 +193,7 @@ def find_scenario(code: uuid.UUID) -> Scenario:
     return get_object_or_404(rows, code=code)
 
 
-def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
+def _preview(request: HttpRequest, scenario: Scenario) -> ShownPrompt:
     return preview_prompt(
         scenario,
         variant=request.GET.get("variant", "otm"),

@@ -13,16 +13,24 @@ from django.shortcuts import get_object_or_404, redirect, render
 from arena import tasks
 from arena.exports.files import CONTENT_TYPE
 from arena.models import BenchmarkFile
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from arena.results.services.written_files import ask_for
 from arena.scenarios.queries import count_tasks, list_benchmarks
-from arena.site.access import ADMIN, BENCHMARK_READERS, STAFF, act_for, form_for, page_for, user_of
+from arena.site.access import (
+    ADMIN,
+    BENCHMARK_READERS,
+    STAFF,
+    act_for,
+    form_for,
+    get_user,
+    page_for,
+)
 from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm
 from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services.events import retire
-from augment.services.inputs import inputs_of, read_request
+from augment.services.inputs import read_request, to_inputs
 from augment.services.scenarios import benchmarks
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark, plan_benchmark
 
@@ -30,7 +38,7 @@ from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchma
 class BenchmarkForm(RequestForm):
     """A new version; scenarios are words, as commands take them."""
 
-    inputs = inputs_of(BenchmarkRequest)
+    inputs = to_inputs(BenchmarkRequest)
     scenarios = forms.CharField(
         max_length=60_000, help_text=next(one.help for one in inputs if one.name == "scenarios")
     )
@@ -63,7 +71,7 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
     elif form.is_bound and form.is_valid():
         with refusals_in(form, "scenarios"), transaction.atomic():
             row = make_benchmark(
-                read_request(BenchmarkRequest, form.cleaned_data), user_of(request)
+                read_request(BenchmarkRequest, form.cleaned_data), get_user(request)
             )
             _ask_for_zip(request, row)
             messages.success(request, f"{row} is made; a worker writes its folder.")
@@ -77,7 +85,7 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show how many tasks there are of which kind, and where to get them."""
     row = get_object_or_404(Benchmark.objects.select_related("made_by"), code=code)
     items = row.items.select_related("scenario").defer("scenario__reference")
-    file = _file_of(row)
+    file = _newest_file(row)
     context = {
         "benchmark": row,
         "items": items,
@@ -85,7 +93,7 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
         "file": file,
         "remarks": benchmarks.list_remarks(row),
-        "is_staff": role_of(request.user) in STAFF,
+        "is_staff": top_role(request.user) in STAFF,
         **wait_for_workers(waits=file is not None and file.is_waiting),
     }
     return render(request, "benchmarks/benchmark.html", context)
@@ -96,21 +104,21 @@ def write_zip(request: HttpRequest, code: uuid.UUID) -> None:
     """Leave the folder to a worker; twice does no harm."""
     with transaction.atomic():
         row = get_object_or_404(Benchmark, code=code)
-        file = _file_of(row)
+        file = _newest_file(row)
         if file is not None and file.state == BenchmarkFile.State.READY:
             raise Conflict("The folder is written already.")
         _ask_for_zip(request, row)
         messages.success(request, "A worker writes the folder; it is offered here when ready.")
 
 
-def _file_of(row: Benchmark) -> BenchmarkFile | None:
+def _newest_file(row: Benchmark) -> BenchmarkFile | None:
     """Return the newest zip that is ready, else the newest."""
     files = row.files.order_by("-pk")
     return files.filter(state=BenchmarkFile.State.READY).first() or files.first()
 
 
 def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:
-    file = ask_for(BenchmarkFile(benchmark=row, asked_by=user_of(request)), row)
+    file = ask_for(BenchmarkFile(benchmark=row, asked_by=get_user(request)), row)
     send_later(request, tasks.send_benchmark_file, file.pk)
 
 
@@ -129,4 +137,4 @@ def download_benchmark(request: HttpRequest, code: uuid.UUID) -> FileResponse:
 def retire_benchmark(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a version, or take that back."""
     row = get_object_or_404(Benchmark, code=code)
-    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")
+    retire(row, actor=get_user(request), is_retired=request.POST.get("retired") != "no")

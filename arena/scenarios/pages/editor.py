@@ -11,7 +11,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.scenarios import services
 from arena.scenarios.pages.augmentations import find_scenario
-from arena.site.access import STAFF, act_for, form_for, user_of
+from arena.site.access import STAFF, act_for, form_for, get_user
 from arena.site.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
 from arena.site.forms import offer, read_code, read_json
 from augment.errors import Conflict, InvalidDocument
@@ -21,7 +21,7 @@ from augment.services.judging.findings import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios import editing, scenes
 from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
-from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scene_imports import note_sentences
 from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
 LONGEST_CHANGE = 1_000_000
@@ -53,7 +53,7 @@ class ScenarioForm(forms.Form):
         offer(self, "type", [("", "As the drawing looks"), *scenes.type_choices()])
 
     def wanted(self) -> dict[str, Any]:
-        """Return what the valid form says of a scenario.
+        """Return the scenario's fields from a valid form.
 
         Raises:
             Conflict: Nothing is said, or the drawing is no JSON.
@@ -69,7 +69,7 @@ class ScenarioForm(forms.Form):
         }
 
 
-def _stored(scenario: Scenario) -> dict[str, Any]:
+def _form_values(scenario: Scenario) -> dict[str, Any]:
     """Return a scenario as the form has it; a sentence of the drawing is made anew."""
     names = ("type", "keep_traffic", "goal")
     return {name: getattr(scenario, name) for name in names} | {
@@ -84,10 +84,13 @@ def _stored(scenario: Scenario) -> dict[str, Any]:
 def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show a scene with what is drawn on it, and add that as a scenario; or copy another."""
     scene = get_object_or_404(BaseScene, code=code)
-    original, first = _named(request, scene, "copy"), _named(request, scene, "follow")
-    usual = {"keep_traffic": True, "derives": True} if original is None else _stored(original)
+    original, first = (
+        _find_scenario(request, scene, "copy"),
+        _find_scenario(request, scene, "follow"),
+    )
+    usual = {"keep_traffic": True, "derives": True} if original is None else _form_values(original)
     if first is not None:
-        usual = _stored(first) | {"instruction": "", "derives": True}
+        usual = _form_values(first) | {"instruction": "", "derives": True}
     form = ScenarioForm(request.POST or usual)
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
@@ -95,7 +98,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             if original is not None and not wanted["derives"]:
                 wanted |= {"intent": original.intent, "intent_origin": original.intent_origin}
             reference = editing.reference_document(
-                editing.draft_of(scene, None, keep_traffic=wanted["keep_traffic"]),
+                editing.make_draft(scene, None, keep_traffic=wanted["keep_traffic"]),
                 wanted["reference"],
             )
             new = scenes.NewScenario(
@@ -105,7 +108,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 follows="" if first is None else first.slug,
                 variant_of="" if original is None else original.slug,
             )
-            made = scenes.add_scenario(new, actor=user_of(request))
+            made = scenes.add_scenario(new, actor=get_user(request))
             send_later(request, enqueue_scenario, made.pk)
             messages.success(request, f"“{made.slug}” is added.")
             return redirect("scenario", code=made.code)
@@ -113,18 +116,18 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "form": form,
         "first": first,
         "scenarios": scene.scenarios.only("base_scene", "code", "slug", "instruction"),
-        "notes": notes_of(scene.notes),
+        "notes": note_sentences(scene.notes),
         "found": {name: len(scene.document.get(name, ())) for name in PARTS}
         | {
             "provenance": scene.provenance,
             "recorded_s": scene.recording["times_s"][-1] if scene.recording else 0.0,
         },
     }
-    draft = editing.draft_of(scene, None, keep_traffic=True)
+    draft = editing.make_draft(scene, None, keep_traffic=True)
     return _editor(request, draft, form["modification"].value(), context)
 
 
-def _named(request: HttpRequest, scene: BaseScene, name: str) -> Scenario | None:
+def _find_scenario(request: HttpRequest, scene: BaseScene, name: str) -> Scenario | None:
     return scene.scenarios.filter(code=read_code(request.GET.get(name, ""))).first()
 
 
@@ -132,11 +135,11 @@ def _named(request: HttpRequest, scene: BaseScene, name: str) -> Scenario | None
 def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Change the drawing and the sentence of a scenario, as far as nothing needs them yet."""
     scenario = find_scenario(code)
-    form = ScenarioForm(request.POST or _stored(scenario))
+    form = ScenarioForm(request.POST or _form_values(scenario))
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
             content = scenes.ScenarioContent(**form.wanted())
-            services.change_scenario(scenario, content, actor=user_of(request))
+            services.change_scenario(scenario, content, actor=get_user(request))
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, f"“{scenario.slug}” is changed.")
             return redirect("scenario", code=code)
@@ -155,7 +158,7 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if request.method == "POST":
         with refusals_told(request):
             made = by_hand.keep_correction(
-                original, _document(text), slug=slug, notes=notes, actor=user_of(request)
+                original, _document(text), slug=slug, notes=notes, actor=get_user(request)
             )
             send_later(request, enqueue_job, made.job_id)
             messages.success(request, "The correction is kept; a worker draws it.")
@@ -177,7 +180,7 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except Conflict as error:
         return JsonResponse({"problem": str(error)}, status=422)
     scenario = scene.scenarios.filter(code=read_code(str(sent.get("scenario") or ""))).first()
-    draft = editing.draft_of(scene, scenario, keep_traffic=sent.get("keep_traffic") is True)
+    draft = editing.make_draft(scene, scenario, keep_traffic=sent.get("keep_traffic") is True)
     if sent.get("derives") is True:
         draft.intent = None
     checked = check_edit(
@@ -197,7 +200,7 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     draft.reference, sentence = checked.modification, ""
     if sent.get("derives") is True:
         _, sentence = scenes.derive_intent(draft, str(sent.get("type") or ""), "")
-    told = {"sentence": sentence, "statements": editing.statements_of(draft.intent)}
+    told = {"sentence": sentence, "statements": editing.intent_statements(draft.intent)}
     parts = ("modification", "problem", "is_against_intent", "presets", "ways")
     return JsonResponse({"lines": lines} | told | {name: getattr(checked, name) for name in parts})
 
@@ -229,7 +232,7 @@ def _text(document: object) -> str:
 
 
 def _document(text: str | bytes) -> object:
-    """Return what was sent; Conflict where it is too long, or no JSON."""
+    """Return the posted document; raise Conflict if it is too long or no JSON."""
     if len(text) > LONGEST_CHANGE:
         raise Conflict("The change is too long.")
     return read_json(text, otherwise="The change is no JSON.")

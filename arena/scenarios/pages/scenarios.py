@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.scenarios import queries, services
 from arena.site import acts
-from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.site.forms import read_code, read_json
 from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
@@ -23,12 +23,12 @@ from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
+    intent_statements,
     last_reading,
-    statements_of,
     waiting_reading,
 )
 from augment.services.scenarios.pictures import is_drawn, reference_picture
-from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_reading, enqueue_scenario
 
@@ -43,7 +43,7 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     chosen = queries.set_asked(request.GET.get("set"))
     choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    found = queries.scenarios_of(chosen, is_retired=bool(listing.chosen("offered")))
+    found = queries.list_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
     found = found.filter(paraphrase_of=None)
     found = listing.narrow(found, "slug", "instruction", "base_scene__slug", by=["type"])
     page = read_page(request, found, size=SCENARIOS_AT_ONCE)
@@ -64,7 +64,7 @@ def load_scenarios(request: HttpRequest) -> None:
     report = load_catalogue(
         sets=[request.POST.get("set", "")],
         with_paraphrases="wordings" in request.POST,
-        actor=user_of(request),
+        actor=get_user(request),
     )
     ensure_builtin()
     counts = ", ".join(f"{number} {step.value}" for step, number in report.scenarios.items())
@@ -95,13 +95,13 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         **acts.wait_for_workers(waits=is_waiting or is_reading),
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),
-        "statements": statements_of(scenario.intent),
+        "statements": intent_statements(scenario.intent),
         "reading": reading,
-        "reading_statements": statements_of(None if reading is None else reading.document),
+        "reading_statements": intent_statements(None if reading is None else reading.document),
         "last_reading": last,
         "readers": readers.order_by("endpoint__label", "model"),
-        "notes": notes_of(scenario.base_scene.notes),
-        "augmentations": queries.augmentations_of(scenario),
+        "notes": note_sentences(scenario.base_scene.notes),
+        "augmentations": queries.list_augmentations(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
 
@@ -116,7 +116,7 @@ def bulk_page(request: HttpRequest) -> HttpResponse:
             if table is None or services.was_too_large(request.META):
                 raise InvalidDocument("file", [("", "choose CSV or YAML; it may be too large")])
             slugs = bulk.add_rows(
-                table.name or "", table.read(), most=most, actor=user_of(request)
+                table.name or "", table.read(), most=most, actor=get_user(request)
             )
             messages.success(request, f"{len(slugs)} scenarios are added.")
             return redirect("scenarios")
@@ -144,13 +144,13 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> None:
     """Accept the last reading, or take the intent of the file that came along."""
     scenario = get_object_or_404(Scenario, code=code)
     if "accept" in request.POST:
-        accept_reading(scenario=scenario.slug, actor=user_of(request))
+        accept_reading(scenario=scenario.slug, actor=get_user(request))
     else:
         file = request.FILES.get("file")
         if file is None or not file.size or file.size > LONGEST_FILE:
             raise Conflict("Choose a JSON file; it may be too long for an intent.")
         document = read_json(file.read(), otherwise="The file is no JSON.")
-        enter_intent(scenario=scenario.slug, document=document, actor=user_of(request))
+        enter_intent(scenario=scenario.slug, document=document, actor=get_user(request))
     messages.success(request, "The intent is set. It counts from now on.")
 
 
@@ -163,7 +163,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     if reader is None:
         raise Conflict("Choose a model.")
     reading = plan_reading(
-        scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=user_of(request)
+        scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=get_user(request)
     )
     acts.send_later(request, enqueue_reading, reading.pk)
     messages.success(request, f"{reader.model} reads it now.")
@@ -186,7 +186,7 @@ def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
         )
         return acts.ask(request, question)
     with acts.refusals_told(request):
-        services.delete(row, actor=user_of(request))
+        services.delete(row, actor=get_user(request))
         messages.success(request, f"“{row.slug}” is deleted.")
         return redirect(f"{kind}s")
     return redirect(kind, code=code)
@@ -196,4 +196,4 @@ def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
 def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a scenario, or take that back."""
     row = get_object_or_404(Scenario, code=code)
-    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")
+    retire(row, actor=get_user(request), is_retired=request.POST.get("retired") != "no")

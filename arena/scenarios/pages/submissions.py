@@ -9,16 +9,16 @@ from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from arena.scenarios.queries import is_waiting, submissions_for
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, ENTRANT, STAFF, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, ENTRANT, STAFF, act_for, form_for, get_user, page_for
 from arena.site.acts import refusals_in, send_later, wait_for_workers
 from arena.site.forms import RequestForm, offer
 from arena.site.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
-from augment.services.endpoints.contestants import free_slug_of
-from augment.services.inputs import inputs_of, read_request
+from augment.services.endpoints.contestants import make_free_slug
+from augment.services.inputs import read_request, to_inputs
 from augment.services.running.entering import AcceptRequest, accept_submission
 from augment.services.scenarios import submissions
 from augment.services.scenarios.uploads import most_megabytes
@@ -44,15 +44,15 @@ class SubmissionForm(forms.Form):
 
 
 class AcceptForm(RequestForm):
-    """How an accepted submission is called, and whether it runs at once."""
+    """Name of an accepted submission, and whether it runs at once."""
 
-    inputs = inputs_of(AcceptRequest)
+    inputs = to_inputs(AcceptRequest)
 
 
 @page_for(*STAFF, ENTRANT)
 def submissions_page(request: HttpRequest) -> HttpResponse:
     """Show staff all submissions, those that wait for them first, and entrants their own."""
-    page = read_page(request, submissions_for(user_of(request)), size=AT_ONCE)
+    page = read_page(request, submissions_for(get_user(request)), size=AT_ONCE)
     waits = any(row.state in row.UNDER_WAY for row in page.object_list)
     context = {"page": page, **wait_for_workers(waits=waits)}
     return render(request, "submissions/list.html", context)
@@ -72,7 +72,7 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
                 Benchmark.objects.get(code=form.cleaned_data["benchmark"]),
                 name=file.name,
                 content=file,
-                actor=user_of(request),
+                actor=get_user(request),
             )
             send_later(request, enqueue_submission, row.pk)
             return redirect("submission", code=row.code)
@@ -84,20 +84,20 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
 def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show a report, rejections first; an admin accepts here."""
     row = _find(request, code)
-    is_admin = role_of(request.user) == ADMIN
+    is_admin = top_role(request.user) == ADMIN
     form = AcceptForm(request.POST if is_admin and request.method == "POST" else None)
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
             asked = read_request(AcceptRequest, form.cleaned_data)
-            contestant, job = accept_submission(row, asked, actor=user_of(request))
+            contestant, job = accept_submission(row, asked, actor=get_user(request))
             messages.success(request, f"“{contestant.name}” is accepted.")
             if job is None:
                 return redirect("contestant", code=contestant.code)
             send_later(request, enqueue_job, job.pk)
             return redirect("job", code=job.code)
     elif not form.is_bound:
-        form.initial = {"slug": free_slug_of(row.title), "name": row.title, "runs": True}
-    page = Paginator(submissions.entries_of(row), AT_ONCE).get_page(page_asked(request))
+        form.initial = {"slug": make_free_slug(row.title), "name": row.title, "runs": True}
+    page = Paginator(submissions.get_entries(row), AT_ONCE).get_page(page_asked(request))
     context = {
         "submission": row,
         "form": form if is_admin and is_waiting(row) else None,
@@ -114,17 +114,17 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def decline(request: HttpRequest, code: uuid.UUID) -> None:
     """Decline a submission, with the reason that its sender reads."""
     reason = request.POST.get("reason", "")
-    submissions.decline_submission(_find(request, code), reason=reason, actor=user_of(request))
+    submissions.decline_submission(_find(request, code), reason=reason, actor=get_user(request))
 
 
 @act_for(*STAFF, ENTRANT, back="submission")
 def withdraw(request: HttpRequest, code: uuid.UUID) -> None:
     """Take one's own submission back before it is decided."""
-    own = submissions_for(user_of(request)).filter(uploaded_by=user_of(request))
-    submissions.withdraw_submission(get_object_or_404(own, code=code), actor=user_of(request))
+    own = submissions_for(get_user(request)).filter(uploaded_by=get_user(request))
+    submissions.withdraw_submission(get_object_or_404(own, code=code), actor=get_user(request))
     messages.success(request, "It is withdrawn, and its file removed.")
 
 
 def _find(request: HttpRequest, code: uuid.UUID) -> Submission:
     """Return a submission that this account may see, or answer 404."""
-    return get_object_or_404(submissions_for(user_of(request), with_report=True), code=code)
+    return get_object_or_404(submissions_for(get_user(request), with_report=True), code=code)

@@ -14,13 +14,13 @@ from django.utils.text import slugify
 from arena.exports.formats import download
 from arena.jobs.exports.sweeps import SWEEP_FORMATS
 from arena.site import acts
-from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.site.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
-from augment.services.inputs import inputs_of, read_request
+from augment.services.inputs import read_request, to_inputs
 from augment.services.judging import sweeps
-from augment.services.judging.simulations import allowed_planners
-from augment.services.judging.thresholds import driver_of, result_of
+from augment.services.judging.simulations import list_allowed_planners
+from augment.services.judging.thresholds import driver_name, sweep_result
 from augment.tasks import enqueue_scenario, enqueue_sweep
 
 KEPT = ("number", "low", "high", "count", "planner", "offsets")
@@ -28,21 +28,21 @@ KEPT = ("number", "low", "high", "count", "planner", "offsets")
 
 
 class SweepForm(RequestForm):
-    """Which number of a scenario is swept."""
+    """Number of a scenario that is swept."""
 
-    inputs = inputs_of(sweeps.SweepRequest)
+    inputs = to_inputs(sweeps.SweepRequest)
     number = forms.ChoiceField(label="Number")
     planner = forms.ChoiceField(label="Planner under test")
 
     def __init__(self, scenario: Scenario, data: Any = None, **more: Any) -> None:
         super().__init__(data, **more)
-        numbers = sweeps.numbers_of(scenario).items()
+        numbers = sweeps.swept_numbers(scenario).items()
         offer(self, "number", [(name, f"{name} (now {value:g})") for name, value in numbers])
-        offer(self, "planner", [(name, name) for name in allowed_planners()])
+        offer(self, "planner", [(name, name) for name in list_allowed_planners()])
 
 
 class FamilyForm(forms.Form):
-    """How many scenarios are drawn."""
+    """Number of scenarios to draw."""
 
     count = forms.IntegerField(
         label="Scenarios", min_value=1, max_value=sweeps.LARGEST_FAMILY, initial=10
@@ -57,7 +57,7 @@ def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     given = {name: request.GET[name] for name in KEPT if name in request.GET}
     context = {
         "scenario": scenario,
-        "sweeps": [(row, driver_of(row)) for row in scenario.sweeps.select_related("hardest")],
+        "sweeps": [(row, driver_name(row)) for row in scenario.sweeps.select_related("hardest")],
         "form": SweepForm(scenario, initial=given),
         "family": FamilyForm(auto_id="family_%s"),
     }
@@ -74,7 +74,7 @@ def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     else:
         with acts.refusals_told(request):
             asked = read_request(sweeps.SweepRequest, form.cleaned_data)
-            sweep = sweeps.plan_sweep(scenario=scenario, request=asked, actor=user_of(request))
+            sweep = sweeps.plan_sweep(scenario=scenario, request=asked, actor=get_user(request))
             acts.send_later(request, enqueue_sweep, sweep.pk)
             return redirect("sweep", code=sweep.code)
     given = urlencode({name: request.POST.get(name, "") for name in KEPT})
@@ -89,7 +89,7 @@ def draw_family(request: HttpRequest, code: uuid.UUID) -> None:
         acts.tell_errors(request, form)
         return
     rows, refused = sweeps.add_family(
-        scenario=_scenario(code), **form.cleaned_data, actor=user_of(request)
+        scenario=_scenario(code), **form.cleaned_data, actor=get_user(request)
     )
     for row in rows:
         acts.send_later(request, enqueue_scenario, row.pk)
@@ -104,10 +104,10 @@ def draw_family(request: HttpRequest, code: uuid.UUID) -> None:
 def sweep_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the curve of a sweep, where the planner fails, and every drive."""
     sweep = _sweep(code)
-    result = result_of(sweep)
+    result = sweep_result(sweep)
     context = {
         "sweep": sweep,
-        "driver": driver_of(sweep),
+        "driver": driver_name(sweep),
         "result": result,
         "planned": result.planned,
         "done": result.planned - result.under_way,
@@ -123,7 +123,7 @@ def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse
     """Answer with the table or the curve as a file."""
     sweep = _sweep(code)
     stem = f"sweep-{sweep.scenario.slug}-{slugify(sweep.number)}"
-    return download(SWEEP_FORMATS, form, stem, result_of(sweep))
+    return download(SWEEP_FORMATS, form, stem, sweep_result(sweep))
 
 
 @form_for(ADMIN)
@@ -138,7 +138,7 @@ def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             back=reverse("sweep", args=[code]),
         )
         return acts.ask(request, question)
-    sweeps.delete_sweep(sweep, actor=user_of(request))
+    sweeps.delete_sweep(sweep, actor=get_user(request))
     messages.success(request, f"The sweep of {sweep.number} is deleted.")
     return redirect("sweeps", code=sweep.scenario.code)
 

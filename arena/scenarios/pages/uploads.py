@@ -10,7 +10,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.scenarios.services import was_too_large
-from arena.site.access import STAFF, act_for, page_for, user_of
+from arena.site.access import STAFF, act_for, get_user, page_for
 from arena.site.acts import looks_again, refusals_told, send_later, wait_for_workers
 from arena.site.forms import read_code
 from arena.site.listing import read_page
@@ -18,7 +18,7 @@ from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
 from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
-from augment.services.scenarios.scene_imports import free_slug, notes_of
+from augment.services.scenarios.scene_imports import free_slug, note_sentences
 from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 UPLOADS_SHOWN = 10
@@ -58,7 +58,7 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
                 name=file.name or "",
                 content=file,
                 source=request.POST.get("format", ""),
-                actor=user_of(request),
+                actor=get_user(request),
             )
             send_later(request, enqueue_upload, row.pk)
             kept.append(row)
@@ -82,7 +82,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "upload": row,
         "stops": list(enumerate(_stops(row))),
         "moment": moment,
-        "notes": notes_of(((moment and moment.report) or {}).get("notes", ())),
+        "notes": note_sentences(((moment and moment.report) or {}).get("notes", ())),
         "slug": free_slug(row.name.partition(".")[0]),
         "kept": moments.filter(state=UploadMoment.State.KEPT),
         **wait_for_workers(waits=waits),
@@ -100,7 +100,7 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except (ValueError, IndexError):
         raise Conflict("This recording has no such moment.") from None
     moment = uploads.ask_for_moment(
-        row, item=chosen["item"], frame=chosen["frame"], slug=slug, actor=user_of(request)
+        row, item=chosen["item"], frame=chosen["frame"], slug=slug, actor=get_user(request)
     )
     send_later(request, enqueue_moment, moment.pk)
     goes_on = "&keep=1" if slug else ""
@@ -115,5 +115,5 @@ def _stops(row: SceneUpload) -> list[dict[str, Any]]:
 def remove(request: HttpRequest, code: uuid.UUID) -> None:
     """Remove the file; the scenes that were kept stay."""
     row = get_object_or_404(SceneUpload, code=code)
-    uploads.remove_upload(row, actor=user_of(request))
+    uploads.remove_upload(row, actor=get_user(request))
     messages.success(request, f"“{row.name}” is removed.")

@@ -19,11 +19,11 @@ from arena.exports.formats import attach
 from arena.models import Enrolment, Study
 from arena.people import links, services
 from arena.people.pages import find_account, link_page, show_new_links, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, page_for, user_of
+from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, get_user, page_for
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
 from arena.studies.forms import AuthorForm
-from arena.studies.queries import enrolled_voters, expert_lines, state_of
+from arena.studies.queries import expert_lines, list_voters, state_of
 from arena.studies.services.planning import Planning
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
@@ -77,7 +77,7 @@ class EnrolmentForm(forms.Form):
 
 
 class NewcomerForm(forms.Form):
-    """What somebody enters who takes part."""
+    """Details that a newcomer enters."""
 
     external_id = forms.CharField(
         max_length=LONGEST_ID, error_messages={"required": gettext_lazy("Please enter it.")}
@@ -107,7 +107,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> None:
         expert=expert,
         contestant=contestant,
         is_author=is_author,
-        actor=user_of(request),
+        actor=get_user(request),
     )
     state = "is" if is_author else "is not"
     messages.success(
@@ -134,7 +134,7 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         )
         return ask(request, question)
     with refusals_told(request):
-        forget_identity(user=user, actor=user_of(request))
+        forget_identity(user=user, actor=get_user(request))
         messages.success(request, f"{name} is forgotten.")
     return redirect("people")
 
@@ -163,14 +163,14 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None
 def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one link; whoever came in by it is signed out."""
     study = get_object_or_404(Study, invitations__code=code)
-    links.revoke(invitation=study.invitations.get(code=code), actor=user_of(request))
+    links.revoke(invitation=study.invitations.get(code=code), actor=get_user(request))
     messages.success(request, "The link was taken back.")
     return redirect("study", code=study.code)
 
 
 @link_page
 def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
-    """Who invited whom to what. Only the button signs in: mail scanners open links, too."""
+    """Show who invites whom to what. Only the button signs in: mail scanners open links, too."""
     invitation = links.find_invitation(token)
     if invitation is None:
         raise Http404
@@ -199,7 +199,7 @@ def _sign_in(request: HttpRequest, expert: User, study: Study | None) -> HttpRes
 
 @link_page
 def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
-    """What the study is, what one agrees to, and a form for the id; then the first pair.
+    """Show the study and its consent text with a form for the id; continue to the first pair.
 
     Whoever comes again from a platform goes on at this device if they say so.
     """
@@ -258,7 +258,7 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = EnrolmentForm(request.POST or None, initial=rules)
     if form.is_valid():
         with refusals_in(form):
-            set_enrolment(study=study, rules=form.cleaned_data, actor=user_of(request))
+            set_enrolment(study=study, rules=form.cleaned_data, actor=get_user(request))
             messages.success(request, "Saved. What the link says holds from now on.")
             return redirect("enrolment", code=code)
     context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}
@@ -268,7 +268,7 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             "address": address,
             "prolific": address + PROLIFIC,
             "state": state_of(enrolment),
-            "page": read_page(request, enrolled_voters(study), size=PAGE),
+            "page": read_page(request, list_voters(study), size=PAGE),
         }
     status = 422 if form.errors else 200
     return render(request, "studies/enrolment.html", context, status=status)
@@ -277,13 +277,13 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @page_for(ADMIN)
 @never_cache
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
+    """Return ids, progress and completion codes of voters as CSV, for thanks or payment."""
     study = get_object_or_404(Study, code=code, enrolment__isnull=False)
-    content = csv_text(COLUMNS, map(_line_of, enrolled_voters(study)))
+    content = csv_text(COLUMNS, map(_voter_row, list_voters(study)))
     return attach(content, "text/csv; charset=utf-8", "voters.csv")
 
 
-def _line_of(voter: Any) -> tuple[object, ...]:
+def _voter_row(voter: Any) -> tuple[object, ...]:
     times = (voter.enrolled_at, voter.last_vote_at, voter.dropped_at)
     return (
         voter.expert.person.pseudonym,

@@ -22,11 +22,11 @@ from arena.people.queries import by_pseudonym, experts
 from arena.results.services.vote_files import ImportedVotes, import_votes
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, act_for, form_for, user_of
+from arena.site.access import ADMIN, act_for, form_for, get_user
 from arena.site.acts import is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.queries import usual_checks
 from arena.studies.forms import StudyForm
-from arena.studies.queries import FINISHED, latest_contestants, missing_of, offered_contestants
+from arena.studies.queries import FINISHED, find_missing, latest_contestants, list_offered
 from arena.studies.services import drafts
 from arena.studies.services.experts import has_practice
 from arena.studies.services.opening import open_study
@@ -52,7 +52,7 @@ _ODD = re.compile(r"[^A-Za-z0-9._ -]+")
 
 @form_for(ADMIN)
 def new_study_page(request: HttpRequest) -> HttpResponse:
-    """Who competes on what, who judges, and what the votes will tell; opening plans every pair."""
+    """Choose contestants, scenarios and experts; see the outlook; opening plans every pair."""
     return _set_up(request, None)
 
 
@@ -67,7 +67,7 @@ def draft_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def discard(request: HttpRequest, code: uuid.UUID) -> None:
     """Remove a draft."""
     draft = get_object_or_404(StudyDraft, code=code)
-    drafts.discard_draft(draft=draft, actor=user_of(request))
+    drafts.discard_draft(draft=draft, actor=get_user(request))
     messages.success(request, "The draft is discarded.")
 
 
@@ -75,7 +75,7 @@ def discard(request: HttpRequest, code: uuid.UUID) -> None:
 def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """A new draft with the settings of a study."""
     study = get_object_or_404(Study, code=code)
-    draft = drafts.draft_like(study=study, actor=user_of(request))
+    draft = drafts.draft_like(study=study, actor=get_user(request))
     messages.success(request, f"A draft with the settings of “{study.name}”.")
     return redirect("study-draft", code=draft.code)
 
@@ -85,7 +85,7 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     posted = request.POST
-    entered = _entered(posted) if posted else _initial(draft)
+    entered = _read_form(posted) if posted else _initial(draft)
     if (preset := posted.get("preset")) in PRESETS:
         entered |= _quantities(preset)
     form = _form(entered)
@@ -93,12 +93,15 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
         return _keep(request, draft, form)
     if "draw" in posted:  # twice does no harm
         with refusals_told(request):
-            tasks.send_checks(user_of(request).pk)
+            tasks.send_checks(get_user(request).pk)
             messages.success(request, "Workers draw the missing attention checks.")
     if is_sure(request) and form.is_valid():
         with refusals_in(form):
             study = drafts.open_draft(
-                form.study_plan(), draft=draft, revision=_revision(request), actor=user_of(request)
+                form.study_plan(),
+                draft=draft,
+                revision=_revision(request),
+                actor=get_user(request),
             )
             messages.success(request, f"“{study.name}” is open; its experts can vote now.")
             return redirect("study", code=study.code)
@@ -110,7 +113,7 @@ def _keep(request: HttpRequest, draft: StudyDraft | None, form: StudyForm) -> Ht
     """Save what stands in the form, whether it makes a study or not."""
     with refusals_told(request):
         kept = drafts.keep_draft(
-            entered=form.data, draft=draft, revision=_revision(request), actor=user_of(request)
+            entered=form.data, draft=draft, revision=_revision(request), actor=get_user(request)
         )
         if PREVIEW in request.POST:
             return redirect("study-draft-preview", code=kept.code)
@@ -129,7 +132,7 @@ def _show(
         "form": form if is_sure(request) else form.as_entered(),
         "draft": draft,
         "revision": revision,
-        "missing": missing_of(draft) if draft else [],
+        "missing": find_missing(draft) if draft else [],
         "presets": PRESETS,
         "chosen": request.POST.get("preset", "" if request.POST or draft else USUAL),
         "estimate": estimate,
@@ -141,14 +144,14 @@ def _show(
 def _form(data: dict[str, Any]) -> StudyForm:
     return StudyForm(
         data,
-        contestants=list(offered_contestants().select_related("endpoint").order_by("name")),
+        contestants=list(list_offered().select_related("endpoint").order_by("name")),
         groups=queries.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
     )
 
 
-def _entered(posted: QueryDict) -> dict[str, Any]:
+def _read_form(posted: QueryDict) -> dict[str, Any]:
     """Return the form as it came in; whole types are the scenarios that they have now."""
     entered = posted.dict() | {name: posted.getlist(name) for name in drafts.NAMES}
     groups = [group for group in queries.by_type() if group.type in posted.getlist("types")]
@@ -162,7 +165,7 @@ def _revision(request: HttpRequest) -> int:
 
 
 def _initial(draft: StudyDraft | None) -> dict[str, Any]:
-    """Return what the draft has, or what suits most studies."""
+    """Return the draft's values, or a common default."""
     if draft is not None:
         return dict(draft.entered)
     people = experts().filter(person__is_simulated=False)
@@ -175,7 +178,7 @@ def _initial(draft: StudyDraft | None) -> dict[str, Any]:
 
 
 def _quantities(preset: str) -> dict[str, Any]:
-    """Return what a preset sets; no checks where none were drawn."""
+    """Return a preset's quantities; no checks where none were drawn."""
     return PRESETS[preset].quantities | ({} if usual_checks() else {"checks": 0.0})
 
 
@@ -190,7 +193,7 @@ def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = _form(draft.entered)
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
-            study = open_study(form.study_plan(), actor=user_of(request))
+            study = open_study(form.study_plan(), actor=get_user(request))
             context = _first_pairs(study, draft) | {"draft": draft}
             shown = render(request, "studies/preview.html", context)
             transaction.set_rollback(True)
@@ -200,7 +203,7 @@ def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _first_pairs(study: Study, draft: StudyDraft) -> dict[str, Any]:
-    """Return what the voting page shows to one of the experts, with addresses that stay."""
+    """Return the pairs that one of the experts sees first, with addresses that stay."""
     here = reverse("study-draft-preview", args=[draft.code])
     expert = study.experts.order_by("username")[0]
     context = vote_context(study, expert, change="")
@@ -248,7 +251,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
         form.add_error("file", TOO_LARGE)
     elif form.is_valid():
         with refusals_in(form):
-            imported = _import(form, user_of(request))
+            imported = _import(form, get_user(request))
             text = f"Imported: votes {imported.votes}, contestants {imported.contestants}."
             messages.success(request, f"{text} {imported.note}".rstrip())
             return redirect("results", code=imported.study.code)

@@ -24,10 +24,10 @@ from arena.results.queries.votes import is_imported
 from arena.results.services.written_files import (
     SHOWS_RESULTS,
     ask_for_study_file,
-    study_files_of,
+    newest_study_files,
     why_not,
 )
-from arena.site.access import ADMIN, STAFF, act_for, allow_only, form_for, page_for, user_of
+from arena.site.access import ADMIN, STAFF, act_for, allow_only, form_for, get_user, page_for
 from arena.site.acts import (
     WHY,
     Confirmation,
@@ -44,7 +44,7 @@ from arena.site.listing import read_listing, read_page
 from arena.studies import queries
 from arena.studies.forms import AuthorForm, HandOverForm
 from arena.studies.services.opening import cancel_study, close_study, preregistration_sha256
-from arena.studies.services.plan import PLAN_INPUTS, plan_of
+from arena.studies.services.plan import PLAN_INPUTS, opened_plan
 from arena.studies.services.taking_part import hand_over
 from augment.services.inputs import InputKind
 
@@ -59,11 +59,11 @@ def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
     states = [(DRAFT, "Draft"), *Study.State.choices]
     listing = read_listing(request, {"state": ("State", states)})
-    rows = listing.narrow(queries.listed_studies(), "name", by=["state"])
+    rows = listing.narrow(queries.list_studies(), "name", by=["state"])
     page = read_page(request, rows, size=STUDIES_AT_ONCE)
     shows_drafts = page.number == 1 and listing.chosen("state") in ("", DRAFT)
     context = {
-        "studies": queries.progress_of(page.object_list),
+        "studies": queries.count_progress(page.object_list),
         "drafts": list(queries.find_drafts(listing.search)) if shows_drafts else [],
         "page": page,
         "listing": listing,
@@ -73,12 +73,12 @@ def studies_page(request: HttpRequest) -> HttpResponse:
 
 @page_for(*STAFF)
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """How far each expert is, their links, and the rules."""
+    """Show each expert's progress and link, and the rules."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if is_imported(study):
         return redirect("results", code=code)
-    study_plan, (line,) = plan_of(study), queries.progress_of([study])
-    lines, export = queries.expert_lines(study), export_place(study, user_of(request))
+    study_plan, (line,) = opened_plan(study), queries.count_progress([study])
+    lines, export = queries.expert_lines(study), export_place(study, get_user(request))
     long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {
         "line": line,
@@ -95,10 +95,10 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             if field.kind not in long
         ],
         "plan": study_plan,
-        "reports": queries.reports_of(study),
+        "reports": queries.list_reports(study),
         "accounts": by_pseudonym(experts()),
         "frozen": preregistration_sha256(study),
-        "authorships": queries.authorships_of(study),
+        "authorships": queries.list_authorships(study),
         "author_form": AuthorForm(study=study),
     }
     return render(request, "studies/study.html", context)
@@ -106,7 +106,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @page_for(*STAFF)
 def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """What was frozen at the opening, byte for byte."""
+    """Return the preregistration, byte for byte as frozen at the opening."""
     study = get_object_or_404(Study, code=code)
     if not study.preregistration:
         raise Http404
@@ -141,7 +141,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
             button="Hand over",
         )
         return ask(request, question)
-    taken = hand_over(study=study, username=giver, to=takers, actor=user_of(request))
+    taken = hand_over(study=study, username=giver, to=takers, actor=get_user(request))
     shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
     messages.success(request, f"Handed over: {shares}.")
     return None
@@ -155,7 +155,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         if study.state != Study.State.OPEN:
             return redirect("study", code=code)
         return ask(request, _closing(study))
-    actor = user_of(request)
+    actor = get_user(request)
     with refusals_told(request):
         closed = close_study(study=study, actor=actor)
         if study.state == Study.State.OPEN:  # not pressed twice
@@ -173,13 +173,13 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("study", code=code)
         return ask(request, _cancelling(study))
     with refusals_told(request):
-        cancel_study(study=study, why=request.POST.get(WHY, ""), actor=user_of(request))
+        cancel_study(study=study, why=request.POST.get(WHY, ""), actor=get_user(request))
         messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)
 
 
 def _closing(study: Study) -> Confirmation:
-    (line,) = queries.progress_of([study])
+    (line,) = queries.count_progress([study])
     return _question(
         study,
         f"Close the study “{study.name}”?",
@@ -191,7 +191,7 @@ def _closing(study: Study) -> Confirmation:
 
 
 def _cancelling(study: Study) -> Confirmation:
-    (line,) = queries.progress_of([study])
+    (line,) = queries.count_progress([study])
     return _question(
         study,
         f"Cancel the study “{study.name}”?",
@@ -214,9 +214,9 @@ def _question(study: Study, title: str, *facts: str, button: str, **more: Any) -
 
 
 def export_place(study: Study, user: User) -> dict[str, Any]:
-    """Return what there is to take away: whether results may be read, and files with obstacles."""
+    """Return the available exports: whether results may be read, and files with obstacles."""
     may_read = results_access(user=user, study=study) is ResultsAccess.FULL
-    rows, files = study_files_of(study), []
+    rows, files = newest_study_files(study), []
     for kind in SHOWS_RESULTS if is_imported(study) else StudyFile.Kind:
         obstacle = why_not(study, kind)
         if kind in SHOWS_RESULTS and not may_read:
@@ -236,7 +236,7 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
     """Leave a file to a worker; twice does no harm."""
     study = _study_for(request, code, kind)
     with refusals_told(request), transaction.atomic():
-        row = ask_for_study_file(study=study, kind=kind, actor=user_of(request))
+        row = ask_for_study_file(study=study, kind=kind, actor=get_user(request))
         send_later(request, tasks.send_study_file, row.pk)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     if is_imported(study):
@@ -247,7 +247,7 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
 @page_for(*STAFF)
 def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
     """The newest one, once it is ready."""
-    row = study_files_of(_study_for(request, code, kind)).get(kind)
+    row = newest_study_files(_study_for(request, code, kind)).get(kind)
     is_ready = row is not None and row.state == StudyFile.State.READY
     if row is None or not is_ready or not default_storage.exists(row.stored):
         raise Http404
@@ -259,7 +259,7 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if kind not in StudyFile.Kind.values:
         raise Http404
-    access = results_access(user=user_of(request), study=study)
+    access = results_access(user=get_user(request), study=study)
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
         raise PermissionDenied
     return study

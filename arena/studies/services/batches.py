@@ -16,7 +16,7 @@ from arena.rating.board_table import spread_over
 from arena.results.services.boards import require_poolable
 from arena.studies.services.opening import open_study
 from arena.studies.services.pictures import find_showable
-from arena.studies.services.plan import plan_of
+from arena.studies.services.plan import opened_plan
 from augment.errors import Conflict, check_names
 from augment.models import Contestant
 from augment.services.events import log_change
@@ -28,7 +28,7 @@ MOST_OPPONENTS = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatchRequest:
-    """What is asked for at a new batch; its rules are those of the board's first study."""
+    """Request for a new batch; its rules are those of the board's first study."""
 
     newcomers: tuple[str, ...] = input_field(
         InputKind.NAMES,
@@ -69,7 +69,7 @@ def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) 
     possible = list(possible_newcomers(board).values_list("slug", flat=True))
     check_names("new contestant", asked.newcomers, possible)
     rated = [line.slug for line in table.document.lines if line.votes]
-    plans = [plan_of(study) for study in studies]
+    plans = [opened_plan(study) for study in studies]
     study_plan = replace(
         plans[0],
         name=f"{board.name}, batch {board.studies.count()}",

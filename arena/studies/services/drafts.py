@@ -10,7 +10,7 @@ from django.db import transaction
 
 from arena.models import Study, StudyDraft
 from arena.studies.services.opening import open_study
-from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, plan_of
+from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, opened_plan
 from augment.errors import Conflict
 from augment.services.events import log_change
 from augment.services.inputs import InputKind
@@ -111,7 +111,9 @@ def draft_like(*, study: Study, actor: User | None = None) -> StudyDraft:
     taken = set(Study.objects.values_list("name", flat=True))
     taken |= {draft.name for draft in StudyDraft.objects.all()}
     names = (study.name[: LONGEST_NAME - 8] + f" ({number})" for number in count(2))
-    entered = {name: _as_entered(name, value) for name, value in asdict(plan_of(study)).items()}
+    entered = {
+        name: _as_entered(name, value) for name, value in asdict(opened_plan(study)).items()
+    }
     entered["name"] = next(name for name in names if name not in taken)
     return keep_draft(entered=entered, actor=actor)
 

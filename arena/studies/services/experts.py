@@ -1,4 +1,4 @@
-"""What experts do beside voting: practise before their first pair, and report what is wrong.
+"""Experts' acts beside voting: practice before their first pair, and reports of problems.
 
 Neither changes a vote; no rating, progress or export of votes sees answers to practice pairs.
 """
@@ -15,7 +15,7 @@ from django.db.models import QuerySet
 from arena.errors import InvalidVote, NothingToPlan, NotYours, StudyNotOpen
 from arena.models import Matchup, PracticePair, Report, Study, Vote
 from arena.studies.services.pictures import latest_pairs
-from arena.voting.queries.ballots import matchup_of, require_open
+from arena.voting.queries.ballots import own_matchup, require_open
 from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
 from augment.models import Scenario
@@ -69,7 +69,7 @@ def answer_practice(
     if position not in pairs:
         raise InvalidVote({"pair": "It is no pair of the round."})
     pair = pairs[position]
-    _unanswered(study, expert).filter(pk=pair.pk).update(answer=answer)
+    _open_practice(study, expert).filter(pk=pair.pk).update(answer=answer)
     return pair
 
 
@@ -79,7 +79,7 @@ def skip_practice(*, study: Study, expert: User) -> None:
     Raises:
         StudyNotOpen: The study is over.
     """
-    _unanswered(study, expert).update(answer=Answer.SKIPPED)
+    _open_practice(study, expert).update(answer=Answer.SKIPPED)
 
 
 def has_practice() -> bool:
@@ -97,7 +97,7 @@ def require_practice_pictures() -> None:
         )
 
 
-def _unanswered(study: Study, expert: User) -> QuerySet[PracticePair]:
+def _open_practice(study: Study, expert: User) -> QuerySet[PracticePair]:
     require_open(study)
     return PracticePair.objects.filter(study=study, expert=expert, answer="")
 
@@ -171,7 +171,7 @@ def report(*, expert: User, complaint: Complaint) -> Report:
         StudyNotOpen: The study is over.
         Conflict: The key belongs to another report.
     """
-    matchup = matchup_of(expert=expert, code=complaint.matchup)
+    matchup = own_matchup(expert=expert, code=complaint.matchup)
     stored = Report.objects.filter(key=complaint.key).first()
     if stored is None:
         if matchup.study.state != Study.State.OPEN:

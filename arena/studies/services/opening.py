@@ -25,13 +25,13 @@ from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.studies.services.experts import require_practice_pictures
-from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
+from arena.studies.services.pictures import Cells, check_pictures, require_checks, scenario_windows
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.treatments import options_of
+from augment.services.endpoints.treatments import read_options
 from augment.services.events import log_change
 from augment.services.judging.displacement import alike_pairs
 from augment.services.running.choosing import find_job
@@ -96,7 +96,7 @@ def open_study(
     cells = broken | shown.cells
     frozen = _frozen(study_plan, rules, planned, shown, alike_shown)
     if study_plan.allow_replay:
-        frozen["replays"] = shown_pictures.replays_of(cells)
+        frozen["replays"] = shown_pictures.replay_settings(cells)
     study = _insert(name, frozen, study_plan, rules, has_simulated)
     study.contestants.set(contestants)
     study.scenarios.set(scenarios)
@@ -153,7 +153,7 @@ def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
 
 
 def find_named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
-    """Return what has these names, sorted by them; raise UnknownName for one that is not known."""
+    """Return the objects of these names, sorted by them; raise UnknownName for an unknown one."""
     check_names(kind, names, sorted(known))
     return [known[name] for name in sorted(set(names))]
 
@@ -179,7 +179,7 @@ def _rules(
     experts: list[User],
     challengers: tuple[str, ...],
 ) -> tuple[PlanRules, Cells, list[Triple]]:
-    """Return what the planner is told, the pictures of checks, and alike pairs that are shown."""
+    """Return the planner's rules, the pictures of checks, and alike pairs that are shown."""
     entries = tuple(
         Entry(scenario=scenario, contestant=contestant, picture=cell.image, sample=cell.sample)
         for (scenario, contestant), cell in sorted(cells.items())
@@ -190,7 +190,7 @@ def _rules(
     broken: Cells = {}
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
         shows_all = study_plan.samples is shown_pictures.SampleRule.ALL
-        checks, broken = check_pictures(scenarios, windows_of(entries), shows_all=shows_all)
+        checks, broken = check_pictures(scenarios, scenario_windows(entries), shows_all=shows_all)
         require_checks(checks, wanted=wanted)
     alike = [
         triple
@@ -314,7 +314,7 @@ def _preregistration(study: Study) -> dict[str, Any]:
 
 def _contestant_document(row: Contestant) -> dict[str, Any]:
     names = ("slug", "name", "kind", "variant", "model", "roles")
-    options = options_of(row).to_document() if row.endpoint else None
+    options = read_options(row).to_document() if row.endpoint else None
     return {name: getattr(row, name) for name in names} | {"options": options}
 
 

@@ -1,4 +1,4 @@
-"""What a study will tell, before its first vote: its expected intervals.
+"""Expected intervals of a study before its first vote.
 
 All of it is closed form: the sandwich of single votes of a balanced plan, plus what experts and
 scenarios add, which only more experts and more scenarios reduce, and Student's t with
@@ -76,13 +76,13 @@ class StudyEstimate:
 
     @property
     def minutes(self) -> float:
-        """What each expert needs, repeats and checks included."""
+        """Minutes that each expert needs, repeats and checks included."""
         on_top = 1.0 + (self.repeats + self.checks) / 100
         return self.votes_per_expert * on_top * (self.seconds + self.extra_seconds) / 60.0
 
     @property
     def extra_seconds(self) -> float:
-        """What the further questions about a pair take."""
+        """Seconds that the further questions about a pair take."""
         return (self.questions - 1) * self.seconds_more
 
     @property
@@ -94,7 +94,7 @@ class StudyEstimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prospect:
-    """What the votes of a study tell.
+    """Expected precision of a study's votes.
 
     Attributes:
         half_width, widest: Expected of a typical interval, and of the widest.
@@ -106,8 +106,8 @@ class Prospect:
     gap: float
 
 
-def estimate_of(given: Mapping[str, Any]) -> StudyEstimate | None:
-    """Return what is in mind, from the values of a StudyPlan; None while one is missing."""
+def estimate_plan(given: Mapping[str, Any]) -> StudyEstimate | None:
+    """Return the estimate from the values of a StudyPlan; None if one is missing."""
     counted = {name: len(given.get(name, ())) for name in ("contestants", "experts", "scenarios")}
     numbers = {name: given.get(name) or 0 for name in QUANTITIES}
     if not all(counted.values()) or not numbers["votes_per_expert"]:
@@ -117,7 +117,7 @@ def estimate_of(given: Mapping[str, Any]) -> StudyEstimate | None:
 
 
 def compare_votes(estimate: StudyEstimate) -> list[tuple[StudyEstimate, Prospect]]:
-    """Return what some numbers of votes per expert tell, from few to many.
+    """Return the prospects of several numbers of votes per expert, from few to many.
 
     Nothing where there is only one contestant, expert or scenario: no interval can be foretold.
     """
@@ -130,12 +130,12 @@ def compare_votes(estimate: StudyEstimate) -> list[tuple[StudyEstimate, Prospect
 
 
 def prospect(estimate: StudyEstimate) -> Prospect:
-    """Return what the votes of a study with two or more of everything tell."""
-    covariance, degrees, chance = _expected_spread(estimate)
+    """Return the prospect of a study with two or more of everything."""
+    covariance, degrees, chance = _predict_spread(estimate)
     variance = covariance.diagonal()
     factor = float(t_quantile(degrees))
     # By chance some intervals of a table are wider than expected.
-    by_chance = 1.0 + 0.5 * _largest_of(estimate.contestants) * math.sqrt(chance)
+    by_chance = 1.0 + 0.5 * _expected_largest(estimate.contestants) * math.sqrt(chance)
     return Prospect(
         half_width=factor * math.sqrt(float(variance.mean())),
         widest=factor * math.sqrt(float(variance.max())) * by_chance,
@@ -143,7 +143,7 @@ def prospect(estimate: StudyEstimate) -> Prospect:
     )
 
 
-def _expected_spread(estimate: StudyEstimate) -> tuple[FloatArray, float, float]:
+def _predict_spread(estimate: StudyEstimate) -> tuple[FloatArray, float, float]:
     """Return (C, C) squared points, Student's degrees of freedom, and the chance in variances.
 
     The last is the relative variance of what is found for one contestant's variance.
@@ -183,7 +183,7 @@ def _covariance_of_a_vote(size: int, spread: float, ties: float) -> FloatArray:
 
 
 def _uneven(estimate: StudyEstimate, per_cluster: float) -> float:
-    """Return what a cluster's tastes weigh more because it has not every pair equally often.
+    """Return the extra weight of a cluster's tastes from its uneven numbers of pairs.
 
     The pairs of a cluster are drawn without putting back: with m of P pairs the variance of its
     mean taste is (C - 2) (P - m) / ((P - 1) m) times larger than with all of them.
@@ -195,7 +195,7 @@ def _uneven(estimate: StudyEstimate, per_cluster: float) -> float:
     return (estimate.contestants - 2) * missing / max(per_cluster, 1e-9)
 
 
-def _largest_of(number: int) -> float:
+def _expected_largest(number: int) -> float:
     """Return the mean of the largest of so many standard normal values."""
     values, step = np.linspace(-9.0, 9.0, 1801, retstep=True)
     return float((1.0 - ndtr(values) ** number - ndtr(-values)).sum() * step)

@@ -1,4 +1,4 @@
-"""Which pictures a study can show: of contestants, and of attention checks."""
+"""Pictures that a study can show: of contestants, and of attention checks."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
@@ -8,9 +8,9 @@ from django.db.models import F, QuerySet
 
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, Entry, PlanRules
-from arena.pairing.rules import place_of, scenario_of
+from arena.pairing.rules import sample_place, scenario_at
 from augment.models import Augmentation, Contestant, Scenario
-from augment.services.scenarios.pictures import window_of
+from augment.services.scenarios.pictures import camera_key
 
 Pair = tuple[Augmentation, Augmentation]
 """A right picture and a broken one of the same scenario."""
@@ -45,11 +45,11 @@ def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augment
     return row
 
 
-def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
+def scenario_windows(entries: Iterable[Entry]) -> dict[str, str]:
     """Return by scenario the window that its pictures in a study show."""
     windows: dict[str, str] = {}
     for entry in sorted(entries, key=lambda entry: entry.scenario):
-        windows.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
+        windows.setdefault(scenario_at(entry.scenario), camera_key(entry.picture))
     return windows
 
 
@@ -80,13 +80,13 @@ def latest_pairs(
         good, broken = (latest.get((slug, kind)) for kind in kinds)
         if good is None or broken is None or good.image == broken.image:
             continue
-        if window_of(good.image) == window_of(broken.image):
+        if camera_key(good.image) == camera_key(broken.image):
             pairs[slug] = (good, broken)
     return pairs
 
 
 def _is_in(window: str | None, image: str) -> bool:
-    return window_of(image) == window
+    return camera_key(image) == window
 
 
 def check_pictures(
@@ -102,7 +102,7 @@ def check_pictures(
     checks: list[Check] = []
     cells: Cells = {}
     for slug, pair in latest_pairs(scenarios, windows).items():
-        place = place_of(slug, 1) if shows_all else slug
+        place = sample_place(slug, 1) if shows_all else slug
         good, broken = (row.contestant.slug for row in pair)
         checks.append(Check(scenario=place, good=good, broken=broken))
         cells |= {(place, row.contestant.slug): row for row in pair}

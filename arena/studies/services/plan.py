@@ -1,4 +1,4 @@
-"""What somebody expects of a study, written down before its first vote, and what came of it."""
+"""Hypotheses on a study, written down before its first vote, and their answers."""
 
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -10,7 +10,7 @@ from arena.errors import NothingToPlan
 from arena.models import Question, Snapshot, Study
 from arena.pairing.rules import MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.voting.services.shown_pictures import SampleRule
-from augment.services.inputs import InputKind, input_field, inputs_of
+from augment.services.inputs import InputKind, input_field, to_inputs
 
 MOST = 100
 LONGEST = 500
@@ -32,7 +32,7 @@ class Hypothesis:
 
 
 class HypothesisVerdict(StrEnum):
-    """What a rating says of an expected pair, with all pairs of the table judged at once."""
+    """Answer of a rating about an expected pair, with all pairs of the table judged at once."""
 
     HELD = "held"
     CONTRADICTED = "contradicted"
@@ -41,7 +41,7 @@ class HypothesisVerdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answered:
+class HypothesisAnswer:
     """A hypothesis and what came of it.
 
     Attributes:
@@ -88,7 +88,7 @@ def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[H
     return tuple(hypotheses)
 
 
-def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
+def frozen_hypotheses(study: Study) -> tuple[Hypothesis, ...]:
     """Return the hypotheses that were frozen at the opening."""
     return tuple(
         Hypothesis(text=kept["text"], above=kept["above"] and tuple(kept["above"]))
@@ -96,21 +96,21 @@ def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
     )
 
 
-def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
-    """Return what a rating says of the study's hypotheses, which are of its primary question."""
+def answer_hypotheses(snapshot: Snapshot) -> tuple[HypothesisAnswer, ...]:
+    """Return the answers of a rating to the study's hypotheses, on its primary question."""
     if snapshot.question != snapshot.study.questions[0]:
         return ()
     ratings = dict(snapshot.standings.values_list("slug", "rating"))
     board = snapshot.results.board
     p_values = {frozenset((pair.a, pair.b)): pair.p for pair in board.p_values or ()}
     answers = []
-    for hypothesis in hypotheses_of(snapshot.study):
+    for hypothesis in frozen_hypotheses(snapshot.study):
         if hypothesis.above is None:
-            answers.append(Answered(hypothesis=hypothesis))
+            answers.append(HypothesisAnswer(hypothesis=hypothesis))
             continue
         high, low = (ratings.get(slug) for slug in hypothesis.above)
         answers.append(
-            Answered(
+            HypothesisAnswer(
                 hypothesis=hypothesis,
                 verdict=_verdict(hypothesis.above, board.above),
                 difference=None if high is None or low is None else high - low,
@@ -253,7 +253,7 @@ class StudyPlan:
         return {share: getattr(self, name) / 100 for name, share in SHARES.items()}
 
 
-PLAN_INPUTS = inputs_of(StudyPlan)
+PLAN_INPUTS = to_inputs(StudyPlan)
 QUANTITIES = ("votes_per_expert", "repeats", "checks", "overlap")
 """What decides how many pairs each expert sees, and what a preset sets."""
 SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
@@ -315,8 +315,8 @@ PRESETS = {
 }
 
 
-def plan_of(study: Study) -> StudyPlan:
-    """Return what was asked for when a study was opened, by what it froze.
+def opened_plan(study: Study) -> StudyPlan:
+    """Return the plan of an opened study, from its frozen fields.
 
     Who joined by a link for everybody, and hidden pairs handed over, are no part of it.
     """
@@ -328,7 +328,7 @@ def plan_of(study: Study) -> StudyPlan:
         experts=tuple(rules.get("experts", ())),
         votes_per_expert=study.votes_per_expert,
         seed=study.seed,
-        hypotheses=tuple(one.text for one in hypotheses_of(study)),
+        hypotheses=tuple(one.text for one in frozen_hypotheses(study)),
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
         questions=tuple(study.questions),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),

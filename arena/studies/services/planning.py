@@ -14,17 +14,17 @@ from django.db.models import Max
 from arena.models import Matchup, Study
 from arena.pairing.later import GridUnit, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
-from arena.pairing.rules import Grid, place_of, scenario_of
+from arena.pairing.rules import Grid, sample_place, scenario_at
 from arena.studies.services.pictures import (
     Cells,
     check_pictures,
     find_showable,
-    windows_of,
+    scenario_windows,
     with_picture,
     without_lost_checks,
 )
 from arena.voting.queries.showings import LEGEND
-from arena.voting.services.shown_pictures import find_frames, frames_shown, sides_of
+from arena.voting.services.shown_pictures import find_frames, frames_shown, shown_sides
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import legends_of_changes
 
@@ -37,7 +37,7 @@ _PLAIN = (
 # --- The plan of a study -----------------------------------------------------------------------
 
 
-def rules_of(study: Study) -> PlanRules:
+def frozen_rules(study: Study) -> PlanRules:
     """Return the rules as they were at opening; planning by them gives the study's matchups."""
     kept = study.rules
     return PlanRules(
@@ -50,17 +50,17 @@ def rules_of(study: Study) -> PlanRules:
     )
 
 
-def pictures_of(study: Study) -> Cells:
+def frozen_pictures(study: Study) -> Cells:
     """Return the pictures that the study was opened with, whatever was drawn since."""
-    rules = rules_of(study)
+    rules = frozen_rules(study)
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
     shows_all = study.shows_all_samples
-    _, cells = check_pictures(scenarios, windows_of(rules.entries), shows_all=shows_all)
+    _, cells = check_pictures(scenarios, scenario_windows(rules.entries), shows_all=shows_all)
     rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
         slug = row.scenario.slug
-        cell = (place_of(slug, row.sample) if shows_all else slug, row.contestant.slug)
+        cell = (sample_place(slug, row.sample) if shows_all else slug, row.contestant.slug)
         entry = wanted.get(cell)
         if entry is None or entry.sample != row.sample:
             continue
@@ -69,19 +69,19 @@ def pictures_of(study: Study) -> Cells:
     return cells
 
 
-def shown_augmentations(study: Study) -> list[Augmentation]:
-    """Return what the study shows of its contestants, by scenario; no attention checks."""
+def list_shown(study: Study) -> list[Augmentation]:
+    """Return the augmentations that the study shows, by scenario; no attention checks."""
     planned = study.matchups.exclude(kind=Matchup.Kind.CHECK).values_list("left", "right")
     keys = {key for pair in planned for key in pair}
     # Those in pairs that nobody is shown count too.
     rated = set(study.contestants.values_list("slug", flat=True))
-    keys |= {row.pk for (_, slug), row in pictures_of(study).items() if slug in rated}
+    keys |= {row.pk for (_, slug), row in frozen_pictures(study).items() if slug in rated}
     rows = Augmentation.objects.filter(pk__in=keys)
     rows = rows.select_related("scenario__base_scene", "contestant")
     return list(rows.order_by("scenario__slug", "contestant__slug", "sample"))
 
 
-def planned_so_far(study: Study) -> dict[str, list[PlannedMatchup]]:
+def list_planned(study: Study) -> dict[str, list[PlannedMatchup]]:
     """Return every showing that is planned, by expert and position."""
     rows = study.matchups.order_by("expert__username", "position").values_list(
         *("expert__username", "position", "scenario__slug", "left__contestant__slug"),
@@ -92,7 +92,7 @@ def planned_so_far(study: Study) -> dict[str, list[PlannedMatchup]]:
     for expert, position, slug, left, right, kind, repeats, sample in rows:
         scenario = slug
         if study.shows_all_samples:
-            scenario = place_of(slug, 1 if kind == Matchup.Kind.CHECK else sample)
+            scenario = sample_place(slug, 1 if kind == Matchup.Kind.CHECK else sample)
         planned[expert].append(
             PlannedMatchup(
                 expert=expert,
@@ -128,18 +128,18 @@ def store(
         NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
-    known = frames_shown(study, {scenario_of(one.scenario) for one in planned}) if batch else {}
+    known = frames_shown(study, {scenario_at(one.scenario) for one in planned}) if batch else {}
     scenarios = _scenarios(planned, cells, reads_scenes=not known)
     frames = find_frames(planned, cells, scenarios, known)
     changes = legends_of_changes(
-        {cell.pk: frames[one.scenario].view for one in planned for cell in sides_of(one, cells)}
+        {cell.pk: frames[one.scenario].view for one in planned for cell in shown_sides(one, cells)}
     )
     rows = [
         Matchup(
             study=study,
             expert=by_name[one.expert],
             position=one.position,
-            scenario=scenarios[scenario_of(one.scenario)],
+            scenario=scenarios[scenario_at(one.scenario)],
             left=left,
             right=right,
             left_image=left.image,
@@ -150,7 +150,7 @@ def store(
             batch=batch,
         )
         for one in planned
-        for frame, (left, right) in [(frames[one.scenario], sides_of(one, cells))]
+        for frame, (left, right) in [(frames[one.scenario], shown_sides(one, cells))]
         for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
@@ -197,8 +197,8 @@ class Planning:
     @classmethod
     def begin(cls, study: Study) -> Self:
         """Return the next planning of a study."""
-        cells = pictures_of(study)
-        rules = without_lost_checks(rules_of(study), cells)
+        cells = frozen_pictures(study)
+        rules = without_lost_checks(frozen_rules(study), cells)
         number = (study.matchups.aggregate(last=Max("batch"))["last"] or 0) + 1
         rng = np.random.default_rng([rules.seed, number])
         return cls(study=study, number=number, cells=cells, rules=rules, grid=rules.grid, rng=rng)

@@ -14,14 +14,14 @@ from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
 from arena.models import EnrolledVoter, Enrolment, Matchup, Person, Study
-from arena.pairing.later import choose_for_newcomer, deal, judges, units_of
+from arena.pairing.later import choose_for_newcomer, deal, judges, main_units
 from arena.people import services
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name, may_be_let_in
 from arena.studies.queries import expert_named, find_silent, find_unfinished
 from arena.studies.services.drafts import rename_in_drafts
 from arena.studies.services.opening import find_named
-from arena.studies.services.planning import Planning, planned_so_far
+from arena.studies.services.planning import Planning, list_planned
 from augment.errors import Conflict
 from augment.services.events import log_change
 from augment.services.texts import is_readable_line, one_line
@@ -61,11 +61,11 @@ def hand_over(
     giver = expert_named(study, username)
     takers = _find_takers(study, username, to)
     names = [taker.username for taker in takers]
-    planning, known = Planning.begin(study), planned_so_far(study)
-    rows = undecided_rows(study, giver)
+    planning, known = Planning.begin(study), list_planned(study)
+    rows = lock_undecided(study, giver)
     positions = {row.position for row in rows}
     open_pairs = [one for one in known[username] if one.position in positions]
-    units = units_of(planning.grid, open_pairs)
+    units = main_units(planning.grid, open_pairs)
     if not units:
         raise NothingToPlan(f"{username} has nothing left to hand over.")
     dealt = deal(planning.grid, known, names, units, planning.rng)
@@ -99,8 +99,8 @@ def _find_takers(study: Study, username: str, to: Sequence[str]) -> list[User]:
     return takers
 
 
-def undecided_rows(study: Study, giver: User) -> list[Matchup]:
-    """Return what an expert has not judged and nobody has reported, locked until re-planned.
+def lock_undecided(study: Study, giver: User) -> list[Matchup]:
+    """Return an expert's unjudged, unreported matchups, locked until re-planned.
 
     A vote or a report holds its matchup's row until it is stored: after waiting, look again.
     """
@@ -225,7 +225,7 @@ def _take_on(study: Study, enrolment: Enrolment, ids: Mapping[str, str]) -> Enro
         pseudonym=f"Voter {number} of {study.code.hex[:6]}",
     )
     planning = Planning.begin(study)
-    counts = judges(planning.grid, planned_so_far(study))
+    counts = judges(planning.grid, list_planned(study))
     units = choose_for_newcomer(planning.grid, counts, enrolment.votes_each, planning.rng)
     if not units:
         raise NothingToPlan(gettext("The study has no pair that could be shown."))
@@ -276,7 +276,7 @@ def give_up_places(*, expert: User, actor: User | None = None) -> None:
 
 
 def _drop(study: Study, voter: EnrolledVoter, *, at: datetime, actor: User | None) -> None:
-    rows = undecided_rows(study, voter.expert)
+    rows = lock_undecided(study, voter.expert)
     Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
     EnrolledVoter.objects.filter(pk=voter.pk).update(dropped_at=at)
     after = {"study": str(study.code), "withdrawn": len(rows)}

@@ -1,4 +1,4 @@
-"""What an expert has voted and votes on next. Nobody sees what is somebody else's."""
+"""Past and next ballots of an expert. Nobody sees somebody else's."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -19,7 +19,7 @@ from arena.people.queries import by_pseudonym
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VotingProgress:
-    """How many matchups there are, have a vote, and were skipped instead."""
+    """Numbers of matchups: all, with a vote, and skipped."""
 
     total: int
     voted: int
@@ -47,7 +47,7 @@ def require_open(study: Study) -> None:
         raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
 
 
-def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
+def own_matchup(*, expert: User, code: UUID | str) -> Matchup:
     """Return one of the expert's own matchups.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Which keys vote, and what the voting page remembers of a person."""
+"""Voting keys, and the voting page's settings of a person."""
 
 from django.contrib.auth.models import User
 

@@ -1,4 +1,4 @@
-"""What is shown of a pair: pictures behind tokens, and drives."""
+"""Content of a pair: pictures behind tokens, and drives."""
 
 from typing import Any
 from uuid import UUID
@@ -9,10 +9,10 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
-from arena.people.queries import role_of
+from arena.people.queries import top_role
 from augment.models import Augmentation, Simulation
 from augment.services.judging.simulations import blind_drive
-from augment.services.scenarios.pictures import film_name, window_of
+from augment.services.scenarios.pictures import camera_key, film_name
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -52,7 +52,7 @@ def picture_of_side(matchup: Matchup, side: str) -> str:
 def original_beside(augmentation: Augmentation) -> str:
     """Return the picture before the change, "" where it shows another window than that after."""
     original = augmentation.scenario.original_image
-    return original if window_of(original) == window_of(augmentation.image) else ""
+    return original if camera_key(original) == camera_key(augmentation.image) else ""
 
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "a": reverse("matchup-image", args=[matchup.left_token]),
         "b": reverse("matchup-image", args=[matchup.right_token]),
         "original": reverse("matchup-image", args=[original]) if original else None,
-        "unchanged": _unchanged(matchup),
+        "unchanged": _unchanged_sides(matchup),
         "is_filmed": bool(film_name(matchup.left_image)),
         **view_shown(matchup),
     }
@@ -81,18 +81,18 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     return shown
 
 
-def _unchanged(matchup: Matchup) -> list[str]:
+def _unchanged_sides(matchup: Matchup) -> list[str]:
     """Return the sides that show the scene as it was; pictures are named by what they show."""
     shown = {"a": matchup.left_image, "b": matchup.right_image}
     return [side for side, image in shown.items() if image and image == matchup.original_image]
 
 
 def _may_see(user: User, shown: Matchup | LabelTask | PracticePair) -> bool:
-    return shown.expert_id == user.pk or role_of(user) == "admin"
+    return shown.expert_id == user.pk or top_role(user) == "admin"
 
 
 def _find_shown(token: str) -> tuple[Matchup | LabelTask | PracticePair | None, str]:
-    """Return what a token belongs to, and the picture that it stands for."""
+    """Return the pair that a token belongs to, and the picture that it stands for."""
     is_token = Q(left_token=token) | Q(right_token=token)
     matchups = Matchup.objects.select_related("left", "right").defer(
         "left__modification", "right__modification"

@@ -67,8 +67,8 @@ class Decision:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Received:
-    """What came of a vote.
+class VoteResult:
+    """Result of a vote.
 
     Attributes:
         study: As it is now; columns that a vote does not need are loaded when asked for.
@@ -95,7 +95,7 @@ def cast_vote(*, expert: User, decision: Decision) -> Vote:
     return _store(expert, decision, is_paced=False).vote
 
 
-def receive_vote(*, expert: User, decision: Decision) -> Received:
+def receive_vote(*, expert: User, decision: Decision) -> VoteResult:
     """Store what an expert's browser sent, at a pace that a person can keep.
 
     The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
@@ -134,7 +134,7 @@ def _find_faults(decision: Decision) -> dict[str, str]:
     return faults
 
 
-def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
+def _store(expert: User, decision: Decision, *, is_paced: bool) -> VoteResult:
     with in_turn(within_s=settings.VOTE_WAIT_S if is_paced else None):
         try:
             return _write(expert, decision, is_paced)
@@ -145,7 +145,7 @@ def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
 
 
 @transaction.atomic
-def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
+def _write(expert: User, decision: Decision, is_paced: bool) -> VoteResult:
     matchup = hold_matchup(expert=expert, code=decision.matchup)
     asked = matchup.study.questions
     decision = replace(decision, question=decision.question or asked[0])
@@ -158,7 +158,7 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
         require_open(matchup.study)
         _check_turn(decision, asked, {vote.question for vote in known})
         own = [vote for vote in known if vote.question == decision.question]
-        vote = _insert(matchup, expert, decision, _superseded(own, decision.supersedes))
+        vote = _insert(matchup, expert, decision, _find_superseded(own, decision.supersedes))
     # Read after the lock, so that a study closed while we waited is seen as closed.
     since = timezone.now() - PACE_WINDOW
     study, progress, just_now = voting_state(study=matchup.study, expert=expert, since=since)
@@ -166,7 +166,7 @@ def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
         _check_allowed(decision, study)
         if is_paced and just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
             raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
-    return Received(vote=vote, study=study, progress=progress)
+    return VoteResult(vote=vote, study=study, progress=progress)
 
 
 _SAME_COLUMNS = ("key", "question", "outcome", "both_miss", "strength", "reason", "ms_visible")
@@ -191,7 +191,7 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
     return vote
 
 
-def _superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
+def _find_superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
     """The vote that the new one replaces, None for a first vote."""
     if not known:
         if supersedes is not None:

@@ -1,4 +1,4 @@
-"""What all showings of a scenario share: one window for both sides, and the scene before."""
+"""Properties shared by all showings of a scenario: one window, and the scene before."""
 
 import hashlib
 import json
@@ -14,13 +14,18 @@ from django.db.models import F, Min, Q
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
-from arena.pairing.rules import place_of, scenario_of
+from arena.pairing.rules import sample_place, scenario_at
 from arena.studies.services.pictures import Cells, find_showable
 from arena.voting.queries.showings import LEGEND, VIEW_OF_OLD
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import Options
-from augment.services.scenarios.pictures import camera_of, legend_of_scene, view_of, window_of
+from augment.services.scenarios.pictures import (
+    camera_key,
+    legend_of_scene,
+    load_camera,
+    picture_view,
+)
 
 MOST_NAMED = 8
 """So many missing pictures are named, the others counted."""
@@ -28,7 +33,7 @@ MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True)
 class ScenarioFrame:
-    """What all showings of a scenario share.
+    """Window and unmodified scene of all showings of a scenario.
 
     Attributes:
         view: Where metres lie.
@@ -62,14 +67,14 @@ def find_frames(
     """
     shown: dict[str, dict[str, Augmentation]] = {}
     for one in planned:
-        for cell in sides_of(one, cells):
-            shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
-    if mixed := [scenario_of(place) for place, windows in shown.items() if len(windows) > 1]:
+        for cell in shown_sides(one, cells):
+            shown.setdefault(one.scenario, {})[camera_key(cell.image)] = cell
+    if mixed := [scenario_at(place) for place, windows in shown.items() if len(windows) > 1]:
         raise _other_windows(sorted(mixed))
     frames, by_place = dict(known), {}
     for place, windows in shown.items():
         ((window, cell),) = windows.items()
-        slug = scenario_of(place)
+        slug = scenario_at(place)
         if (slug, window) not in frames:
             frames[slug, window] = _frame(scenarios[slug], window, cell)
         by_place[place] = frames[slug, window]
@@ -85,7 +90,7 @@ def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
     first = shown.order_by().values("scenario").annotate(first=Min("pk")).values("first")
     rows = Matchup.objects.filter(pk__in=first).exclude(original_image="")
     return {
-        (slug, window_of(image)): ScenarioFrame(view, original, view[LEGEND]["scene"])
+        (slug, camera_key(image)): ScenarioFrame(view, original, view[LEGEND]["scene"])
         for slug, image, view, original in rows.values_list(
             *("scenario__slug", "left_image", "view", "original_image")
         )
@@ -94,7 +99,7 @@ def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
 
 
 def _frame(scenario: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
-    """Return what a picture needs, whatever version drew it: today's window, or one before.
+    """Return a picture's frame, whichever version drew it: today's window, or an earlier one.
 
     Raises:
         NothingToPlan: Nobody knows any more where metres lie in such a picture.
@@ -107,10 +112,10 @@ def _view(scenario: Scenario, window: str, cell: Augmentation) -> tuple[dict[str
     if window in scenario.windows:
         noted = scenario.windows[window]
         return noted["view"], noted["image"]
-    original = scenario.original_image if window_of(scenario.original_image) == window else ""
-    camera = camera_of(scenario)
+    original = scenario.original_image if camera_key(scenario.original_image) == window else ""
+    camera = load_camera(scenario)
     if window == camera.key:
-        return view_of(camera), original
+        return picture_view(camera), original
     shows = Q(left_image=cell.image) | Q(right_image=cell.image)
     earlier = Matchup.objects.filter(shows, scenario=scenario, view__isnull=False)
     before = earlier.order_by("pk").first()
@@ -129,13 +134,13 @@ def _other_windows(scenarios: list[str]) -> NothingToPlan:
     )
 
 
-def sides_of(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
-    """Return what is shown on the left and on the right."""
+def shown_sides(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+    """Return the augmentations on the left and on the right."""
     return cells[one.scenario, one.left], cells[one.scenario, one.right]
 
 
 class SampleRule(StrEnum):
-    """Which samples of a cell take part.
+    """Rule that selects the samples of a cell.
 
     ONE: one of each scenario, by the study's seed (`draw_sample`). ALL: every one, each against
     the same sample of the others.
@@ -206,7 +211,7 @@ def choose_pictures(
             cells[scenario, contestant] = samples[drawn]
         else:
             for sample, row in samples.items():
-                cells[place_of(scenario, sample), contestant] = row
+                cells[sample_place(scenario, sample), contestant] = row
     _refuse_mixed(cells)
     used = {row.job_id: row.job for row in cells.values()}
     return StudyPictures(
@@ -264,7 +269,7 @@ Way = tuple[Any, ...]
 """Planner, offsets, whether recorded traffic reacts."""
 
 
-def replays_of(cells: Cells) -> dict[str, Any]:
+def replay_settings(cells: Cells) -> dict[str, Any]:
     """Return how the drives were driven that a study plays, and of which scenarios, by slug.
 
     Those are the scenarios of which every picture that takes part was driven in one and the same
@@ -277,7 +282,7 @@ def replays_of(cells: Cells) -> dict[str, Any]:
     """
     pictures: defaultdict[str, set[int]] = defaultdict(set)
     for (place, _), cell in cells.items():
-        pictures[scenario_of(place)].add(cell.pk)
+        pictures[scenario_at(place)].add(cell.pk)
     driven: defaultdict[Way, set[int]] = defaultdict(set)
     drives = Simulation.objects.filter(
         augmentation__in={cell.pk for cell in cells.values()}, state=Simulation.State.DONE

@@ -91,7 +91,7 @@ def _turn(limit: float | None) -> Iterator[None]:
         with path.open("ab") as turn:  # closed, it is free again
             if limit is None:
                 fcntl.flock(turn, fcntl.LOCK_EX)
-            while limit is not None and not _locked(turn):
+            while limit is not None and not _is_locked(turn):
                 if time.monotonic() >= limit:
                     raise DatabaseBusy
                 time.sleep(LOOK_EVERY_S)
@@ -100,7 +100,7 @@ def _turn(limit: float | None) -> Iterator[None]:
         _DOOR.release()
 
 
-def _locked(turn: IO[bytes]) -> bool:
+def _is_locked(turn: IO[bytes]) -> bool:
     try:
         fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -110,7 +110,7 @@ def _locked(turn: IO[bytes]) -> bool:
 
 @contextmanager
 def _patience_until(limit: float | None) -> Iterator[None]:
-    """What is left of the time goes to SQLite's own lock; then all is as it was."""
+    """Give the remaining time to SQLite's own lock, then restore its timeout."""
     if limit is None:
         yield
         return

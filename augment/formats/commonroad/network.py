@@ -17,10 +17,10 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, Value, fault_at
-from augment.formats.road_map import Name, RoadMap, Segment, crossing_segments, following_of
-from augment.formats.roads import middle_of, refuse_shape
+from augment.formats.road_map import Name, RoadMap, Segment, crossing_segments, find_successors
+from augment.formats.roads import refuse_shape, segment_centreline
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.lane_graph import turn_type_of
+from augment.scene.lane_graph import classify_turn
 
 SPEED_SIGNS = "274 274.1 R2-1 R301 3.24 R15 C43 B14 Ρ-32 P-32 R-32 B31 R4-1"
 """Highest speeds, values in m/s: of Germany and the countries without signs of their own (a zone
@@ -94,7 +94,7 @@ def read_points(parent: Element, place: str) -> FloatArray:
     return foreign.read_finite(rows, place, 2)
 
 
-def network_of(root: Element, step: int) -> RoadMap:
+def read_network(root: Element, step: int) -> RoadMap:
     """Return the map with the lights at one time step."""
     doubts, left_out = Doubts(), Counter[str]()
 
@@ -199,7 +199,7 @@ def _show_lights(
 
     Of several lanelets in a row with one light, the last leads into the intersection.
     """
-    following = following_of({name: one.segment for name, one in lanelets.items()})
+    following = find_successors({name: one.segment for name, one in lanelets.items()})
     governing = {name: {*lanelets[name].lights} for name in lanelets if name in inside}
     for name, one in lanelets.items():
         for after in following[name] if one.lights and name not in inside else ():
@@ -266,7 +266,7 @@ def _lanelet(
         speed_limit_mps=min(known, default=None),
     )
     with refuse_shape(place):
-        turn = turn_type_of(middle_of(segment))
+        turn = classify_turn(segment_centreline(segment))
     paths = "trafficLightRef", "stopLine/trafficLightRef"
     lights = [number for path in paths for number in _references(element, path, doubts)]
     # One whose number can't be read is dark, and not none.
@@ -278,8 +278,8 @@ def _lanelet(
 def _find_inside(
     root: Element, lanelets: Mapping[Name, Segment], doubts: Doubts
 ) -> dict[Name, TurnType | None]:
-    """Return what intersections name, with its turn where they tell it."""
-    following, named = following_of(lanelets), dict[Name, TurnType | None]()
+    """Return the connectors named by intersections, with the turn if they have one."""
+    following, named = find_successors(lanelets), dict[Name, TurnType | None]()
     for incoming in root.findall("intersection/incoming"):
         for lane in _references(incoming, "incomingLanelet", doubts):
             named |= {after: named.get(after) for after in following.get(lane, [])}

@@ -15,11 +15,11 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
-from augment.formats.commonroad.network import network_of
+from augment.formats.commonroad.network import read_network
 from augment.formats.commonroad.states import StateReader, read_box
 from augment.formats.documents import read_xml
 from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, LogReader
-from augment.formats.road_map import left_out_notes
+from augment.formats.road_map import note_left_out
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 
 VERSIONS = ("2018b", "2020a", "2024")
@@ -72,7 +72,7 @@ class Obstacle:
 
     @property
     def type(self) -> AgentType:
-        """What it is here."""
+        """Type of the agent."""
         return TYPE_OF.get(self.kind, AgentType.EGO_VEHICLE)
 
     def track(self, steps: int) -> LoggedTrack:
@@ -107,7 +107,7 @@ class CommonRoad(LogReader):
         chosen = problems or vehicles or [_NOBODY]
         if item is not None:
             chosen = [foreign.look_up(egos, item, "item")]
-        notes = [*left_out_notes("objects", left_out), *doubts.notes]
+        notes = [*note_left_out("objects", left_out), *doubts.notes]
         if step_s > LONGEST_GAP_S:
             notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
         steps = 1 + max(max(one.steps) for one in (*obstacles, *chosen))
@@ -119,7 +119,7 @@ class CommonRoad(LogReader):
                 ego=ego.track(steps).states,
                 ego_size_m=ego.size_m,
                 tracks=[one.track(steps) for one in obstacles if one is not ego],
-                map_at=lambda frame: network_of(root, frame),
+                map_at=lambda frame: read_network(root, frame),
                 world=f"CommonRoad scenario frame of {benchmark}",
                 title=f"CommonRoad scenario {benchmark}, ego {ego.id}",
                 licence=root.get("source", "").strip()[:200] or "no source named",
@@ -158,7 +158,7 @@ def _problem(element: Element, states: StateReader) -> Obstacle:
 
 
 def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> Obstacle | None:
-    """What stands or drives; None for what is left out."""
+    """Return the obstacle, None if it is left out."""
     kind = element.findtext("type", "").strip()
     place = f"obstacle {element.get('id', '')[:20]}"
     if {kind, element.tag} & {*SCENERY.split()}:

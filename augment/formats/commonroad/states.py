@@ -116,7 +116,7 @@ class StateReader:
         return center.x, center.y
 
     def _cover(self, shape: Element, place: str) -> shapely.Geometry:
-        """What a shape or lanelet covers in the file's frame."""
+        """Return the area of a shape or lanelet in the file's frame."""
         if shape.tag != "lanelet":
             return cover(shape, place)
         number = read_whole(shape.get("ref"), place)
@@ -163,7 +163,7 @@ def read_box(shape: Element, place: str, doubts: Doubts) -> tuple[float, float, 
 
 
 def cover(shape: Element, place: str) -> shapely.Geometry:
-    """Return what a shape covers around the origin of its frame.
+    """Return the area of a shape around the origin of its frame.
 
     Raises:
         InvalidDocument: It is none of the format's shapes, or breaks it.

@@ -60,7 +60,7 @@ Ids = Mapping[str, int]
 """Whole numbers from 1 on, a new one for each name that is asked for."""
 
 
-def write(cells: Sequence[Cell]) -> writing.Written:
+def write(cells: Sequence[Cell]) -> writing.Output:
     """One XML file for each cell."""
     return writing.write_each(cells, _write_one)
 
@@ -102,7 +102,7 @@ def _exact(name: str, value: float) -> ET.Element:
 
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     scene = cell.after
-    if not writing.ways_of(scene):
+    if not writing.list_ways(scene):
         raise writing.CannotExpress("CommonRoad needs at least one lane, and this scene has none")
     ids: Ids = defaultdict(count(1).__next__)
     # A map's name in a benchmark id has letters and digits alone.
@@ -141,11 +141,11 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
 
 def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
     scene = cell.after
-    graph, ways = LaneGraph(scene), writing.ways_of(scene)
+    graph, ways = LaneGraph(scene), writing.list_ways(scene)
     for way in ways:
         ids[way.id]  # lanelets have the first numbers
     for way in ways:
-        bounds = zip(("leftBound", "rightBound"), _paired_bounds(way), strict=True)
+        bounds = zip(("leftBound", "rightBound"), _pair_bounds(way), strict=True)
         edges = [_tag(name, *(_point("point", one) for one in line)) for name, line in bounds]
         yield _tag("lanelet", *edges, *_of_way(way, graph, ids), id=ids[way.id])
     for limit in sorted({way.speed_limit_mps for way in ways if way.speed_limit_mps is not None}):
@@ -175,7 +175,7 @@ def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
 
 
 def _of_way(way: AnyLane, graph: LaneGraph, ids: Ids) -> Iterator[ET.Element]:
-    """What stands in a lanelet after its bounds."""
+    """Yield the children of a lanelet after its bounds."""
     for name in graph.predecessors(way.id):
         yield _tag("predecessor", ref=ids[name])
     for name in graph.successors(way.id):
@@ -193,9 +193,9 @@ def _of_way(way: AnyLane, graph: LaneGraph, ids: Ids) -> Iterator[ET.Element]:
         yield _tag("trafficLightRef", ref=ids[f"light of {way.id}"])
 
 
-def _paired_bounds(way: AnyLane) -> list[FloatArray]:
+def _pair_bounds(way: AnyLane) -> list[FloatArray]:
     """Both edges with equally many points, opposite to each other; no point of either is lost."""
-    sides = writing.bounds_of(way)
+    sides = writing.way_edges(way)
     edges = [side.points_m for side in sides]
     if len(edges[0]) == len(edges[1]):
         middle = ((edges[0] + edges[1]) / 2.0).tolist()
@@ -231,7 +231,7 @@ def _intersections(scene: Scene, ids: Ids) -> Iterator[ET.Element]:
 
 
 def _is_static(movement: Movement) -> bool:
-    """What never moves; people, buses and bicycles that stand keep their types as dynamic ones."""
+    """Return whether it never moves; people, buses and bicycles are dynamic even if they stand."""
     kind = movement.agent.type
     if kind in _STATIC:
         way_m = np.ptp(movement.states[movement.is_present, :2], axis=0).max()

@@ -36,7 +36,7 @@ from augment.scene.entities import (
     TrafficDensity,
     TurnType,
 )
-from augment.scene.schema import Size, Speed, path, problems_of
+from augment.scene.schema import Size, Speed, list_problems, path
 
 WHAT = "interPlan file"
 OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
@@ -84,7 +84,7 @@ class SpecialScenario(_Part):
 
 
 class Details(_Part):
-    """What stands under one base token.
+    """Entry under one base token.
 
     Attributes:
         extra_agents_to_spawn: Rows of x, y and speed, and perhaps how the vehicle behaves.
@@ -108,7 +108,7 @@ class File(_Part):
 
 
 class Built(_Part):
-    """What interPlan's code makes of a special scenario beyond what the file says.
+    """Additions of interPlan's code to a special scenario beyond its file.
 
     Attributes:
         boxes_m: As `InterplanRules`.
@@ -121,7 +121,7 @@ class Built(_Part):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InterplanSource:
-    """Where a scenario comes from in nuPlan and in interPlan's file, whose parts stay verbatim.
+    """Source of a scenario in nuPlan and in interPlan's file, whose parts stay verbatim.
 
     Attributes:
         token: The base token: nuPlan's lidar_pc of t0.
@@ -143,7 +143,7 @@ class InterplanSource:
 # Reading
 
 
-def file_of(document: object) -> File:
+def parse_file(document: object) -> File:
     """Return the document in its typed shape.
 
     Raises:
@@ -157,13 +157,13 @@ def file_of(document: object) -> File:
     try:
         file = File.model_validate(document)
     except ValidationError as fault:
-        raise InvalidDocument(WHAT, problems_of(fault)) from None
+        raise InvalidDocument(WHAT, list_problems(fault)) from None
     if not any(one.special_scenario for one in file.modification_details_dictionary.values()):
         raise InvalidDocument(WHAT, [("", "holds no special scenario")])
     return file
 
 
-def place_of(token: str, index: str | int, *steps: str | int) -> str:
+def entry_place(token: str, index: str | int, *steps: str | int) -> str:
     """Return where in a file a part of a special scenario stands."""
     return path("modification_details_dictionary", token, "special_scenario", str(index), *steps)
 
@@ -198,7 +198,7 @@ def read_entry(
                 f"is {away_m:.0f} m from the ego of scene {scene.name}; more than "
                 f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
             )
-            raise InvalidDocument(WHAT, [(place_of(token, index, key, number), problem)])
+            raise InvalidDocument(WHAT, [(entry_place(token, index, key, number), problem)])
         return x_m, y_m
 
     def add(kind: AgentType, point: Point, heading_rad: float, **more: Any) -> None:
@@ -259,7 +259,7 @@ def surround(
     token: str,
     vehicles_m: Sequence[tuple[float, float]],
 ) -> tuple[SpawnedTraffic, Built]:
-    """Return what interPlan spawns around the ego, and what else its code makes of a scenario.
+    """Return the traffic that interPlan spawns around the ego, and its other additions.
 
     Args:
         entry: Its roadblocks come before those of the token, an empty list too.
@@ -271,7 +271,7 @@ def surround(
     Raises:
         InvalidDocument: An extra agent has no place or speed.
     """
-    density, _ = options_of(entry.config)
+    density, _ = parse_suffix(entry.config)
     roadblocks = entry.roadblock_locations_to_spawn_agents
     if roadblocks is None:
         roadblocks = details.roadblock_locations_to_spawn_agents or []
@@ -342,15 +342,15 @@ _DENSITIES = {None: TrafficDensity.NONE} | {
 _TURNS = {None: None, "l": TurnType.LEFT, "r": TurnType.RIGHT, "s": TurnType.STRAIGHT}
 
 
-def options_of(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
+def parse_suffix(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
     """Return density and goal of a suffix such as "dlgl"."""
     parts = {part[0]: part[1:] for part in _CONFIG_PARTS.findall(config or "")}
     return _DENSITIES[parts.get("d")], _TURNS[parts.get("g")]
 
 
-def config_of(options: SceneOptions, given: str = "") -> str:
+def format_suffix(options: SceneOptions, given: str = "") -> str:
     """Return the suffix of a scenario's options; as given where that says the same already."""
-    if options_of(given) == (options.density, options.goal):
+    if parse_suffix(given) == (options.density, options.goal):
         return given
     density = "" if options.density is TrafficDensity.NONE else f"d{options.density[0]}"
     goal = "" if options.goal is None else f"g{options.goal[0]}"
@@ -361,7 +361,7 @@ def config_of(options: SceneOptions, given: str = "") -> str:
 # Writing
 
 
-def token_of(scene_name: str) -> str:
+def scene_token(scene_name: str) -> str:
     """Return the base token that stands for a scene: 16 hexadecimal digits, always the same."""
     return hashlib.sha256(scene_name.encode()).hexdigest()[:16]
 
@@ -389,9 +389,11 @@ def yaml_text(
     document = {
         **(given or usual),
         "modification_details_dictionary": {
-            _Quoted(token): {
+            _QuotedText(token): {
                 **(details or beside),
-                "special_scenario": {_Quoted(index): entry for index, entry in entries.items()},
+                "special_scenario": {
+                    _QuotedText(index): entry for index, entry in entries.items()
+                },
             }
             for token, (entries, details) in by_token.items()
         },
@@ -401,7 +403,7 @@ def yaml_text(
     return head + body
 
 
-class _Quoted(str):
+class _QuotedText(str):
     __slots__ = ()
 
 
@@ -418,7 +420,7 @@ def _represent_list(dumper: _Dumper, items: list[Any]) -> yaml.SequenceNode:
 
 
 _Dumper.add_representer(
-    _Quoted,
+    _QuotedText,
     lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"'),
 )
 _Dumper.add_representer(list, _represent_list)

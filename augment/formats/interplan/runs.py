@@ -1,4 +1,4 @@
-"""What a run in nuPlan needs beside interPlan's file: filters, commands, whose scenario is whose.
+"""Files for a run in nuPlan beside interPlan's: filters, commands, owners of scenarios.
 
 Names of configurations are those of interPlan's and nuPlan's own scripts.
 """

@@ -15,7 +15,7 @@ from augment.errors import Conflict
 from augment.formats.interplan import file as interplan
 from augment.formats.interplan.file import InterplanSource
 from augment.formats.interplan.runs import MODIFICATIONS, NuplanScenario, run_files
-from augment.formats.writing import Cell, Loss, LossReport, Written
+from augment.formats.writing import Cell, Loss, LossReport, Output
 from augment.geometry.frames import difference, wrap
 from augment.scene.density import is_bus
 from augment.scene.entities import (
@@ -40,7 +40,7 @@ _MADE_UP = (
 )
 
 
-def write(cells: Sequence[Cell]) -> Written:
+def write(cells: Sequence[Cell]) -> Output:
     """One YAML file for all of them, and what nuPlan needs to drive those of its own scenes.
 
     What came from interPlan's file keeps its base token and index, and is written as it stood
@@ -66,7 +66,7 @@ def write(cells: Sequence[Cell]) -> Written:
     comments = [f"{_MADE_UP} {', '.join(sorted(made_up))}"] if made_up else []
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
     runs: list[NuplanScenario] = []
-    for entry, index in zip(entries, _numbered(entries), strict=True):
+    for entry, index in zip(entries, _list_numbers(entries), strict=True):
         by_token[entry.token][index] = entry.written()
         losses += entry.report.losses
         name = f"{entry.token}-s{index}"
@@ -81,10 +81,10 @@ def write(cells: Sequence[Cell]) -> Written:
     }
     file = next((source.file for source in given.values() if source.file), None)
     text = interplan.yaml_text(documents, comments, file)
-    return Written(files={MODIFICATIONS: text.encode()} | run_files(runs), losses=tuple(losses))
+    return Output(files={MODIFICATIONS: text.encode()} | run_files(runs), losses=tuple(losses))
 
 
-def _numbered(entries: Sequence["_Entry"]) -> list[str]:
+def _list_numbers(entries: Sequence["_Entry"]) -> list[str]:
     """The index of each special scenario.
 
     Its own for who is as in the file, then for who comes first, else the next that nobody has.
@@ -116,13 +116,13 @@ class _Entry:
 
     def __init__(self, cell: Cell, kind: ScenarioType) -> None:
         self.cell, self.kind = cell, kind
-        self.source = cell.source or InterplanSource(token=interplan.token_of(cell.scene.name))
+        self.source = cell.source or InterplanSource(token=interplan.scene_token(cell.scene.name))
         self.token = self.source.token
         self.report = LossReport(cell)
 
     @cached_property
     def is_unchanged(self) -> bool:
-        """Whether the change is the one that stands in interPlan's file."""
+        """True if the change is the one in interPlan's file."""
         if self.source.index is None:
             return False
         return self._read(self.source.entry) == self.cell.modification
@@ -133,7 +133,7 @@ class _Entry:
         return interplan.read_entry(self.token, self.source.index or "0", special, scene)[0]
 
     def run_as(self, name: str) -> NuplanScenario:
-        """How nuPlan's results call it."""
+        """Return the scenario's name in nuPlan's results."""
         cell = self.cell
         return NuplanScenario(
             scenario=name,
@@ -145,14 +145,14 @@ class _Entry:
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
         given = dict(self.source.entry)
-        config = interplan.config_of(self.cell.scene.options, given.pop("config", None) or "")
+        config = interplan.format_suffix(self.cell.scene.options, given.pop("config", None) or "")
         head = {"type": self.kind.value} | ({"config": config} if config else {})
         self._lose_unknown()
         if self.is_unchanged:
             return head | {key: value for key, value in given.items() if key != "type"}
         change, by_key = self.cell.modification, defaultdict[str, list[TrafficAgent]](list)
         for agent in change.added:
-            by_key[_key_of(agent, self.cell.scene)].append(agent)
+            by_key[_find_key(agent, self.cell.scene)].append(agent)
         if self.cell.scene.options.density is not TrafficDensity.NONE:
             self._lose(f"traffic that would meet a vehicle of this change is left out{_OUTCOME}")
         if self.cell.keeps_traffic:
@@ -207,7 +207,7 @@ class _Entry:
         return [*place, round(yaw_rad, 6)]
 
     def _walk_end(self, agent: TrafficAgent) -> Point:
-        """Where somebody walks to; a worker who stands takes a step, others cross a road."""
+        """Return the end of a walk; a standing worker takes a step, others cross a road."""
         start = agent.x_m, agent.y_m
         if agent.walk_to_m is not None and math.dist(start, agent.walk_to_m) >= _NO_WALK_M:
             return agent.walk_to_m
@@ -223,7 +223,7 @@ class _Entry:
         return round(float(x_m), 4), round(float(y_m), 4)
 
 
-def _key_of(agent: TrafficAgent, scene: Scene) -> str:
+def _find_key(agent: TrafficAgent, scene: Scene) -> str:
     """The key under which interPlan has such a thing, empty where it has none."""
     if math.hypot(agent.x_m, agent.y_m) > interplan.FURTHEST_FROM_EGO_M:
         return ""
@@ -237,7 +237,7 @@ def _key_of(agent: TrafficAgent, scene: Scene) -> str:
 
 
 def _changes(agent: TrafficAgent, found: TrafficAgent) -> Iterator[tuple[str, bool]]:
-    """What comes back otherwise, and whether the scene is another one by it."""
+    """Yield the values that come back changed, and whether they change the scene."""
     if agent.type is not found.type:
         yield f"is {agent.length_m:g} m long and becomes a {found.type}", True
     sizes = (agent.length_m, agent.width_m), (found.length_m, found.width_m)

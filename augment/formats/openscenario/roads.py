@@ -29,7 +29,7 @@ _JOINED_COS = 0.996
 _FIRST_JUNCTION = 100_000
 
 
-def map_of(cell: Cell, report: LossReport) -> bytes:
+def write_map(cell: Cell, report: LossReport) -> bytes:
     """Return the file.
 
     Raises:
@@ -38,9 +38,9 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
     from scenariogeneration import xodr
 
     scene = cell.after
-    if not writing.ways_of(scene):
+    if not writing.list_ways(scene):
         raise writing.CannotExpress("OpenDRIVE needs at least one road, and there is no lane")
-    roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.ways_of(scene), start=1)}
+    roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.list_ways(scene), start=1)}
     connecting = [one for one in scene.connectors if _is_connecting(one, roads)]
     groups = dict(enumerate(writing.group_connectors(connecting), start=_FIRST_JUNCTION))
     links = _Links(roads)
@@ -87,7 +87,7 @@ class _Road:
         points = way.centerline.points_m
         tangents = directions(points)
         edges = np.column_stack(
-            [_offsets(edge, points, tangents) for edge in writing.bounds_of(way)]
+            [_offsets(edge, points, tangents) for edge in writing.way_edges(way)]
         )
         if (edges[:, 0] - edges[:, 1] < NARROWEST_M).any():
             raise writing.CannotExpress(f"{way.id} has no width somewhere between its edges")
@@ -109,7 +109,7 @@ def directions(points_m: FloatArray) -> FloatArray:
 
 
 def _offsets(edge: Polyline, points: FloatArray, tangents: FloatArray) -> FloatArray:
-    """How far left of a line an edge is, beside each of its points."""
+    """Return the signed distance, left positive, of an edge from each point of a line."""
     offsets = []
     for point, (cos, sin) in zip(points, tangents, strict=True):
         place = edge.project(float(point[0]), float(point[1]))
@@ -119,7 +119,7 @@ def _offsets(edge: Polyline, points: FloatArray, tangents: FloatArray) -> FloatA
 
 
 def _is_connecting(one: LaneConnector, roads: Mapping[str, _Road]) -> bool:
-    """Whether both its ends are lanes that it really reaches."""
+    """Return whether both its ends are lanes that it really reaches."""
     before, after = (roads.get(name or "") for name in (one.from_lane, one.to_lane))
     if before is None or after is None:
         return False
@@ -127,7 +127,7 @@ def _is_connecting(one: LaneConnector, roads: Mapping[str, _Road]) -> bool:
 
 
 class _Links:
-    """What comes before and after each road: its kind and number."""
+    """Predecessor and successor of each road: kind and number."""
 
     def __init__(self, roads: Mapping[str, _Road]) -> None:
         self._roads = roads
@@ -266,7 +266,7 @@ def _text(root: ET.Element, cell: Cell) -> bytes:
     """The file; its header has no time of day, but extent and origin."""
     header = root.find("header")
     assert header is not None
-    points = np.vstack([way.centerline.points_m for way in writing.ways_of(cell.after)])
+    points = np.vstack([way.centerline.points_m for way in writing.list_ways(cell.after)])
     pose = cell.after.origin.pose
     header.set("date", f"{cell.made_on.isoformat()}T00:00:00")
     extent = (*points.max(axis=0), *points.min(axis=0))

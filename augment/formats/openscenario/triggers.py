@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import SETS_OUT_WITHIN_M, motion_of, walking_pace_mps
+from augment.scene.motion import SETS_OUT_WITHIN_M, find_motion, walking_pace_mps
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion, PointPath
 from augment.scene.planned_mover import PlannedMover
 
@@ -63,11 +63,11 @@ def motion_in(agent: TrafficAgent) -> PlannedMotion:
     return agent.motion
 
 
-def held_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
+def unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
     """Return states (T, 4) of an agent whose motion never starts; NaN past the map."""
     alone = replace(cell.after, agents=(replace(agent, motion=None),))
     name = frozenset([agent.id])
-    return motion_of(alone, recording=cell.recording, replaced=name).others[0].states
+    return find_motion(alone, recording=cell.recording, replaced=name).others[0].states
 
 
 def states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> FloatArray:
@@ -80,7 +80,7 @@ def states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> Flo
     return np.array(rows)
 
 
-def written_distance(
+def distance_condition(
     cell: Cell,
     agent: TrafficAgent,
     start: NearEgo | AtPlace,
@@ -103,7 +103,7 @@ def written_distance(
     centres, axles = watched.states[:, :2], _behind(watched.states, back_m)
     if isinstance(start, NearEgo):
         # Once it starts it looks along its path, so what counts is how it stood before.
-        own = held_states(cell, agent)
+        own = unstarted_states(cell, agent)
         goals, marks = own[:, :2], _behind(own, ahead_m(agent))
         off_m = back_m + ahead_m(agent)
     else:

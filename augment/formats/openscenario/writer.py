@@ -15,7 +15,7 @@ import numpy as np
 
 from augment.formats import writing
 from augment.formats.openscenario import triggers
-from augment.formats.openscenario.roads import map_of
+from augment.formats.openscenario.roads import write_map
 from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import FloatArray, Movement
@@ -41,7 +41,7 @@ _HEIGHT_M = {AgentType.BUS: 3.0, AgentType.TRAFFIC_CONE: 0.5, AgentType.BARRIER:
 _USUAL_HEIGHT_M, _MASS_KG, _FASTEST_MPS = 1.8, 1000.0, 70.0
 
 
-def write(cells: Sequence[Cell]) -> writing.Written:
+def write(cells: Sequence[Cell]) -> writing.Output:
     """For each cell a scenario and its map; a map that no road can follow is refused."""
     return writing.write_each(cells, _write_one)
 
@@ -53,7 +53,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     from scenariogeneration import xosc
 
     road_file, motion = f"{cell.stem}.xodr", cell.motion
-    files = {road_file: map_of(cell, report)}
+    files = {road_file: write_map(cell, report)}
     everyone = (motion.ego, *motion.others)
     entities = xosc.Entities()
     for one in everyone:
@@ -119,7 +119,7 @@ def _position(xosc: Any, agent: TrafficAgent, state: FloatArray) -> Any:
 
 
 def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
-    """Where and how fast everybody is at t0; who comes later is not there yet."""
+    """Yield everybody's place and speed at t0; agents that come later are not there yet."""
     init = xosc.Init()
     now = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0.0)
     for one in everyone:
@@ -133,7 +133,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 
 
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
-    """What somebody does: come, follow a trajectory, go. Nothing for who stands throughout."""
+    """Yield an agent's events: come, follow a trajectory, go. Nothing if it stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
     if (mover := triggers.with_motion(agent)) is not None:
         yield from _own_events(xosc, cell, movement, mover)
@@ -154,10 +154,10 @@ def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
 
 
 def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) -> Iterator[Any]:
-    """What it does until its motion starts, and from then on; past the map it is gone."""
+    """Yield the events before and after its motion starts; past the map it is gone."""
     started_s, times_s = movement.started_s, cell.motion.times_s
     if agent.speed_mps > 0.0 and started_s != 0.0:
-        states = triggers.held_states(cell, agent)
+        states = triggers.unstarted_states(cell, agent)
         follow = _follow(xosc, agent, times_s, states, is_relative=False)
         yield from _until_gone(
             xosc, agent, states, _event(xosc, f"{agent.id} goes on", follow, 0.0)
@@ -192,7 +192,7 @@ def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None
     start, name = triggers.motion_in(agent).start, f"{agent.id} sets out"
     if isinstance(start, AtTime):
         return _at(xosc, name, start.after_s)
-    apart = triggers.written_distance(cell, agent, start, started_s, _ahead_m)
+    apart = triggers.distance_condition(cell, agent, start, started_s, _ahead_m)
     given = apart.within_m, xosc.Rule.lessOrEqual
     kind = xosc.RelativeDistanceType.euclidianDistance
     condition = xosc.RelativeDistanceCondition(*given, kind, EGO_ID, freespace=False)
@@ -245,7 +245,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
         text = "the motion is left out: where it begins hangs on when it starts, and it never does"
         report.lose(f"{agent.id}: {text}", changes_scene=True)
         return
-    apart = triggers.written_distance(cell, agent, start, started_s, _ahead_m)
+    apart = triggers.distance_condition(cell, agent, start, started_s, _ahead_m)
     text = "its distance is told between rear axles: the same moment with our ego, else up to"
     report.lose(f"{agent.id}: {text} {apart.off_m:.1f} m off")
     if apart.early_s > 0.0:

@@ -17,7 +17,7 @@ import shapely
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
-from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
+from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, note_left_out
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
 
@@ -143,7 +143,7 @@ def _log(path: Path, item: str | None) -> Log:
         is_free=not licences,
         item=item,
         frame=frame or 0,
-        notes=[*left_out_notes("objects", left_out), *doubts.notes],
+        notes=[*note_left_out("objects", left_out), *doubts.notes],
     )
 
 

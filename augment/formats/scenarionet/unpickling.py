@@ -81,7 +81,7 @@ def _build_dictionary(*_: Any) -> dict[Any, Any]:
     return {}
 
 
-def _number_of(value: Any) -> Any:
+def _enum_number(value: Any) -> Any:
     """Return the number of an enumeration's member, which stands for it."""
     if not isinstance(value, int):
         raise TypeError("a member of an enumeration needs its number")
@@ -107,7 +107,7 @@ _ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
     "__builtin__.set": set,
     "_codecs.encode": _encode,
     **{
-        f"trafficgen.utils.typedef.{kind}": _number_of  # in LCTGen's pickles
+        f"trafficgen.utils.typedef.{kind}": _enum_number  # in LCTGen's pickles
         for kind in ("AgentType", "RoadLineType", "RoadEdgeType")
     },
     "numpy.core.multiarray._reconstruct": _Array,
@@ -126,7 +126,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def read_pickle(path: Path) -> Any:
-    """Return what the file holds: dictionaries, lists, texts, numbers, numpy arrays.
+    """Return the file's content: dictionaries, lists, texts, numbers, numpy arrays.
 
     Raises:
         InvalidDocument: The file is no pickle, or names what is not on the list.

@@ -24,7 +24,7 @@ from augment.scene.entities import (
     TrafficLight,
     TrafficSide,
 )
-from augment.scene.lane_graph import LaneGraph, turn_type_of
+from augment.scene.lane_graph import LaneGraph, classify_turn
 from augment.scene.motion import Movement
 
 VERSION = "scenario-arena 1"
@@ -64,7 +64,7 @@ _BESIDE_M = 0.3
 """The edges of neighbours lie no further apart."""
 
 
-def write(cells: Sequence[Cell]) -> writing.Written:
+def write(cells: Sequence[Cell]) -> writing.Output:
     """A data set: a file for each cell, the summary and the mapping."""
     summaries: dict[str, dict[str, Any]] = {}
 
@@ -129,11 +129,11 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_types(_BECOMES)
     text = "left out: there is no type for a {} area"
     report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
-    odd = [one.id for one in connectors if one.turn_type is not turn_type_of(one.centerline)]
+    odd = [one.id for one in connectors if one.turn_type is not classify_turn(one.centerline)]
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
     dark = [one.id for one in connectors if one.traffic_light is TrafficLight.NONE]
     report.lose_of(dark, "that it has no light is not said")
-    if any(way.left_boundary or way.right_boundary for way in writing.ways_of(scene)):
+    if any(way.left_boundary or way.right_boundary for way in writing.list_ways(scene)):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
     if scene.traffic_side is TrafficSide.LEFT:
         report.lose("that people drive on the left stands in the metadata, where few stacks look")
@@ -180,8 +180,8 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
     features: dict[str, dict[str, Any]] = {}
-    for way in writing.ways_of(scene):
-        points_m, (left, right) = way.centerline.points_m, writing.bounds_of(way)
+    for way in writing.list_ways(scene):
+        points_m, (left, right) = way.centerline.points_m, writing.way_edges(way)
         beside = (way.left_neighbor, way.right_neighbor) if isinstance(way, Lane) else (None, None)
         features[way.id] = {
             "type": "LANE_SURFACE_STREET" if isinstance(way, Lane) else "LANE_SURFACE_UNSTRUCTURE",
@@ -207,7 +207,7 @@ def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
 
 def _road_edges(scene: Scene) -> Iterator[np.ndarray]:
     """The edges of lanes (P, 2) where no other lane or connector lies beside or across them."""
-    sides = [[one.points_m for one in writing.bounds_of(way)] for way in writing.ways_of(scene)]
+    sides = [[one.points_m for one in writing.way_edges(way)] for way in writing.list_ways(scene)]
     outlines = [shapely.Polygon(np.vstack([left, right[::-1]])) for left, right in sides]
     covers = shapely.buffer(shapely.make_valid(outlines), _BESIDE_M)
     tree = shapely.STRtree(covers)

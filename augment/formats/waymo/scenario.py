@@ -23,7 +23,14 @@ from google.protobuf.unknown_fields import UnknownFieldSet
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.reading import Log, LoggedTrack, LogReader, read_each
-from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
+from augment.formats.road_map import (
+    WIDEST_M,
+    RoadMap,
+    Segment,
+    edge_distances,
+    mean_width,
+    note_left_out,
+)
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
@@ -65,7 +72,7 @@ class WaymoMotion(LogReader):
             return False
         with path.open("rb") as file:
             head = file.read(_HEAD.size)
-        return len(head) == _HEAD.size and masked_crc32c(head[:8]) == _HEAD.unpack(head)[1]
+        return len(head) == _HEAD.size and mask_crc32c(head[:8]) == _HEAD.unpack(head)[1]
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One of each record."""
@@ -101,21 +108,21 @@ def _log(file: str, number: int, payload: bytes) -> Log:
             for index, one in tracks.items()
             if one is not ego and index not in unset and np.isfinite(one.states).any()
         ],
-        map_at=lambda frame: city_of(scenario, frame),
+        map_at=lambda frame: read_city(scenario, frame),
         world="Waymo Open Motion scenario frame",
         title=f"Waymo Open Motion data set, {file}, scenario {name}",
         licence=LICENCE,
         item=str(number),
         frame=doubts.read("current times", foreign.read_whole, *current) or 0,
-        notes=[*left_out_notes("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
+        notes=[*note_left_out("objects", {"TYPE_UNSET": len(unset)}), *doubts.notes],
     )
 
 
 # Records and messages
 
 
-def masked_crc32c(block: bytes) -> int:
-    """Return what stands in the file beside a block: its CRC-32C, rotated and shifted."""
+def mask_crc32c(block: bytes) -> int:
+    """Return a block's checksum as the file has it: its CRC-32C, rotated and shifted."""
     crc: int = google_crc32c.value(block)
     return (((crc >> 15) | (crc << 17)) + 0xA282EAD8) & 0xFFFFFFFF
 
@@ -138,7 +145,7 @@ def read_records(path: Path, *, only: str | None = None) -> Iterator[tuple[int, 
             if len(head) < _HEAD.size:
                 raise fault_at(record, "is cut off in its length")
             length, check = _HEAD.unpack(head)
-            if masked_crc32c(head[:8]) != check:
+            if mask_crc32c(head[:8]) != check:
                 raise fault_at(record, "has a length with a wrong checksum")
             end = file.tell() + length + _FOOT.size
             if end > size:
@@ -146,7 +153,7 @@ def read_records(path: Path, *, only: str | None = None) -> Iterator[tuple[int, 
             if only in (None, str(number)):
                 payload = file.read(length)
                 (check,) = _FOOT.unpack(file.read(_FOOT.size))
-                if masked_crc32c(payload) != check:
+                if mask_crc32c(payload) != check:
                     raise fault_at(record, "has a payload with a wrong checksum")
                 yield number, payload
             file.seek(end)
@@ -204,7 +211,7 @@ def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
 # The map
 
 
-def city_of(scenario: Any, frame: int) -> RoadMap:
+def read_city(scenario: Any, frame: int) -> RoadMap:
     """Return the map with the lights of one step."""
     lanes, edges, areas = dict[int, Any](), dict[int, FloatArray](), []
     left_out, doubts = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}, Doubts()
@@ -261,7 +268,7 @@ def _segment(
     line = _points(lane.polyline, place)
     foreign.look_up(LANE_TYPES, lane.type, f"{place}.type")
     left, right = (
-        edge_of(
+        edge_distances(
             line,
             [
                 (part.lane_start_index, part.lane_end_index, edges[part.boundary_feature_id])
@@ -279,7 +286,7 @@ def _segment(
         centerline=line,
         left=left if is_whole else None,
         right=right if is_whole else None,
-        width_m=width_of(line, left, right),
+        width_m=mean_width(line, left, right),
         successors=tuple(lane.exit_lanes),
         predecessors=tuple(lane.entry_lanes),
         left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
@@ -290,7 +297,7 @@ def _segment(
 
 
 def _is_whole_edge(line: FloatArray, edge: FloatArray) -> bool:
-    """Whether an edge is known all along, has a length and is nowhere another lane's."""
+    """Return whether an edge is known all along, has a length and is nowhere another lane's."""
     if len(edge) < 2 or not np.isfinite(edge).all():
         return False
     is_near = np.hypot(*(edge - line).T).max() <= WIDEST_M

@@ -12,8 +12,8 @@ from augment.services.endpoints.contestants import (
     ensure_builtin,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.treatments import left_out
-from augment.services.inputs import add_options, inputs_of, read_request, read_values
+from augment.services.endpoints.treatments import list_unsent_options
+from augment.services.inputs import add_options, read_request, read_values, to_inputs
 from augment.services.terminal import TerminalCommand
 from augment.variants.respondents import ModelRole
 
@@ -31,7 +31,7 @@ class Command(TerminalCommand):
 
     def add_arguments(self, parser: CommandParser) -> None:
         """The contestant, and what a new endpoint needs."""
-        add_options(parser, inputs_of(ContestantRequest))
+        add_options(parser, to_inputs(ContestantRequest))
         for role in ROLES:
             parser.add_argument(
                 f"--{role}",
@@ -39,7 +39,7 @@ class Command(TerminalCommand):
                 help=f"who plays the {role}, where the variant has one; default: the model itself",
             )
         add_options(parser.add_argument_group("how it asks"), OPTION_INPUTS)
-        asked = [one for one in inputs_of(EndpointRequest) if one.name in OF_ENDPOINTS]
+        asked = [one for one in to_inputs(EndpointRequest) if one.name in OF_ENDPOINTS]
         group = parser.add_argument_group("a new endpoint")
         add_options(group, asked, is_any_required=False)
 
@@ -57,7 +57,7 @@ class Command(TerminalCommand):
         )
         row = add_contestant(request)
         self.stdout.write(f"{row.slug}: {row.name} ({row.kind})")
-        for role, names in left_out(row).items():
+        for role, names in list_unsent_options(row).items():
             self.stderr.write(f"Not sent, as the {role}'s model refuses it: {', '.join(names)}.")
 
 

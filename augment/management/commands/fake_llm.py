@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.fake_llm.server import MODELS, running
-from augment.services.scenarios.prompts import stored_tasks
+from augment.services.scenarios.prompts import find_stored_tasks
 from augment.services.terminal import TerminalCommand
 
 _STOP = (signal.SIGINT, signal.SIGTERM)
@@ -34,7 +34,10 @@ class Command(TerminalCommand):
         """Serve until SIGINT or SIGTERM."""
         host, port = options["host"], options["port"]
         try:
-            with _until_signalled() as wait, running(host, port, known=stored_tasks) as server:
+            with (
+                _until_signalled() as wait,
+                running(host, port, known=find_stored_tasks) as server,
+            ):
                 self.stdout.write(f"The stand-in language model listens on {server.url}")
                 self.stdout.flush()
                 wait()

@@ -9,7 +9,7 @@ from django.utils import timezone
 
 from augment.management.waiting import WAITING, wait_if_asked
 from augment.services.endpoints.contestants import ensure_builtin
-from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.inputs import add_options, read_request, to_inputs
 from augment.services.running import jobs
 from augment.services.running.choosing import resolve_contestants
 from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
@@ -30,8 +30,8 @@ class Command(TerminalCommand):
     )
 
     def add_arguments(self, parser: CommandParser) -> None:
-        """What to run, and whether to wait."""
-        for asked in inputs_of(JobRequest):
+        """Add the contestants, the scenarios, and whether to wait."""
+        for asked in to_inputs(JobRequest):
             add_options(parser, [replace(asked, default="") if asked.name == "name" else asked])
         parser.add_argument(
             "--estimate", action="store_true", help="say what it would use, and launch nothing"

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from augment.formats.readers import READERS
-from augment.services.scenarios.scene_imports import import_scene, notes_of
+from augment.services.scenarios.scene_imports import import_scene, note_sentences
 from augment.services.terminal import TerminalCommand
 
 
@@ -56,5 +56,5 @@ class Command(TerminalCommand):
             for name in ("agents", "lanes", "connectors", "areas")
         )
         self.stdout.write(f"Imported scene {row.slug}: {counts} besides the ego.")
-        for note in notes_of(row.notes):
+        for note in note_sentences(row.notes):
             self.stdout.write(f"  {note}")

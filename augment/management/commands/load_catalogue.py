@@ -6,7 +6,7 @@ from typing import Any
 from django.conf import settings
 
 from augment.scene.entities import CatalogueSet
-from augment.services.scenarios.catalogue import CatalogueStep, folder_of, load_catalogue
+from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue, set_folder
 from augment.services.terminal import TerminalCommand
 
 
@@ -37,7 +37,7 @@ class Command(TerminalCommand):
         """Load it and say what that changed."""
         folder, sets = options["folder"], [options["set"]]
         if sets == ["all"]:
-            sets = [one for one in CatalogueSet if folder_of(folder, one).is_dir()]
+            sets = [one for one in CatalogueSet if set_folder(folder, one).is_dir()]
         paraphrased = options["paraphrases"]
         report = load_catalogue(folder=folder, sets=sets, with_paraphrases=paraphrased)
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):

@@ -5,7 +5,7 @@ from typing import Any
 from django.db import transaction
 
 from augment.services.inputs import read_request
-from augment.services.running.budget import Caps, limit_of
+from augment.services.running.budget import Caps, describe_caps
 from augment.services.running.choosing import find_job
 from augment.services.running.jobs import resume
 from augment.services.running.progress import count_rows
@@ -32,4 +32,4 @@ class Command(TerminalCommand):
             resume(job, higher=read_request(Caps, options))
             transaction.on_commit(lambda: enqueue_job(job.pk))
         waiting = count_rows(job).queued
-        self.stdout.write(f"Job {job.code}, capped at {limit_of(job)}: {waiting} to run.")
+        self.stdout.write(f"Job {job.code}, capped at {describe_caps(job)}: {waiting} to run.")

@@ -8,7 +8,7 @@ from django.db import transaction
 from augment.services.inputs import read_request
 from augment.services.judging import simulations
 from augment.services.judging.sweeps import SweepRequest, plan_sweep, write_values
-from augment.services.judging.thresholds import SweepResult, result_of
+from augment.services.judging.thresholds import SweepResult, sweep_result
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_sweep
@@ -46,14 +46,14 @@ class Command(TerminalCommand):
         sweep = plan_sweep(scenario=scenario, request=request, also=also)
         if options["queue"]:
             transaction.on_commit(lambda: enqueue_sweep(sweep.pk))
-            self.stdout.write(f"{result_of(sweep).planned} drives wait for the workers.")
+            self.stdout.write(f"{sweep_result(sweep).planned} drives wait for the workers.")
             return
-        waiting = [drive.pk for line in result_of(sweep).lines for drive in line.drives]
+        waiting = [drive.pk for line in sweep_result(sweep).lines for drive in line.drives]
         for number, pk in enumerate(waiting, start=1):
             simulations.Drives(also).perform(pk)
             self.stderr.write(f"[{number}/{len(waiting)}]")
         sweep.refresh_from_db()
-        self._say(result_of(sweep))
+        self._say(sweep_result(sweep))
 
     def _say(self, result: SweepResult) -> None:
         for line in result.lines:

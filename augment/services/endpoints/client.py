@@ -25,8 +25,8 @@ from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
 from augment.models import CallLease, Endpoint
 from augment.services.clock import DATABASE_TIME, Moment, database_now, repeating
-from augment.services.endpoints.known_endpoints import key_of
-from augment.services.endpoints.known_models import profile_of, remember_refusal
+from augment.services.endpoints.known_endpoints import read_key
+from augment.services.endpoints.known_models import read_profile, remember_refusal
 from augment.services.endpoints.treatments import Treatment
 
 logger = logging.getLogger(__name__)
@@ -42,7 +42,7 @@ _FIRST_WAIT_S, _LONGEST_WAIT_S = 0.05, 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Queue:
-    """How a call waits for its place.
+    """Order in which a call waits for its place.
 
     Attributes:
         longest_s: A call that has waited that long gives up.
@@ -94,7 +94,7 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
             ModelFault: It can't do without something that the model lacks.
         """
         if request.model not in self._profiles:
-            known: ModelProfile = profile_of(endpoint=self._endpoint, model=request.model)
+            known: ModelProfile = read_profile(endpoint=self._endpoint, model=request.model)
             self._profiles[request.model] = known
         return self._profiles[request.model].fitted(request)
 
@@ -137,7 +137,7 @@ def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_noth
     """
     return OpenAIWire(
         base_url=endpoint.base_url,
-        api_key=key_of(endpoint),
+        api_key=read_key(endpoint),
         timeout_s=settings.LLM_TIMEOUT_S,
         most_bytes=settings.LLM_ANSWER_MB * MEGABYTE,
         still_wanted=still_wanted,

@@ -139,10 +139,10 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
 
 def free_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
     """Return a slug that says how a contestant asks and that nobody has."""
-    return free_slug_of("-".join((model, variant, options_from_document(options).slug())))
+    return make_free_slug("-".join((model, variant, options_from_document(options).slug())))
 
 
-def free_slug_of(words: str) -> str:
+def make_free_slug(words: str) -> str:
     """Return a slug made of these words that no contestant has."""
     stem = re.sub(r"[^a-z0-9]+", "-", words.lower())
     stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
@@ -168,7 +168,7 @@ def _title(
     own: Respondent,
     others: Mapping[ModelRole, Respondent],
 ) -> str:
-    """Return what people read where nobody chose a name; no other contestant's name."""
+    """Return the default title; no other contestant has it."""
     played = [f"{role} {respondent.model}" for role, respondent in others.items()]
     parts = [own.model, spell_variant(recipe.slug), *played]
     if described := options.describe():

@@ -24,7 +24,7 @@ from django.forms import model_to_dict
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed, UnknownName
 from augment.llm.addresses import check_base_url
-from augment.llm.wire_transport import server_of
+from augment.llm.wire_transport import host_and_port
 from augment.models import Endpoint, EndpointModel, KeyBinding
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
@@ -44,7 +44,7 @@ _FOR_KEYS = re.compile(r"[A-Za-z_][A-Za-z0-9_]*_API_KEY")
 
 @dataclass(frozen=True, kw_only=True)
 class EndpointFacts:
-    """What of an endpoint can be changed."""
+    """Facts about an endpoint that can be changed."""
 
     base_url: str = input_field(InputKind.TEXT, "Address, up to /v1", most=200)
     key_variable: str = input_field(
@@ -218,10 +218,10 @@ def find_key_obstacle(variable: str, base_url: str | None) -> str:
         return f"{variable} may not be sent to an endpoint: {KEY_RULE} is needed"
     if not variable or base_url is None:
         return ""
-    server, hosts = server_of(base_url), _read_bindings().get(variable, "").split("|")
+    server, hosts = host_and_port(base_url), _read_bindings().get(variable, "").split("|")
     # A host without a port stands for all of its ports; with two ports it is no address.
     anywhere = server[server.rfind(":") :]
-    bound = {server_of(f"https://{host}{port}") for host in hosts for port in ("", anywhere)}
+    bound = {host_and_port(f"https://{host}{port}") for host in hosts for port in ("", anywhere)}
     if server in bound - {""}:
         return ""
     if server and KeyBinding.objects.filter(variable=variable, server=server).exists():
@@ -251,7 +251,7 @@ def list_keys() -> list[str]:
     return sorted(name for name in os.environ if may_hold_key(name) and os.environ[name].strip())
 
 
-def key_of(endpoint: Endpoint) -> str | None:
+def read_key(endpoint: Endpoint) -> str | None:
     """Return the endpoint's key, read from the environment at the moment of the call.
 
     Raises:

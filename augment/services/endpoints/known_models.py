@@ -1,4 +1,4 @@
-"""What is known of the models of endpoints, what they cost, and what calls to them took.
+"""Facts about the models of endpoints, their prices, and the latency of calls to them.
 
 Unknown stays unknown, never zero. Listed prices come with the package genai-prices, without asking
 the network: they are as new as the installed version.
@@ -29,7 +29,7 @@ TEMPERATURE = "temperature"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spending:
-    """What calls took together.
+    """Use of several calls together.
 
     An answer from the store counts as what it had cost when it was asked for: the question is
     what an outcome costs, not what this job or study did.
@@ -53,11 +53,11 @@ class Spending:
 
 @transaction.atomic
 def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
-    """Return what is known of the model at the endpoint; a new row knows its listed price."""
+    """Return the facts about the model at the endpoint; a new row has its listed price."""
     row, made = EndpointModel.objects.get_or_create(endpoint=endpoint, model=model)
     if made and not endpoint.is_simulated:
         now = timezone.now()
-        listed = listed_price(base_url=endpoint.base_url, model=model, now=now)
+        listed = find_listed_price(base_url=endpoint.base_url, model=model, now=now)
         if listed is not None:
             price, row.price_source = listed
             row.price_in_usd, row.price_out_usd = price.prompt_usd, price.completion_usd
@@ -66,15 +66,15 @@ def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     return row
 
 
-def facts_of(*, endpoint: Endpoint, model: str) -> EndpointModel:
-    """Return what is known of a model; a row that is not stored where nothing is."""
+def read_facts(*, endpoint: Endpoint, model: str) -> EndpointModel:
+    """Return the facts about a model; an unsaved row if nothing is known."""
     row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
     return row or EndpointModel(endpoint=endpoint, model=model)
 
 
-def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
-    """Return what the model takes, as far as it is known."""
-    return _profile(facts_of(endpoint=endpoint, model=model))
+def read_profile(*, endpoint: Endpoint, model: str) -> ModelProfile:
+    """Return the parameters that the model takes, as far as known."""
+    return _profile(read_facts(endpoint=endpoint, model=model))
 
 
 @transaction.atomic
@@ -95,7 +95,7 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
     return _profile(row)
 
 
-def price_of(row: EndpointModel) -> Price | None:
+def find_price(row: EndpointModel) -> Price | None:
     """Return the price of a model at an endpoint, None where it is unknown."""
     if row.price_in_usd is None or row.price_out_usd is None:
         return None
@@ -106,7 +106,7 @@ def price_of(row: EndpointModel) -> Price | None:
     )
 
 
-def listed_price(*, base_url: str, model: str, now: datetime) -> tuple[Price, str] | None:
+def find_listed_price(*, base_url: str, model: str, now: datetime) -> tuple[Price, str] | None:
     """Return the price of a model and where that is written; None where it is not.
 
     The vendor is told by the address alone: a model of the same name on somebody else's server
@@ -179,7 +179,7 @@ def sum_spending(which: Q, *, by: str) -> dict[int, Spending]:
     }
 
 
-def family_of(model: str) -> str:
+def vendor_family(model: str) -> str:
     """Return the vendor of a model, as far as genai-prices tells it by the name alone.
 
     Else the first word of the model id, without what stands before its last slash.

@@ -1,4 +1,4 @@
-"""What a model at an endpoint can do: asked over the real wire, and written into its row.
+"""Probes of a model at an endpoint: asked over the real wire, and written into its row.
 
 A fault that says nothing about the ability (a busy server) leaves the ability as it was.
 """
@@ -16,12 +16,12 @@ from django.utils import timezone
 
 from augment.errors import Conflict, ModelFault, ParameterRefused
 from augment.llm.client import ChatClient, ModelProfile
-from augment.llm.costs import cut_of, usd_of
+from augment.llm.costs import find_cut, to_usd
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
-from augment.services.endpoints.known_models import TEMPERATURE, model_at, price_of
+from augment.services.endpoints.known_models import TEMPERATURE, find_price, model_at
 from augment.services.endpoints.treatments import SAMPLING
 from augment.services.events import log_change
 from augment.services.texts import make_document_storable, one_line
@@ -39,7 +39,7 @@ _LONGEST_NOTE = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeFinding:
-    """What one question showed.
+    """Result of one question.
 
     Attributes:
         ability: Which.
@@ -73,7 +73,7 @@ class ProbeReport:
     cost_usd: str | None = None
 
     def has(self, ability: Ability) -> bool | None:
-        """Return what was found of the ability by all questions, None where nothing was."""
+        """Return whether the model has the ability by all questions, None if nothing is known."""
         answers = [made.has_it for made in self.findings if made.ability == ability]
         return next((has_it for has_it in answers if not has_it), True if answers else None)
 
@@ -171,7 +171,7 @@ class _Prober:
 
     def __init__(self, *, client: ChatClient, row: EndpointModel) -> None:
         self._client, self._row = client, row
-        self._price = price_of(row)
+        self._price = find_price(row)
         self.calls = 0
         self.profile = ModelProfile(
             reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
@@ -190,7 +190,7 @@ class _Prober:
             refuses = fault.status in _REFUSALS and not is_other
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
-        cut = cut_of(request, reply, context_tokens=self._row.context_tokens)
+        cut = find_cut(request, reply, context_tokens=self._row.context_tokens)
         is_good = question.is_good(reply) if cut is None else False
         if ability == Ability.ANSWER_LIMIT and is_good is False:
             # Some servers pass over a parameter that they do not know instead of refusing it.
@@ -234,11 +234,11 @@ class _Prober:
             completion_tokens=completion,
             cached_tokens=reply.cached_tokens or 0,
         )
-        return f"{usd_of(nano_usd):f}"
+        return f"{to_usd(nano_usd):f}"
 
 
 def _list_chosen_values(row: EndpointModel) -> list[dict[str, Any]]:
-    """Return what contestants send the model beside messages, each set of values once."""
+    """Return the parameters that contestants send the model, each set of values once."""
     rows = Contestant.objects.filter(endpoint=row.endpoint, model=row.model, retired_at=None)
     chosen = [
         {name: given[name] for name in sorted(SAMPLING & given.keys())}

@@ -1,4 +1,4 @@
-"""Who plays a contestant's roles, and what it sends, fixed when it first runs.
+"""Models of a contestant's roles and their requests, fixed when it first runs.
 
 By default a contestant's own model plays all roles. A contestant is one treatment: were its tools
 called natively in one half of a study and in the answer in the other, its rating would be that of
@@ -19,7 +19,7 @@ from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
-from augment.services.endpoints.known_models import facts_of, price_of, profile_of
+from augment.services.endpoints.known_models import find_price, read_facts, read_profile
 from augment.services.events import log_change
 from augment.variants.options import ContestantOptions, complete_options, options_from_document
 from augment.variants.recipes import Recipe, find_recipe
@@ -42,12 +42,12 @@ class Respondent:
     @cached_property
     def facts(self) -> EndpointModel:
         """What is known of the model there; looked up once."""
-        return facts_of(endpoint=self.endpoint, model=self.model)
+        return read_facts(endpoint=self.endpoint, model=self.model)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Treatment:
-    """What a contestant sends in each of its roles, and its options, none of ours left open."""
+    """Requests of a contestant in each of its roles, and its options, defaults filled in."""
 
     contestant_pk: int
     respondents: Mapping[ModelRole, Respondent]
@@ -66,7 +66,7 @@ class Treatment:
     def without(
         self, refused: ParameterRefused, *, endpoint: Endpoint, model: str
     ) -> ModelProfile:
-        """Return what it sends from now on to a model that does not take one parameter.
+        """Return the profile from now on of a model that refuses one parameter.
 
         Raises:
             ModelFault: Earlier answers of this contestant were made with the parameter.
@@ -92,16 +92,18 @@ class Treatment:
         row = Contestant.objects.select_for_update(no_key=True).get(pk=self.contestant_pk)
         sends, profile = dict(row.sends or {}), ModelProfile()
         for role in roles:
-            profile = _profile_of(sends[role.value]).without(parameter)
-            sends[role.value] = _document_of(profile)
+            profile = _parse_profile(sends[role.value]).without(parameter)
+            sends[role.value] = _profile_document(profile)
         if sends != row.sends:
             row.sends = sends
             row.save(update_fields=["sends"])
         return profile
 
 
-def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respondent]) -> Treatment:
-    """Return what a contestant sends; roles that never ran are fixed to what is known now.
+def read_treatment(
+    contestant: Contestant, respondents: Mapping[ModelRole, Respondent]
+) -> Treatment:
+    """Return a contestant's requests; roles that never ran are fixed to today's facts.
 
     Args:
         contestant: Who is about to run, as just read.
@@ -119,7 +121,7 @@ def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respond
     return Treatment(
         contestant_pk=contestant.pk,
         respondents=respondents,
-        profiles={role: _profile_of(stored[role.value]) for role in respondents},
+        profiles={role: _parse_profile(stored[role.value]) for role in respondents},
         options=options,
     )
 
@@ -137,7 +139,7 @@ def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
         raise InvalidDocument("contestant", problems)
 
 
-def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
+def read_respondents(contestant: Contestant) -> dict[ModelRole, Respondent]:
     """Return who plays each role of a contestant's variant; nobody where it has none.
 
     Raises:
@@ -161,19 +163,19 @@ def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
 
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """Return the models without a price that contestants ask, as "model at endpoint"."""
-    asked = {one for row in contestants for one in respondents_of(row).values()}
-    return sorted(str(one) for one in asked if price_of(one.facts) is None)
+    asked = {one for row in contestants for one in read_respondents(row).values()}
+    return sorted(str(one) for one in asked if find_price(one.facts) is None)
 
 
-def options_of(contestant: Contestant) -> ContestantOptions:
+def read_options(contestant: Contestant) -> ContestantOptions:
     """Return the options fixed at a contestant's first run, before that as they would be now."""
     if contestant.frozen_options is not None:
         return options_from_document(contestant.frozen_options)
-    return _completed(contestant) if contestant.endpoint else ContestantOptions()
+    return _complete_options(contestant) if contestant.endpoint else ContestantOptions()
 
 
 def other_prompts(slug: str, options: ContestantOptions) -> str | None:
-    """Return what is wrong with options whose prompts are not installed; None where they are."""
+    """Return why the prompts of options are not installed; None if they are."""
     wanted, installed = options.prompt_version, prompt_version()
     if wanted is None or wanted == installed:
         return None
@@ -183,7 +185,7 @@ def other_prompts(slug: str, options: ContestantOptions) -> str | None:
     )
 
 
-def left_out(contestant: Contestant) -> dict[str, list[str]]:
+def list_unsent_options(contestant: Contestant) -> dict[str, list[str]]:
     """Return by role the chosen options that are not sent, as its model does not take them.
 
     Of a contestant that has not run yet: as far as it is known now.
@@ -196,8 +198,8 @@ def left_out(contestant: Contestant) -> dict[str, list[str]]:
     if not chosen:
         return {}
     sends = contestant.sends or {
-        role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
-        for role, one in respondents_of(contestant).items()
+        role.value: _profile_document(read_profile(endpoint=one.endpoint, model=one.model))
+        for role, one in read_respondents(contestant).items()
     }
     refused = {role: sorted(chosen & set(sent["refused"])) for role, sent in sends.items()}
     return {role: names for role, names in sorted(refused.items()) if names}
@@ -229,24 +231,24 @@ def _fix(
     row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
     before = row.sends or {}
     new = {
-        role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
+        role.value: _profile_document(read_profile(endpoint=one.endpoint, model=one.model))
         for role, one in respondents.items()
         if role.value not in before
     }
     row.sends = before | new
-    row.frozen_options = row.frozen_options or _completed(row).to_document()
+    row.frozen_options = row.frozen_options or _complete_options(row).to_document()
     row.save(update_fields=["sends", "frozen_options"])
     log_change(row, "fix", after={"slug": row.slug, "sends": new, "options": row.frozen_options})
     return row.sends, row.frozen_options
 
 
-def _completed(contestant: Contestant) -> ContestantOptions:
-    """Return what was chosen, and for the rest what counts now."""
+def _complete_options(contestant: Contestant) -> ContestantOptions:
+    """Return the options with today's defaults for open ones."""
     modifier = (contestant.sends or {}).get("modifier")
     if modifier is None:
         assert contestant.endpoint is not None
-        known = profile_of(endpoint=contestant.endpoint, model=contestant.model)
-        modifier = _document_of(known)
+        known = read_profile(endpoint=contestant.endpoint, model=contestant.model)
+        modifier = _profile_document(known)
     return complete_options(
         options_from_document(contestant.options),
         find_recipe(contestant.variant),
@@ -255,11 +257,11 @@ def _completed(contestant: Contestant) -> ContestantOptions:
     )
 
 
-def _document_of(profile: ModelProfile) -> dict[str, Any]:
-    """Return what of a profile changes what contestants send; no variant sends a schema."""
+def _profile_document(profile: ModelProfile) -> dict[str, Any]:
+    """Return the part of a profile that changes requests; no variant sends a schema."""
     sent = SAMPLING | frozenset(LengthName)
     return asdict(profile) | {"refused": sorted(profile.refused & sent)}
 
 
-def _profile_of(document: Mapping[str, Any]) -> ModelProfile:
+def _parse_profile(document: Mapping[str, Any]) -> ModelProfile:
     return ModelProfile(**{**document, "refused": frozenset(document["refused"])})

@@ -1,1 +1,1 @@
-"""What is measured about stored augmentations: checks, displacement, drives."""
+"""Measures of stored augmentations: checks, displacement, drives."""

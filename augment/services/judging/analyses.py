@@ -1,4 +1,4 @@
-"""What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals.
+"""Analyses of a job's rows by contestant: lines, repeats, pairs, wordings, refusals.
 
 Rows of tables are dicts. None is unknown or undefined, never zero.
 """
@@ -18,14 +18,14 @@ from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.displacement import DISTANCES, KeptSummary, Measured, of_job
+from augment.services.judging.displacement import DISTANCES, KeptSummary, MeasuredRow, of_job
 from augment.services.judging.findings import FINDINGS
 from augment.services.judging.measures import Measure, compute_once, digest_code, digest_rows
 from augment.services.judging.realism import REALISM, realism_of_job
 
 State = Augmentation.State
 Row = dict[str, Any]
-Answers = Mapping[str, Sequence[Measured]]
+Answers = Mapping[str, Sequence[MeasuredRow]]
 """What each contestant answered, by its slug."""
 
 SEED = 2026
@@ -69,7 +69,7 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
 
 
 def repeatability(job: GenerationJob) -> list[Row]:
-    """Return what varies between the samples of each contestant, of rows that have an outcome.
+    """Return the variation between each contestant's samples, of rows that have an outcome.
 
     The displacement of a sample is the mean over its matched objects, over time where something
     moves, as in all analyses; `within_m` is the pooled
@@ -96,15 +96,15 @@ def measure_job(job: GenerationJob) -> None:
     for start in range(0, len(ids), _AT_ONCE):
         for measure in _ROW_MEASURES:
             measure.of(ids[start : start + _AT_ONCE])
-    compare_pairs(answers_of(job))  # whose bootstrap is kept as well
+    compare_pairs(read_answers(job))  # whose bootstrap is kept as well
 
 
 # --- Analyses ----------------------------------------------------------------------------------
 
 
-def answers_of(job: GenerationJob) -> Answers:
+def read_answers(job: GenerationJob) -> Answers:
     """Return all outcomes of a job, measured, but those of the reference; one query."""
-    answers: defaultdict[str, list[Measured]] = defaultdict(list)
+    answers: defaultdict[str, list[MeasuredRow]] = defaultdict(list)
     for one in of_job(job):
         is_reference = one.row.contestant.kind == Contestant.Kind.REFERENCE
         if one.row.state in Augmentation.SHOWABLE and not is_reference:
@@ -118,7 +118,7 @@ def compare_pairs(answers: Answers) -> Sequence[paired.PairedComparison]:
     A scenario's value is the median over its samples of the mean displacement of their matched
     objects.
     """
-    values = {slug: _values_of(measured) for slug, measured in answers.items()}
+    values = {slug: _median_errors(measured) for slug, measured in answers.items()}
 
     def compute() -> bytes:
         return _PAIRS.dump_json(paired.compare_all(values, seed=SEED))
@@ -132,7 +132,7 @@ def measure_wordings(answers: Answers) -> list[Row]:
     for measured in answers.values():
         scenarios = {one.row.scenario.slug: one.row.scenario for one in measured}
         wishes: defaultdict[int, list[float]] = defaultdict(list)
-        for slug, value in _values_of(measured).items():
+        for slug, value in _median_errors(measured).items():
             wishes[scenarios[slug].paraphrase_of_id or scenarios[slug].pk].append(value)
         several = [values for values in wishes.values() if len(values) > 1]
         if several:
@@ -191,7 +191,7 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
         )
 
 
-def _values_of(measured: Sequence[Measured]) -> dict[str, float]:
+def _median_errors(measured: Sequence[MeasuredRow]) -> dict[str, float]:
     """Return by scenario the median over samples of the mean displacement in metres."""
     samples: defaultdict[str, list[float]] = defaultdict(list)
     for one in measured:

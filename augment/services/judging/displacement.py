@@ -1,4 +1,4 @@
-"""How far stored augmentations are from their references: one by one, in groups, by object."""
+"""Displacement of stored augmentations from their references: single, grouped, by object."""
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -15,14 +15,14 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
-from augment.metrics.kept import KeptObject, kept_objects, summarise_kept
+from augment.metrics.kept import KeptObject, find_kept_objects, summarise_kept
 from augment.metrics.kept import KeptSummary as KeptSummary
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
 from augment.services.judging.measures import Measure
-from augment.services.scenarios.scenes import ground_of
+from augment.services.scenarios.scenes import load_ground
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State
@@ -38,14 +38,14 @@ NO_VARIANT = "Without a variant"
 
 
 class By(StrEnum):
-    """What augmentations are grouped by, beside their contestant."""
+    """Grouping of augmentations, beside their contestant."""
 
     TYPE = "type"
     VARIANT = "variant"
     CONTESTANT = "contestant"
 
 
-class Unmeasured(StrEnum):
+class MissingReason(StrEnum):
     """Why an augmentation has no displacement."""
 
     UNFINISHED = "waits, runs, failed or was cancelled"
@@ -56,7 +56,7 @@ class Unmeasured(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distance:
-    """How far an augmentation is from the reference.
+    """Distance of an augmentation from the reference.
 
     Attributes:
         displacement: None where there is a reason why not; all missing for an answer that was
@@ -67,16 +67,16 @@ class Distance:
 
     displacement: Displacement | None = None
     kept: tuple[KeptObject, ...] = ()
-    why_not: Unmeasured | None = None
+    why_not: MissingReason | None = None
 
     @property
     def kept_summary(self) -> KeptSummary | None:
-        """How much was to stay and did, None without any."""
+        """Share of what was to stay that did stay, None without any."""
         return summarise_kept(self.kept)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measured(Distance):
+class MeasuredRow(Distance):
     """An augmentation with how far it is from the reference."""
 
     row: Augmentation
@@ -97,22 +97,22 @@ class Group:
     kept: KeptSummary | None
 
 
-def of_job(job: GenerationJob) -> list[Measured]:
+def of_job(job: GenerationJob) -> list[MeasuredRow]:
     """Measure every row of a job, or take what is stored."""
     return _measure(_rows().defer("modification").filter(job=job))
 
 
-def of_rows(ids: Collection[int]) -> list[Measured]:
+def of_rows(ids: Collection[int]) -> list[MeasuredRow]:
     """Measure the augmentations with these primary keys, as those of a job."""
     return _measure(_rows().defer("modification").filter(pk__in=ids))
 
 
-def of_augmentation(row: Augmentation) -> Measured:
+def of_augmentation(row: Augmentation) -> MeasuredRow:
     """Measure one row whose scenario is loaded, or take what is stored."""
     return _measure([row])[0]
 
 
-def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
+def groups(measured: Iterable[MeasuredRow], *, by: By) -> list[Group]:
     """Sum up what was measured: by type in the catalogue's order, else by name.
 
     Args:
@@ -120,16 +120,16 @@ def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
         by: What to group by, beside the contestant. By variant only the types count whose places
             are definite, as in the paper.
     """
-    cells: defaultdict[tuple[int, str, str, str], list[Measured]] = defaultdict(list)
+    cells: defaultdict[tuple[int, str, str, str], list[MeasuredRow]] = defaultdict(list)
     for one in measured:
         counts = by is not By.VARIANT or one.row.scenario.type in PLACED_EXACTLY
         if counts and one.displacement is not None:
-            rank, heading = _group_of(one.row, by)
+            rank, heading = _group_key(one.row, by)
             contestant = one.row.contestant
             cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(one)
     return [
         Group(
-            heading=_group_of(cell[0].row, by)[1],
+            heading=_group_key(cell[0].row, by)[1],
             contestant=cell[0].row.contestant,
             summary=summarise([one.displacement for one in cell if one.displacement is not None]),
             kept=summarise_kept([thing for one in cell for thing in one.kept]),
@@ -138,7 +138,7 @@ def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
     ]
 
 
-def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
+def _group_key(row: Augmentation, by: By) -> tuple[int, str]:
     """Return a rank and a heading: variants as the paper has them, combinations, then none."""
     if by is By.TYPE:
         kind, types = row.scenario.type, [*ScenarioType]
@@ -151,7 +151,7 @@ def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
     return rank, spell_variant(row.contestant.variant) or NO_VARIANT
 
 
-def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
+def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
     """Yield every object of every measured augmentation, by scenario and contestant.
 
     Each is a dict: the `row` that it is of; `object`, whether it is matched, missing or surplus;
@@ -164,7 +164,7 @@ def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
             continue
         wanted, placed = (
             {agent.id: agent for agent in change.changed} if change else {}
-            for change in (_read(one.row.scenario.reference), _answer_of(one.row))
+            for change in (_read(one.row.scenario.reference), _read_answer(one.row))
         )
         found = one.displacement
         for standing, reference_id, generated_id, match in (
@@ -224,15 +224,15 @@ def _rows() -> QuerySet[Augmentation]:
     return rows.defer("notes").order_by("scenario__slug", "contestant__slug", "sample")
 
 
-def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
+def _measure(rows: Iterable[Augmentation]) -> list[MeasuredRow]:
     listed = list(rows)
-    unfinished = Distance(why_not=Unmeasured.UNFINISHED)
+    unfinished = Distance(why_not=MissingReason.UNFINISHED)
     distances = DISTANCES.of(row.pk for row in listed)
-    return [_measured(row, distances.get(row.pk, unfinished)) for row in listed]
+    return [_measure_augmentation(row, distances.get(row.pk, unfinished)) for row in listed]
 
 
-def _measured(row: Augmentation, distance: Distance) -> Measured:
-    return Measured(row=row, **{field.name: getattr(distance, field.name) for field in _FIELDS})
+def _measure_augmentation(row: Augmentation, distance: Distance) -> MeasuredRow:
+    return MeasuredRow(row=row, **{field.name: getattr(distance, field.name) for field in _FIELDS})
 
 
 def _compute(ids: Collection[int]) -> dict[int, Distance]:
@@ -247,21 +247,21 @@ def _compute(ids: Collection[int]) -> dict[int, Distance]:
 def _measure_row(
     row: Augmentation, standard_of: Callable[[Augmentation], "_Standard"]
 ) -> Distance:
-    reference, answer, before = standard_of(row).reference, _answer_of(row), row.follows
+    reference, answer, before = standard_of(row).reference, _read_answer(row), row.follows
     if reference is None:
-        return Distance(why_not=Unmeasured.NO_REFERENCE)
+        return Distance(why_not=MissingReason.NO_REFERENCE)
     if answer is None and row.state == State.DONE:
-        return Distance(why_not=Unmeasured.UNREADABLE_ROW)
+        return Distance(why_not=MissingReason.UNREADABLE_ROW)
     moves = answer is not None and (answer.has_motion or reference.has_motion)
     try:
         found = displacement(answer, reference, standard_of(row).ground if moves else None)
     except (InvalidDocument, InvalidModification):
-        return Distance(why_not=Unmeasured.UNFIT_MOTION)
-    own = None if before is None else _answer_of(before)
+        return Distance(why_not=MissingReason.UNFIT_MOTION)
+    own = None if before is None else _read_answer(before)
     earlier = None if before is None else standard_of(before).reference
     kept: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
-        kept = kept_objects(own, answer, reference_before=earlier, reference_after=reference)
+        kept = find_kept_objects(own, answer, reference_before=earlier, reference_after=reference)
     return Distance(displacement=found, kept=kept)
 
 
@@ -270,7 +270,7 @@ _FIELDS = fields(Distance)
 
 
 class _Standard:
-    """What the answers to one scenario are held against; read when it is asked for."""
+    """Reference values of one scenario's answers, read when first needed."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -281,10 +281,10 @@ class _Standard:
 
     @cached_property
     def ground(self) -> Ground:
-        return ground_of(self._scenario)
+        return load_ground(self._scenario)
 
 
-def _answer_of(row: Augmentation) -> Modification | None:
+def _read_answer(row: Augmentation) -> Modification | None:
     return _read(row.modification) if row.state == State.DONE else None
 
 

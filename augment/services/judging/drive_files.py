@@ -14,8 +14,8 @@ from typing import Any
 from augment.errors import Conflict
 from augment.formats.documents import read_json
 from augment.scene import codec
-from augment.services.judging.simulations import NUPLAN, Options, document_of, load_planner
-from augment.simulation.drive import expert_of, run
+from augment.services.judging.simulations import NUPLAN, Options, drive_document, load_planner
+from augment.simulation.drive import find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
 from augment.simulation.traffic import DriveSetting
@@ -86,7 +86,7 @@ def _setting(source: Path, name: str, options: Options) -> DriveSetting:
 def _drive(setting: DriveSetting, options: Options) -> dict[str, Any]:
     road = Road(setting.scene, setting.recording)
     drove = run(setting, load_planner(options, also=(options.planner,)), road=road)
-    score = score_drive(drove, expert_of(setting, road), modification=setting.modification)
+    score = score_drive(drove, find_expert(setting, road), modification=setting.modification)
     return {
         "format": "scenario-arena/drive",
         "version": 1,
@@ -95,5 +95,5 @@ def _drive(setting: DriveSetting, options: Options) -> dict[str, Any]:
         "is_reactive": options.is_reactive,
         "score": score.value,
         "kind": NUPLAN,
-        **document_of(drove, {ScoreKind.NUPLAN: score}),
+        **drive_document(drove, {ScoreKind.NUPLAN: score}),
     }

@@ -61,12 +61,12 @@ class DrivingLine:
 
     @property
     def is_simulated(self) -> bool:
-        """Whether its contestant is simulated."""
+        """True if its contestant is simulated."""
         return self.contestant is not None and self.contestant.is_simulated
 
     @property
     def lowered(self) -> float | None:
-        """By how much the change lowered the score, 0 to 1."""
+        """Loss of score due to the change, 0 to 1."""
         if self.mean is None or self.before is None:
             return None
         return self.before - self.mean
@@ -98,7 +98,7 @@ class DrivingScores:
 
     @property
     def done(self) -> int:
-        """How many have an outcome."""
+        """Number of rows with an outcome."""
         return self.total - self.under_way
 
     @property
@@ -187,7 +187,7 @@ def _scores(
         contestant = 0 if row.augmentation is None else row.augmentation.contestant_id
         cells[row.subject, contestant].append(row)
     elsewhere = list(results.select_related("augmentation__contestant", "augmentation__scenario"))
-    types = [*(row.scenario.type for row in rows), *map(_type_of, elsewhere)]
+    types = [*(row.scenario.type for row in rows), *map(_scenario_type, elsewhere)]
     kinds = in_type_order([*ScenarioType, *types])
     lines = [_line(cell, before, score, kinds) for cell in cells.values()]
     failures = Counter(row.reason for row in rows if row.state == State.FAILED)
@@ -240,7 +240,7 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
         cells[contestant.name.lower(), contestant.slug, row.planner].append(row)
     for (_, _, planner), cell in sorted(cells.items()):
         contestant = cell[0].augmentation.contestant
-        done = [(_type_of(row), row.score, row) for row in cell if row.score is not None]
+        done = [(_scenario_type(row), row.score, row) for row in cell if row.score is not None]
         yield DrivingLine(
             subject=Subject.AUGMENTATION,
             name=f"{contestant.name}, driven in nuPlan by {planner}",
@@ -260,7 +260,7 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
         )
 
 
-def _type_of(row: NuplanResult) -> str:
+def _scenario_type(row: NuplanResult) -> str:
     return row.augmentation.scenario.type
 
 

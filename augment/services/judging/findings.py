@@ -1,4 +1,4 @@
-"""What the geometric checks say of a scene's change: findings and guesses of faults.
+"""Geometric checks of a scene's change: findings and guesses of faults.
 
 The reference and anybody's labels stay out of it.
 """
@@ -21,14 +21,14 @@ from augment.scene.codec import modification_from_document, modification_to_docu
 from augment.scene.intent import Intent
 from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios import editing
-from augment.services.scenarios.scenes import ground_of, intent_of
+from augment.services.scenarios.scenes import load_ground, load_intent
 
 _WAY_STEPS = 10
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
+class CheckedRow:
     """All findings about a change, the worst first.
 
     Attributes:
@@ -49,7 +49,7 @@ class Checked:
 
     @property
     def faults(self) -> list[Finding]:
-        """What is wrong or doubtful."""
+        """Findings that are wrong or doubtful."""
         return [finding for finding in self.findings if finding.is_fault]
 
     @property
@@ -64,7 +64,7 @@ def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     changed = Augmentation.objects.filter(pk__in=ids).exclude(modification=None)
     for scenario, rows in rows_by_scenario(changed):
         try:
-            ground, intent = ground_of(scenario), intent_of(scenario)
+            ground, intent = load_ground(scenario), load_intent(scenario)
         except InvalidDocument:
             continue
         for row in rows:
@@ -77,20 +77,20 @@ FINDINGS = Measure("findings", tuple[Finding, ...], _compute)
 """The findings about rows that can be checked, the worst first."""
 
 
-def check_augmentation(row: Augmentation) -> Checked | None:
+def check_augmentation(row: Augmentation) -> CheckedRow | None:
     """Check a row whose scenario and scene are loaded; None without a modification."""
     if row.modification is None:
         return None
     try:
-        findings = _check(row, ground_of(row.scenario), intent_of(row.scenario))
+        findings = _check(row, load_ground(row.scenario), load_intent(row.scenario))
     except (InvalidDocument, InvalidModification) as error:
-        return Checked(problem=str(error))
-    return Checked(findings=findings, is_against_intent=row.scenario.intent is not None)
+        return CheckedRow(problem=str(error))
+    return CheckedRow(findings=findings, is_against_intent=row.scenario.intent is not None)
 
 
 def check_edit(
     scenario: Scenario, document: object, *, snapped: str = "", preset: object = None
-) -> Checked:
+) -> CheckedRow:
     """Check a change that is being made by hand, before anything is kept.
 
     Args:
@@ -105,16 +105,16 @@ def check_edit(
             modification = editing.snap(scenario, modification, snapped)
         if preset is not None:
             modification = editing.give_preset(scenario, modification, preset)
-        ground, intent = editing.editable_ground(scenario), intent_of(scenario)
+        ground, intent = editing.editable_ground(scenario), load_intent(scenario)
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification, CannotPlace, UnknownName) as error:
-        return Checked(problem=str(error))
+        return CheckedRow(problem=str(error))
     motion = ground.motion_after(modification, of_all=False) if modification.has_motion else None
-    return Checked(
+    return CheckedRow(
         modification=modification_to_document(modification),
         findings=_worst_first(findings),
         is_against_intent=intent is not None,
-        presets=editing.presets_of(scenario, modification),
+        presets=editing.motion_presets(scenario, modification),
         ways={
             one.agent.id: one.states[one.is_present, :2][::_WAY_STEPS].round(2).tolist()
             for one in (motion.others if motion else ())

@@ -19,7 +19,7 @@ from augment.simulation.score import ScoreKind
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedResults:
-    """What came of an import.
+    """Result of an import.
 
     Attributes:
         kept: How many results were written; those of the same planner and rules were replaced.
@@ -50,7 +50,7 @@ def import_results(
     scenarios = read_tokens(tokens.read_bytes())
     drives = [drive for folder in folders for drive in read_results(folder)]
     _check_once(drives)
-    codes = {name: code for name, text in scenarios.items() if (code := _code_of(text))}
+    codes = {name: code for name, text in scenarios.items() if (code := _find_code(text))}
     rows = Augmentation.objects.filter(code__in=set(codes.values())).defer("modification")
     by_code = {row.code: row for row in rows}
     by_scenario = {name: by_code[code] for name, code in codes.items() if code in by_code}
@@ -84,7 +84,7 @@ def _check_once(drives: Sequence[NuplanDrive]) -> None:
             raise InvalidDocument("nuPlan results", [(scenario, problem)])
 
 
-def _code_of(text: str) -> UUID | None:
+def _find_code(text: str) -> UUID | None:
     try:
         return UUID(text)
     except ValueError:

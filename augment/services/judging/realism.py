@@ -1,4 +1,4 @@
-"""How realistic stored augmentations are: one by one, and between floor and ceiling."""
+"""Realism of stored augmentations: single, and between floor and ceiling."""
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence
@@ -20,7 +20,7 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, S
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification
 from augment.services.judging.measures import Measure, rows_by_scenario
-from augment.services.scenarios.scenes import reference_of, scene_of, seed_of
+from augment.services.scenarios.scenes import load_reference, load_scene, scenario_seed
 
 MOST_SCENES = 40
 """So many scenes are learned from; of more, those whose digests come first: a fixed sample."""
@@ -29,7 +29,7 @@ RANDOM_DRAWS = 4
 
 
 class Subject(StrEnum):
-    """Whose realism a line states, in the order of a table."""
+    """Subject of a line, in the order of a table."""
 
     RECORDING = "recording"
     REFERENCE = "reference"
@@ -70,12 +70,12 @@ class RealismLine:
 
     @property
     def name(self) -> str:
-        """How it is headed."""
+        """Heading of the line."""
         return self.contestant.name if self.contestant else NAMES[self.subject]
 
     @property
     def is_simulated(self) -> bool:
-        """Whether its contestant is simulated."""
+        """True if its contestant is simulated."""
         return self.contestant is not None and self.contestant.is_simulated
 
 
@@ -140,11 +140,13 @@ objects are placed at random; the pattern is the reference, without one the firs
 """
 
 
-class _Recorded:
-    """What is learned from the scenes of this installation."""
+class _LearnedScenes:
+    """Statistics learned from the scenes of this installation."""
 
     def __init__(self) -> None:
-        self.counts = {key: metric.count_recorded(_objects_of(*key)) for key in _learned_scenes()}
+        self.counts = {
+            key: metric.count_recorded(_read_objects(*key)) for key in _list_learned_scenes()
+        }
         self._total = sum(self.counts.values(), metric.RecordedCounts())
 
     def without(self, scene: BaseScene) -> metric.RecordedCounts:
@@ -152,12 +154,12 @@ class _Recorded:
         return self._total - self.counts.get(_key(scene), metric.RecordedCounts())
 
 
-class _Judged:
+class _ScenarioRealism:
     """One scenario, whose changes are judged by the other scenes."""
 
-    def __init__(self, scenario: Scenario, learned: _Recorded) -> None:
+    def __init__(self, scenario: Scenario, learned: _LearnedScenes) -> None:
         self._scenario = scenario
-        self._ground = Ground.of(scene_of(scenario))
+        self._ground = Ground.of(load_scene(scenario))
         self._recorded = learned.without(scenario.base_scene)
 
     def of(self, change: Modification | None) -> metric.Realism | None:
@@ -172,12 +174,12 @@ class _Judged:
     def recording(self, pattern: Modification) -> metric.Realism | None:
         """Return that of what was recorded here, of the classes that the pattern changes."""
         classes = {CLASS_OF[one.type] for one in pattern.changed}
-        objects = _objects_of(*_key(self._scenario.base_scene))
+        objects = _read_objects(*_key(self._scenario.base_scene))
         return self._judge([one for one in objects if one.object_class in classes])
 
     def random(self, pattern: Modification) -> list[metric.Realism | None]:
         """Return those of the pattern's objects anywhere; always the same for a scenario."""
-        rng = np.random.default_rng(seed_of(self._scenario.slug))
+        rng = np.random.default_rng(scenario_seed(self._scenario.slug))
         return [
             self.of(metric.place_at_random(self._ground, pattern, rng))
             for _ in range(RANDOM_DRAWS)
@@ -188,33 +190,33 @@ class _Judged:
         return None if realism.mean is None else realism
 
 
-def _learned_scenes() -> list[tuple[UUID, str]]:
+def _list_learned_scenes() -> list[tuple[UUID, str]]:
     """Return the keys of the scenes that are learned from, as `_key` has them."""
     scenes = BaseScene.objects.order_by("content_hash", "slug")
     return list(scenes.values_list("code", "content_hash")[:MOST_SCENES])
 
 
 def _name_learned_scenes() -> str:
-    return str(_learned_scenes())
+    return str(_list_learned_scenes())
 
 
 def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
-    learned = _Recorded()
+    learned = _LearnedScenes()
     found: dict[int, metric.Realism] = {}
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged = _Judged(scenario, learned)
-        values = {row.pk: judged.of(_change_of(row)) for row in rows}
+        judged = _ScenarioRealism(scenario, learned)
+        values = {row.pk: judged.of(_read_change(row)) for row in rows}
         found |= {pk: value for pk, value in values.items() if value is not None}
     return found
 
 
 def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
-    learned = _Recorded()
+    learned = _LearnedScenes()
     found: dict[int, Surroundings] = {}
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged, reference = _Judged(scenario, learned), reference_of(scenario)
+        judged, reference = _ScenarioRealism(scenario, learned), load_reference(scenario)
         for row in rows:
-            pattern = reference or _change_of(row) or Modification()
+            pattern = reference or _read_change(row) or Modification()
             found[row.pk] = {
                 Subject.RECORDING: (judged.recording(pattern),),
                 Subject.REFERENCE: () if reference is None else (judged.of(reference),),
@@ -229,18 +231,18 @@ SURROUNDINGS = Measure("surroundings", Surroundings, _judge_surroundings, _name_
 
 
 def _key(scene: BaseScene) -> tuple[UUID, str]:
-    """Return what a scene is remembered by: its row and what it holds."""
+    """Return the cache key of a scene: its row and its content's hash."""
     return scene.code, scene.content_hash
 
 
 @lru_cache(maxsize=4 * MOST_SCENES)
-def _objects_of(code: UUID, content_hash: str) -> tuple[metric.PlacedObject, ...]:
-    """Return what was recorded in a scene; a quarter of a second for a hundred objects."""
+def _read_objects(code: UUID, content_hash: str) -> tuple[metric.PlacedObject, ...]:
+    """Return the recorded objects of a scene; a quarter of a second for a hundred objects."""
     document = BaseScene.objects.values_list("document", flat=True).get(code=code)
     return tuple(metric.measure_recorded(Ground.of(scene_from_document(document))))
 
 
-def _change_of(row: Augmentation) -> Modification | None:
+def _read_change(row: Augmentation) -> Modification | None:
     try:
         return None if row.modification is None else modification_from_document(row.modification)
     except InvalidDocument:

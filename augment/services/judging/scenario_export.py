@@ -1,4 +1,4 @@
-"""What a job made as scenarios in a standard format, with what is lost and where it comes from."""
+"""Export of a job's scenarios in a standard format, with losses and sources."""
 
 import re
 from collections import defaultdict
@@ -9,10 +9,10 @@ from augment.errors import Conflict, UnknownName
 from augment.formats.interplan.file import InterplanSource
 from augment.formats.nuplan_log import NuPlan
 from augment.formats.writers import WRITERS, writer_named
-from augment.formats.writing import Cell, Loss, Written
+from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.codec import modification_from_document, recording_from_document
-from augment.services.scenarios.scenes import scene_of, type_of
+from augment.services.scenarios.scenes import known_type, load_scene
 
 FORMATS = tuple(WRITERS)
 
@@ -37,7 +37,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportOrigin:
-    """What scenarios were taken from: its kind ("job", "study"), name and code."""
+    """Origin of exported scenarios: its kind ("job", "study"), name and code."""
 
     kind: str
     name: str
@@ -45,7 +45,7 @@ class ExportOrigin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Exported:
+class Archive:
     """The files of scenarios and what is to be said with them.
 
     Attributes:
@@ -54,18 +54,18 @@ class Exported:
 
     origin: ExportOrigin
     format: str
-    written: Written
+    written: Output
     missing: tuple[Loss, ...]
     sources: tuple[Source, ...]
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What anyone who passes the files on has to know."""
+        """Warnings for whoever passes the files on."""
         return list_warnings(self.sources)
 
 
 def list_warnings(sources: Iterable[Source]) -> tuple[str, ...]:
-    """Return what anyone has to know who passes on files that were made from these."""
+    """Return the warnings for whoever passes on files that were made from these."""
     by_licence: dict[bool | None, list[str]] = defaultdict(list)
     for source in sources:
         by_licence[source.is_non_commercial].append(source.scene)
@@ -78,7 +78,7 @@ def list_warnings(sources: Iterable[Source]) -> tuple[str, ...]:
     )
 
 
-def source_of(row: BaseScene) -> Source:
+def scene_source(row: BaseScene) -> Source:
     """Return a scene with what its provenance says of its licence."""
     bound = bool(_NON_COMMERCIAL.search(row.provenance))
     is_known = bound or row.provenance.lower().startswith(_OWN)
@@ -90,7 +90,7 @@ def source_of(row: BaseScene) -> Source:
     )
 
 
-def export_job(job: GenerationJob, *, file_format: str, contestant: str | None = None) -> Exported:
+def export_job(job: GenerationJob, *, file_format: str, contestant: str | None = None) -> Archive:
     """Return all that a job made, as scenarios of that format.
 
     Args:
@@ -118,7 +118,7 @@ def export_job(job: GenerationJob, *, file_format: str, contestant: str | None =
 
 def export_rows(
     rows: Iterable[Augmentation], origin: ExportOrigin, file_format: str, *, many: bool = False
-) -> Exported:
+) -> Archive:
     """Return augmentations as scenarios of that format.
 
     Args:
@@ -145,12 +145,12 @@ def export_rows(
         scenes[row.scenario.base_scene.slug] = row.scenario.base_scene
     if not cells:
         raise Conflict(f"{origin.name} has no modification that could be written.")
-    return Exported(
+    return Archive(
         origin=origin,
         format=file_format,
         written=writer(cells),
         missing=tuple(missing),
-        sources=tuple(source_of(scenes[slug]) for slug in sorted(scenes)),
+        sources=tuple(scene_source(scenes[slug]) for slug in sorted(scenes)),
     )
 
 
@@ -165,8 +165,8 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
     return Cell(
         name=name,
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
-        scene=scene_of(scenario),
-        type=type_of(scenario.type),
+        scene=load_scene(scenario),
+        type=known_type(scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),

@@ -17,14 +17,14 @@ from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.judging.thresholds import conclude, conclude_all
-from augment.services.scenarios.scenes import reference_of, scene_of, type_of
+from augment.services.scenarios.scenes import known_type, load_reference, load_scene
 from augment.services.work import Lease, Settlement, WorkKind
-from augment.simulation.drive import Drive, expert_of, run
+from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, criticality, score_drive
-from augment.simulation.trace import blind_trace, trace_of
+from augment.simulation.trace import blind_trace, make_trace
 from augment.simulation.traffic import DriveSetting
 
 State, Subject = Simulation.State, Simulation.Subject
@@ -35,18 +35,18 @@ SCORES = {NUPLAN: "nuplan_score", INTERPLAN: "interplan_score"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """How to drive."""
+    """Options of a drive."""
 
     planner: str = PDM_CLOSED
     offsets: str = "paper"
     is_reactive: bool = False
 
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
-        """Those driven so."""
+        """Return the drives with these options."""
         return rows.filter(**asdict(self))
 
 
-def allowed_planners() -> tuple[str, ...]:
+def list_allowed_planners() -> tuple[str, ...]:
     """Return the planners that workers of this installation may load."""
     return (*NAMED, *settings.PLANNERS)
 
@@ -114,30 +114,30 @@ class Drives(WorkKind[Simulation]):
         self._also = also
 
     def sendable(self) -> QuerySet[Simulation]:
-        """None of a planner that no worker may load: they wait for the command that named it."""
-        return super().sendable().filter(planner__in=allowed_planners())
+        """Return the drives that may be sent; planners from a command wait for that command."""
+        return super().sendable().filter(planner__in=list_allowed_planners())
 
     def run(self, row: Simulation, held: Lease[Simulation]) -> Settlement:
         """Drive and score; a planner from outside may raise anything."""
-        setting = _setting_of(row)
+        setting = _load_setting(row)
         road = Road(setting.scene, setting.recording)
         planner = load_planner(row, also=self._also)
         drove = run(setting, planner, road=road, after_step=lambda step: held.insist())
-        expert = expert_of(setting, road)
+        expert = find_expert(setting, road)
         scores = {
             kind: score_drive(
                 drove,
                 expert,
                 kind=kind,
-                scenario_type=type_of(row.scenario.type),
+                scenario_type=known_type(row.scenario.type),
                 modification=setting.modification,
             )
             for kind in ScoreKind
         }
-        trace = trace_of(setting, drove, scores[ScoreKind.NUPLAN])
+        trace = make_trace(setting, drove, scores[ScoreKind.NUPLAN])
         columns = {
             **{SCORES[kind.value]: score.value for kind, score in scores.items()},
-            "document": document_of(drove, scores),
+            "document": drive_document(drove, scores),
             "trace": zlib.compress(json.dumps(trace, separators=(",", ":")).encode(), 6),
         }
         return Settlement(state=State.DONE, columns=columns)
@@ -155,7 +155,7 @@ class Drives(WorkKind[Simulation]):
 DRIVES = Drives()
 
 
-def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
+def drive_document(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
     """Return the parts of the scores, and what else is said of a drive; no series."""
     score = scores[ScoreKind.NUPLAN]
     return {
@@ -211,12 +211,12 @@ def _plan(
     return [row.pk] if row.state == State.QUEUED else []
 
 
-def _setting_of(row: Simulation) -> DriveSetting:
-    """Return what a row drives; without a modification the scene stays as it was."""
-    scenario, modification, scene = row.scenario, None, scene_of(row.scenario)
+def _load_setting(row: Simulation) -> DriveSetting:
+    """Return the scene that a row drives; unchanged without a modification."""
+    scenario, modification, scene = row.scenario, None, load_scene(row.scenario)
     changed = row.augmentation or row.swept
     if row.subject == Subject.REFERENCE:
-        modification = reference_of(scenario)
+        modification = load_reference(scenario)
     elif changed is not None and changed.modification is not None:
         modification = modification_from_document(changed.modification)
     recording = scenario.base_scene.recording

@@ -21,7 +21,13 @@ from augment.services.inputs import InputKind, input_field
 from augment.services.judging.simulations import Options, load_planner
 from augment.services.judging.thresholds import tell_difference
 from augment.services.scenarios.editing import read_edit
-from augment.services.scenarios.scenes import add_variant, intent_of, scene_of, seed_of, type_of
+from augment.services.scenarios.scenes import (
+    add_variant,
+    known_type,
+    load_intent,
+    load_scene,
+    scenario_seed,
+)
 from augment.simulation.planners import IDM, OFFSETS_M, PDM_CLOSED
 
 LARGEST_FAMILY = 100
@@ -59,12 +65,12 @@ class SweepRequest:
 
     @property
     def options(self) -> Options:
-        """How it is driven; offsets matter to PDM-Closed alone."""
+        """Options of its drives; offsets matter to PDM-Closed alone."""
         offsets = self.offsets if self.planner == PDM_CLOSED else Options().offsets
         return Options(planner=self.planner, offsets=offsets, is_reactive=self.is_reactive)
 
 
-def numbers_of(scenario: Scenario) -> dict[str, float]:
+def swept_numbers(scenario: Scenario) -> dict[str, float]:
     """Return every number of a scenario that can be swept, by its path in intent or reference."""
     return list_numbers(_document(scenario, None))
 
@@ -89,7 +95,7 @@ def plan_sweep(
         Conflict: No value fits the scene.
     """
     load_planner(request.options, also=also)
-    changes = changes_of(scenario, request)
+    changes = map_changes(scenario, request)
     sweep = Sweep(
         scenario=scenario, number=request.number, asked_by=actor, **asdict(request.options)
     )
@@ -106,22 +112,22 @@ def plan_sweep(
             Simulation(scenario=scenario, swept=row, subject=SWEPT, **asdict(way))
             for row in rows
             if row.modification is not None
-            for way in ways_of(request.options)
+            for way in tested_ways(request.options)
         )
     return sweep
 
 
-def changes_of(
+def map_changes(
     scenario: Scenario, request: SweepRequest
 ) -> dict[float, Modification | AugmentError]:
-    """Return what is changed with each value of a number, or why nothing fits.
+    """Return by each value of a number its modification, or why nothing fits.
 
     Raises:
         UnknownName: The scenario has no such number.
         InvalidDocument: The bounds make no values.
         Conflict: No value fits.
     """
-    known, scene, number = numbers_of(scenario), scene_of(scenario), request.number
+    known, scene, number = swept_numbers(scenario), load_scene(scenario), request.number
     check_names("number", [number], known)
     document, changes = _document(scenario, number), dict[float, Modification | AugmentError]()
     for value in request.values:
@@ -136,19 +142,19 @@ def changes_of(
 
 
 def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
-    """Return the values that fit as scenarios in the own JSON, files by name; as `changes_of`."""
+    """Return the values that fit as scenarios in the own JSON, files by name; as `map_changes`."""
     recording = scenario.base_scene.recording
     cells = [
         Cell(
             name=f"{scenario.slug} with {request.number} = {value:g}",
             stem=f"{scenario.slug}--{value:.10g}",
-            scene=scene_of(scenario),
-            type=type_of(scenario.type),
+            scene=load_scene(scenario),
+            type=known_type(scenario.type),
             modification=change,
             keeps_traffic=scenario.keep_traffic,
             recording=None if recording is None else codec.recording_from_document(recording),
         )
-        for value, change in changes_of(scenario, request).items()
+        for value, change in map_changes(scenario, request).items()
         if isinstance(change, Modification)
     ]
     return own_json.write(cells).files
@@ -161,7 +167,7 @@ def delete_sweep(sweep: Sweep, *, actor: User | None = None) -> None:
     sweep.delete()
 
 
-def ways_of(tested: Options) -> list[Options]:
+def tested_ways(tested: Options) -> list[Options]:
     """Return the ways in which each value is driven, the tested one first."""
     named = [
         Options(planner=IDM, is_reactive=tested.is_reactive),
@@ -186,10 +192,10 @@ def add_family(
         raise Conflict(f"A family has 1 to {LARGEST_FAMILY} members, not {count}.")
     if seed < 0:
         raise Conflict(f"A seed is 0 or more, not {seed}.")
-    intent = intent_of(scenario)
+    intent = load_intent(scenario)
     if intent is None:
         raise Conflict(f"“{scenario.slug}” has no intent whose ranges could be drawn from.")
-    members = sample_family(scene_of(scenario), intent, count=count, seed=seed)
+    members = sample_family(load_scene(scenario), intent, count=count, seed=seed)
     with transaction.atomic():
         rows = [
             add_variant(
@@ -219,5 +225,5 @@ def _document(scenario: Scenario, number: str | None) -> dict[str, Any]:
 def _change(scenario: Scenario, scene: Scene, document: dict[str, Any]) -> Modification:
     if document["format"] == codec.INTENT.frame["format"]:
         intent = codec.intent_from_document(document)
-        return place(scene, intent, seed=seed_of(scenario.slug)).modification
+        return place(scene, intent, seed=scenario_seed(scenario.slug)).modification
     return read_edit(scenario, document)

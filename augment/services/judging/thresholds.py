@@ -1,4 +1,4 @@
-"""What a sweep says: each value's drives, where the planner fails, the hardest value solved.
+"""Result of a sweep: drives of each value, the planner's threshold, the hardest value solved.
 
 Once the last drive has an outcome the sweep is concluded: whichever worker finds that first keeps
 the hardest value as a scenario, and a worker's regular round does where that one died before.
@@ -18,7 +18,7 @@ from augment.scene.entities import Modification
 from augment.scene.intent import Intent
 from augment.scene.intent_statements import list_statements
 from augment.scene.numbers import list_numbers, set_number
-from augment.services.scenarios.scenes import add_variant, scene_of, seed_of
+from augment.services.scenarios.scenes import add_variant, load_scene, scenario_seed
 from augment.simulation.score import ScoreKind
 from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
 
@@ -44,7 +44,7 @@ class SweepLine:
     def cells(self) -> Sequence[tuple[Simulation | None, bool | None]]:
         """The drives, each with whether it was lawful; None where it has no score."""
         lawful = {trial.driver: trial.is_lawful for trial in self.tried.trials}
-        return [(drive, lawful.get(driver_of(drive))) for drive in self.drives]
+        return [(drive, lawful.get(driver_name(drive))) for drive in self.drives]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,12 +68,12 @@ class SweepResult:
 
     @property
     def drivers(self) -> list[str]:
-        """Who drives each value, the planner under test first."""
-        return list(dict.fromkeys(driver_of(one) for line in self.lines for one in line.drives))
+        """Drivers of each value, the planner under test first."""
+        return list(dict.fromkeys(driver_name(one) for line in self.lines for one in line.drives))
 
     @property
     def verdict(self) -> str:
-        """Where the planner under test fails, as a sentence."""
+        """Threshold of the planner under test, as a sentence."""
         passed = {line.tried.is_passed for line in self.lines} - {None}
         if self.edges:
             places = "; ".join(f"it passes {good:g} and fails {bad:g}" for good, bad in self.edges)
@@ -83,8 +83,8 @@ class SweepResult:
         return f"The planner {'passes' if True in passed else 'fails'} every value driven."
 
 
-def result_of(sweep: Sweep) -> SweepResult:
-    """Return what a sweep says so far; two queries."""
+def sweep_result(sweep: Sweep) -> SweepResult:
+    """Return the result of a sweep so far; two queries."""
     drives: dict[int, list[Simulation]] = {}
     for drive in Simulation.objects.filter(swept__sweep=sweep).only(*_TRIAL).order_by("pk"):
         drives.setdefault(drive.swept_id or 0, []).append(drive)
@@ -101,7 +101,7 @@ def result_of(sweep: Sweep) -> SweepResult:
     )
 
 
-def driver_of(drive: Simulation | Sweep) -> str:
+def driver_name(drive: Simulation | Sweep) -> str:
     """Return a planner with its offsets, where they matter, as pages and files name it."""
     return f"{drive.planner}, {drive.offsets}" if drive.planner == "pdm-closed" else drive.planner
 
@@ -115,7 +115,7 @@ def conclude(sweep_pk: int) -> None:
     sweep = rows.filter(pk=sweep_pk, concluded_at=None).first()
     if sweep is None:
         return
-    result = result_of(sweep)
+    result = sweep_result(sweep)
     if result.hardest is not None:
         row = next(line.row for line in result.lines if line.tried is result.hardest)
         sweep.hardest = _keep(sweep, row)
@@ -132,7 +132,7 @@ def conclude_all() -> None:
 
 
 def tell_difference(before: Intent, after: Intent) -> str:
-    """Return what an intent says that another one does not, as short statements."""
+    """Return the statements of an intent that another one lacks."""
     known = list_statements(before)
     return "; ".join(one for one in list_statements(after) if one not in known)
 
@@ -143,7 +143,7 @@ def tell_difference(before: Intent, after: Intent) -> str:
 def _line(sweep: Sweep, row: SweepValue, drives: list[Simulation]) -> SweepLine:
     trials = tuple(
         Trial(
-            driver=driver_of(drive),
+            driver=driver_name(drive),
             score=drive.nuplan_score or 0.0,
             is_lawful=is_lawful(
                 {one["name"]: one["value"] for one in drive.document["metrics"][ScoreKind.NUPLAN]}
@@ -180,7 +180,7 @@ def _intent_with(sweep: Sweep, value: float, reference: Modification) -> Intent 
     # Somebody may have given the scenario another intent since.
     try:
         intent = codec.intent_from_document(changed)
-        made = place(scene_of(scenario), intent, seed=seed_of(scenario.slug)).modification
+        made = place(load_scene(scenario), intent, seed=scenario_seed(scenario.slug)).modification
     except AugmentError:
         return None
     stored = codec.modification_to_document(made)

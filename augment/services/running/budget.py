@@ -1,4 +1,4 @@
-"""What the calls of a job, or of a judge, may use and use: reserved before, settled after each.
+"""Budget of a job's or judge's calls: reserved before, settled after each.
 
     spent + reserved + worst case <= cap
 
@@ -17,9 +17,9 @@ from django.db import transaction
 from django.db.models import F, Q, QuerySet
 
 from augment.errors import Conflict, ModelFault, NotSent
-from augment.llm.costs import Price, WorstCase, nano_usd_of
+from augment.llm.costs import Price, WorstCase, to_nano_usd
 from augment.llm.messages import Reply
-from augment.models import Budgeted, Contestant, GenerationJob, JudgeRun, ModelCall
+from augment.models import CappedWork, Contestant, GenerationJob, JudgeRun, ModelCall
 from augment.services.clock import Moment
 from augment.services.endpoints.treatments import list_unpriced_models
 from augment.services.events import log_change
@@ -41,7 +41,7 @@ _COUNTED = (
 
 
 class Room(StrEnum):
-    """Whether a job has room for one more call."""
+    """Answer to a job's request for one more call."""
 
     TAKEN = "taken"
     BUSY = "busy"
@@ -49,8 +49,8 @@ class Room(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Used:
-    """What a call used.
+class Usage:
+    """Tokens and cost of a call.
 
     Attributes:
         nano_usd: None where the price is unknown.
@@ -64,12 +64,12 @@ class Used:
     calls: int = 1
 
 
-_NOTHING = Used(tokens=0, nano_usd=0, is_estimated=False, calls=0)
+_NOTHING = Usage(tokens=0, nano_usd=0, is_estimated=False, calls=0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Caps:
-    """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
+    """Caps of a job; None is no cap. Of several, the first that is reached counts."""
 
     cap_usd: Decimal | None = input_field(
         InputKind.DECIMAL,
@@ -101,7 +101,7 @@ class Caps:
             InvalidDocument: A cap is nothing or less, or too high to be counted to.
         """
         check_bounds(self)
-        usd = None if self.cap_usd is None else nano_usd_of(self.cap_usd)
+        usd = None if self.cap_usd is None else to_nano_usd(self.cap_usd)
         columns = {"cap_nano_usd": usd, "cap_calls": self.cap_calls, "cap_tokens": self.cap_tokens}
         return {name: value for name, value in columns.items() if value is not None}
 
@@ -142,7 +142,7 @@ def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
             job,
             "stop",
             before={"state": State.RUNNING.value},
-            after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
+            after={"state": State.STOPPED_AT_CAP.value, "cap": describe_caps(job)},
         )
     has_room = jobs.filter(alone).exclude(state=State.STOPPED_AT_CAP).exists()
     return Room.BUSY if has_room else Room.SPENT
@@ -150,7 +150,7 @@ def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
 
 @transaction.atomic(savepoint=False)
 def settle(
-    *, call: ModelCall, used: Used, now: Moment, answer: dict[str, Any] | None = None
+    *, call: ModelCall, used: Usage, now: Moment, answer: dict[str, Any] | None = None
 ) -> None:
     """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
@@ -175,7 +175,7 @@ def settle(
         # Not the request and the answer, which are long.
         call = rows.select_for_update().only("attempt_id", "judgement_id", *_COUNTED).get()
         rows.update(**columns)
-    job = _budgets_of(call)
+    job = _find_budgets(call)
     if job is None:
         return  # a reading sums up its calls itself
     if call.settled_at is None:
@@ -188,7 +188,7 @@ def settle(
             spent_tokens=F("spent_tokens") + used.tokens,
         )
     else:
-        counted = _used_unseen(call).calls
+        counted = _settle_unseen(call).calls
         job.update(
             spent_nano_usd=F("spent_nano_usd") + (used.nano_usd or 0) - (call.cost_nano_usd or 0),
             spent_calls=F("spent_calls") + used.calls - counted,
@@ -209,26 +209,26 @@ def settle_unseen(*, now: Moment, of: Q) -> None:
         fault = "nobody saw the end: its worker stopped"
         if call.sent_at is None:
             fault = "not sent: its worker stopped while it waited for a place"
-        settle(call=call, used=_used_unseen(call), now=now, answer={"fault": fault})
+        settle(call=call, used=_settle_unseen(call), now=now, answer={"fault": fault})
 
 
-def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Used:
-    """Return what an answered call used; where the server did not say, its worst case."""
+def settle_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Usage:
+    """Return the use of an answered call; its worst case if the server does not say."""
     prompt, completion = reply.prompt_tokens, reply.completion_tokens
     seen = WorstCase(
         prompt_tokens=worst.prompt_tokens if prompt is None else prompt,
         completion_tokens=worst.completion_tokens if completion is None else completion,
         cached_tokens=reply.cached_tokens or 0,
     )
-    return Used(
+    return Usage(
         tokens=seen.tokens,
         nano_usd=seen.nano_usd(price),
         is_estimated=prompt is None or completion is None,
     )
 
 
-def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -> Used:
-    """Return what a call without an answer used.
+def settle_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -> Usage:
+    """Return the use of a call without an answer.
 
     An endpoint that answers with an error, or was not asked at all, bills nothing. A time-out, a
     broken connection or an answer that is none may be billed all the same.
@@ -236,11 +236,11 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
     if isinstance(fault, NotSent):
         return _NOTHING
     if fault.status is not None and fault.status >= 400:
-        return Used(tokens=0, nano_usd=0, is_estimated=False)
-    return Used(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
+        return Usage(tokens=0, nano_usd=0, is_estimated=False)
+    return Usage(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
 
 
-def limit_of(job: Budgeted) -> str:
+def describe_caps(job: CappedWork) -> str:
     """Return the caps of a job as a person reads them."""
     caps = {
         "USD": None if job.cap_usd is None else f"{job.cap_usd.normalize():f}",
@@ -257,10 +257,10 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
         Conflict: A cap can't be, or there is one in USD and an unknown price.
     """
     unknown = list_unpriced_models(contestants) if caps.cap_usd is not None else []
-    return columns_of(caps, unknown)
+    return cap_columns(caps, unknown)
 
 
-def columns_of(caps: Caps, unpriced: Collection[str]) -> dict[str, int]:
+def cap_columns(caps: Caps, unpriced: Collection[str]) -> dict[str, int]:
     """Return the caps as columns; `unpriced` names the models whose price nobody knows.
 
     Raises:
@@ -288,7 +288,7 @@ def raise_caps(job: GenerationJob, caps: Caps) -> None:
         current = getattr(job, name)
         if current is None or value <= current:
             raise Conflict(
-                f"Only a cap that the job has is raised, and must be higher: {limit_of(job)}."
+                f"Only a cap that the job has is raised, and must be higher: {describe_caps(job)}."
             )
         setattr(job, name, value)
     job.save(update_fields=list(columns))
@@ -303,7 +303,7 @@ def count_unpriced(job: GenerationJob) -> int:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _budgets_of(call: ModelCall) -> Budgets | None:
+def _find_budgets(call: ModelCall) -> Budgets | None:
     """Return the row whose caps a call counts against; None where it is a reading's."""
     if call.attempt_id is not None:
         return GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
@@ -312,11 +312,11 @@ def _budgets_of(call: ModelCall) -> Budgets | None:
     return None
 
 
-def _used_unseen(call: ModelCall) -> Used:
-    """Return what counts for a call whose end nobody saw."""
+def _settle_unseen(call: ModelCall) -> Usage:
+    """Return the use of a call whose end nobody saw."""
     if call.sent_at is None:
         return _NOTHING
-    return Used(tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True)
+    return Usage(tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True)
 
 
 def _within_caps(worst: WorstCase, nano_usd: int | None, *, with_reserved: bool) -> Q:

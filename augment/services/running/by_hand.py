@@ -1,4 +1,4 @@
-"""What a person made of an augmentation, as an augmentation of a contestant of kind human.
+"""Corrections by hand: augmentations of a contestant of kind human.
 
 The row is written with its modification and waits; a worker leases it as any other, draws it and
 settles it. The one that was corrected stays as it is.

@@ -24,7 +24,7 @@ from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services.endpoints.known_models import facts_of, price_of
+from augment.services.endpoints.known_models import find_price, read_facts
 from augment.services.endpoints.treatments import Respondent
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
@@ -64,8 +64,8 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
         raise errors.JobCancelled
 
 
-def sentence_of(fault: errors.ModelFault) -> str:
-    """Return what broke, with the HTTP status where there was one."""
+def reason_sentence(fault: errors.ModelFault) -> str:
+    """Return the reason of a failure, with the HTTP status if there was one."""
     text = str(fault)
     if fault.status is None or str(fault.status) in text:
         return text
@@ -113,7 +113,7 @@ class CallTranscript(ABC):
 
     def price(self, role: ModelRole, model: str) -> Price | None:
         """Return what a model costs that plays a role, None where that is unknown."""
-        return price_of(facts_of(endpoint=self._endpoint_of(role), model=model))
+        return find_price(read_facts(endpoint=self._endpoint_of(role), model=model))
 
     @abstractmethod
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
@@ -172,7 +172,7 @@ class CallTranscript(ABC):
                 served_from_id=earlier.served_from_id or earlier.pk,
             )
         self._numbers += 1
-        return _reply_of(earlier)
+        return _stored_reply(earlier)
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Reserve the worst case of a request and store it; returns its number, from 1.
@@ -224,29 +224,29 @@ class CallTranscript(ABC):
         """
         call = self._in_flight.pop(number)
         # The fault also where there is none: the worker may have been thought dead meanwhile.
-        fault_text = "" if fault is None else make_storable(sentence_of(fault))
+        fault_text = "" if fault is None else make_storable(reason_sentence(fault))
         self._settle(
             call.row,
-            budget.used_by_reply(reply, worst=call.worst, price=call.price),
-            _columns_of(reply) | {"fault": fault_text},
+            budget.settle_reply(reply, worst=call.worst, price=call.price),
+            _reply_columns(reply) | {"fault": fault_text},
         )
 
     def broke(self, number: int, fault: errors.ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._in_flight.pop(number)
-        columns: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
+        columns: dict[str, Any] = {"fault": make_storable(reason_sentence(fault))}
         if isinstance(fault, errors.NotSent):
             columns["sent_at"] = None
-        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
+        used = budget.settle_fault(fault, worst=call.worst, price=call.price)
         self._settle(call.row, used, columns)
 
-    def _settle(self, call: ModelCall, used: budget.Used, answer: dict[str, Any]) -> None:
+    def _settle(self, call: ModelCall, used: budget.Usage, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out."""
         settle = partial(budget.settle, call=call, used=used, now=timezone.now(), answer=answer)
         wait_out(settle, sleep=self._sleep)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
-        """Return what a call's row says about the request, whoever answers it."""
+        """Return the columns of a call's row that describe the request."""
         document = make_document_storable(request.to_document(image_url=image_reference))
         return {
             **self._owner,
@@ -314,7 +314,7 @@ class RowTranscript(CallTranscript):
         super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key)
 
     def price(self, role: ModelRole, model: str) -> Price | None:
-        return price_of(self._respondents[role].facts)
+        return find_price(self._respondents[role].facts)
 
     def insist(self) -> None:
         insist_wanted(self._held, lock=True)
@@ -331,7 +331,7 @@ class RowTranscript(CallTranscript):
         return budget.reserve(jobs=self._jobs, worst=worst, price=price)
 
     def limit(self) -> str:
-        return budget.limit_of(self._jobs.get())
+        return budget.describe_caps(self._jobs.get())
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         self._notes += 1
@@ -360,7 +360,7 @@ def _hold_question(request_hash: str) -> None:
             cursor.execute("SELECT pg_advisory_xact_lock(%s)", [int(request_hash[:15], 16)])
 
 
-def _columns_of(reply: Reply) -> dict[str, Any]:
+def _reply_columns(reply: Reply) -> dict[str, Any]:
     """Return the answer as columns; a refusal that says nothing else is the answer."""
     extras = {
         "tool_calls": [asdict(call) for call in reply.tool_calls],
@@ -382,7 +382,7 @@ def _columns_of(reply: Reply) -> dict[str, Any]:
     }
 
 
-def _reply_of(call: ModelCall) -> Reply:
+def _stored_reply(call: ModelCall) -> Reply:
     """Return the answer that a call had, as it would come again; it took no time."""
     extras = call.extras or {}
     return Reply(

@@ -1,4 +1,4 @@
-"""What people mean when they name contestants and jobs, and what no job can do."""
+"""Contestants and jobs by the names that people use, and scenarios that no job can run."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -10,7 +10,7 @@ from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName, check_names
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.endpoints.known_endpoints import find_key_obstacle
-from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
+from augment.services.endpoints.treatments import other_prompts, read_options, read_respondents
 from augment.services.scenarios.choosing import ALL
 from augment.services.scenarios.submissions import refuse_unanswered
 from augment.variants.options import ToolProtocol
@@ -36,8 +36,8 @@ def find_obstacle(contestant: Contestant) -> str:
     if contestant.kind == Kind.SUBMISSION and not hasattr(contestant, "submission"):
         return "its submission is not in this installation"
     try:
-        respondents = respondents_of(contestant)
-        options = options_of(contestant)
+        respondents = read_respondents(contestant)
+        options = read_options(contestant)
     except AugmentError as error:
         return str(error)
     if contestant.endpoint is None:

@@ -20,7 +20,7 @@ from augment.variants.options import MOST_SAMPLES
 
 @dataclass(frozen=True, kw_only=True)
 class AcceptRequest:
-    """How an accepted submission is called, and whether it runs at once."""
+    """Name of an accepted submission, and whether it runs at once."""
 
     slug: str = input_field(InputKind.TEXT, "Short name in files", SLUG_RULE, most=80)
     name: str = input_field(InputKind.TEXT, "Name in results", most=LONGEST_NAME)

@@ -1,4 +1,4 @@
-"""What a job will probably cost: from what its contestants used before."""
+"""Expected cost of a job, from its contestants' use so far."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,22 +6,22 @@ from decimal import Decimal
 
 from django.db.models import Count, Q, Sum
 
-from augment.llm.costs import usd_of
+from augment.llm.costs import to_usd
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
-from augment.services.endpoints.known_models import price_of
-from augment.services.endpoints.treatments import options_of, respondents_of
+from augment.services.endpoints.known_models import find_price
+from augment.services.endpoints.treatments import read_options, read_respondents
 from augment.services.running.jobs import JobScope, with_followed
 from augment.variants.options import recipe_with
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import calls_of
+from augment.variants.showing import call_ranges
 
 State = Augmentation.State
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContestantEstimate:
-    """What one contestant is expected to use in a job.
+    """Expected use of one contestant in a job.
 
     Attributes:
         rows: Augmentations.
@@ -85,7 +85,7 @@ class JobEstimate:
 
 
 def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEstimate:
-    """Return what a job of these would use; unknown slugs are left out.
+    """Return the estimate of a job; unknown slugs are left out.
 
     Args:
         scope: What the job runs.
@@ -114,14 +114,14 @@ def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEst
 
 
 def _line(row: Contestant, cells: int) -> ContestantEstimate:
-    calls = calls_of(recipe_with(find_recipe(row.variant), options_of(row))).values()
+    calls = call_ranges(recipe_with(find_recipe(row.variant), read_options(row))).values()
     least, usual, most = (
         cells * sum(getattr(one, name) for one in calls) for name in ("least", "usual", "most")
     )
     plain = ContestantEstimate(
         slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most)
     )
-    seen, used = _used_before(row)
+    seen, used = _average_use(row)
     if not used:
         return plain
     share = cells / seen
@@ -142,16 +142,16 @@ def _line(row: Contestant, cells: int) -> ContestantEstimate:
 def _usd(
     row: Contestant, used: Mapping[ModelRole, tuple[int, int, int]], share: float
 ) -> Decimal | None:
-    respondents, total = respondents_of(row), 0
+    respondents, total = read_respondents(row), 0
     for role, (_, prompt, completion) in used.items():
-        price = price_of(respondents[role].facts)
+        price = find_price(respondents[role].facts)
         if price is None:
             return None
         total += price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
-    return usd_of(round(share * total))
+    return to_usd(round(share * total))
 
 
-def _used_before(row: Contestant) -> tuple[int, dict[ModelRole, tuple[int, int, int]]]:
+def _average_use(row: Contestant) -> tuple[int, dict[ModelRole, tuple[int, int, int]]]:
     """Return over how many augmentations, and by role its calls, prompt and completion tokens.
 
     Of a contestant that is not stored yet: from all that ask the same model in the same variant.

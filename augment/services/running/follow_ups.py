@@ -25,7 +25,7 @@ from augment.variants.respondents import ModelRole, NoteKind
 
 @dataclass(frozen=True, kw_only=True)
 class FollowUpRequest(Caps):
-    """What is to be changed in a result, and what asking for it may use."""
+    """Change that is asked for in a result, and caps of its calls."""
 
     instruction: str = input_field(
         InputKind.TEXT,
@@ -54,7 +54,7 @@ def ask_follow_up(
         Conflict: No language model gave this answer, it is none, its transcript is gone, or a job
             can't run the contestant.
     """
-    conversation_of(answer)
+    read_conversation_until(answer)
     before = answer.scenario
     new = NewScenario(
         scene=before.base_scene.slug,
@@ -92,7 +92,7 @@ def find_augmentation(code: str) -> Augmentation:
     raise Conflict(f"No augmentation has the code {code!r}; it stands in its page's address.")
 
 
-def conversation_of(answer: Augmentation | None) -> tuple[Message, ...]:
+def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
     """Return the modifier's conversation up to and including the answer that counted.
 
     Raises:

@@ -16,7 +16,7 @@ from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.events import log_change
 from augment.services.running.budget import Room
-from augment.services.running.calls import CallTranscript, sentence_of
+from augment.services.running.calls import CallTranscript, reason_sentence
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
@@ -97,7 +97,7 @@ class Readings(WorkKind[IntentReading]):
                     row.scenario.instruction, client=opened, model=row.model, transcript=transcript
                 )
         except ModelFault as fault:
-            return Settlement(state=State.FAILED, reason=sentence_of(fault))
+            return Settlement(state=State.FAILED, reason=reason_sentence(fault))
         except ReplyUnreadable as unreadable:
             return Settlement(state=State.FAILED, reason=str(unreadable))
         except BudgetSpent as spent:

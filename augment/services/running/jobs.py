@@ -15,7 +15,7 @@ from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.running.budget import NO_CAPS, Caps, check_caps, limit_of, raise_caps
+from augment.services.running.budget import NO_CAPS, Caps, check_caps, describe_caps, raise_caps
 from augment.services.running.choosing import refuse_impossible
 from augment.services.running.progress import count_rows
 from augment.services.texts import one_line
@@ -36,7 +36,7 @@ _Row = TypeVar("_Row", Contestant, Scenario)
 
 @dataclass(frozen=True, kw_only=True)
 class JobScope:
-    """What a job runs: contestants x scenarios x samples."""
+    """Scope of a job: contestants x scenarios x samples."""
 
     contestants: Sequence[str] = input_field(InputKind.NAMES, "Contestants", "Slugs.")
     scenarios: Sequence[str] = input_field(InputKind.NAMES, "Scenarios", "Slugs.")
@@ -113,7 +113,7 @@ def launch(
     )
     if follows is None:
         _let_follow(rows)
-    settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": limit_of(job)}
+    settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": describe_caps(job)}
     slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
     _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
@@ -179,10 +179,10 @@ def resume(
     waiting = Augmentation.objects.filter(job=job.pk, state=State.QUEUED)
     queued = change_all(waiting, sent_at=None)
     job.refresh_from_db(from_queryset=GenerationJob.objects.select_for_update())
-    before = {"state": job.state, "cap": limit_of(job)}
+    before = {"state": job.state, "cap": describe_caps(job)}
     raise_caps(job, higher)
     _move(job, GenerationJob.HELD, JobState.RUNNING, "resumed")
-    after = {"state": JobState.RUNNING.value, "cap": limit_of(job), "queued": queued}
+    after = {"state": JobState.RUNNING.value, "cap": describe_caps(job), "queued": queued}
     _log(job, "resume", actor, before=before, after=after)
     return job
 

@@ -18,25 +18,25 @@ from django.db.models import Avg, Exists, OuterRef, Q, QuerySet
 
 from augment import errors
 from augment.llm.client import ChatClient
-from augment.llm.costs import Price, WorstCase, usd_of
+from augment.llm.costs import Price, WorstCase, to_usd
 from augment.llm.messages import shorten
 from augment.models import JudgeRun, ModelCall, PairJudgement
 from augment.prompts.fill import JudgeQuestion
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_endpoints import find_endpoint
-from augment.services.endpoints.known_models import facts_of, price_of
+from augment.services.endpoints.known_models import find_price, read_facts
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running import budget
 from augment.services.running.budget import Caps, Room
-from augment.services.running.calls import CallTranscript, sentence_of
+from augment.services.running.calls import CallTranscript, reason_sentence
 from augment.services.texts import make_storable
 from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants.judge import UNREADABLE, ask_judge, most_nano_usd
 from augment.variants.judge import Exchange as Exchange
+from augment.variants.judge import combine_answers as combine_answers
 from augment.variants.judge import exchange as exchange
-from augment.variants.judge import preference_of as preference_of
 from augment.variants.respondents import NoteKind
 
 State = PairJudgement.State
@@ -72,7 +72,7 @@ class JudgeRequest(Caps):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgeEstimate:
-    """What a run will use; calls that break and are sent again come on top.
+    """Estimate of a run; calls that break and are sent again come on top.
 
     Attributes:
         usd: By what earlier answers of this judge took, None without any or without a price.
@@ -86,30 +86,30 @@ class JudgeEstimate:
 
 
 def estimate_judge(request: JudgeRequest, pairs: int, longest: str) -> JudgeEstimate:
-    """Return what a run would use; `longest` is the longest instruction of its pairs.
+    """Return the estimate of a run; `longest` is the longest instruction of its pairs.
 
     Raises:
         UnknownName: No such endpoint.
         Conflict: The model can't see pictures.
     """
     endpoint = find_endpoint(request.endpoint)
-    facts = facts_of(endpoint=endpoint, model=request.model)
+    facts = read_facts(endpoint=endpoint, model=request.model)
     if facts.vision is False:
         raise errors.Conflict(
             f"{request.model} at {endpoint.label} can’t see pictures, so it can’t judge them. "
             "Choose another model; where this is wrong, probe the model again."
         )
-    calls, price = ORDERS * pairs, price_of(facts)
+    calls, price = ORDERS * pairs, find_price(facts)
     usd = most = None
     if price is not None:
-        most = usd_of(calls * most_nano_usd(longest, price))
+        most = to_usd(calls * most_nano_usd(longest, price))
         used = ModelCall.objects.filter(
             **{"judgement__run__endpoint": endpoint, "judgement__run__model": request.model},
             served_from=None,
         ).aggregate(prompt=Avg("prompt_tokens"), completion=Avg("completion_tokens"))
         if None not in used.values():
             tokens = {f"{name}_tokens": round(mean) for name, mean in used.items()}
-            usd = usd_of(calls * price.nano_usd(**tokens))
+            usd = to_usd(calls * price.nano_usd(**tokens))
     return JudgeEstimate(pairs=pairs, calls=calls, usd=usd, most_usd=most)
 
 
@@ -130,18 +130,18 @@ def plan_judge(
             "No pair was judged by experts yet, so there is nothing to compare with."
         )
     endpoint = find_endpoint(request.endpoint)
-    is_priced = price_of(facts_of(endpoint=endpoint, model=request.model)) is not None
+    is_priced = find_price(read_facts(endpoint=endpoint, model=request.model)) is not None
     unpriced = [] if is_priced else [f"{request.model} at {endpoint.label}"]
     run = JudgeRun.objects.create(
         endpoint=endpoint,
         model=request.model,
         question=request.question,
         asked_by=actor,
-        **budget.columns_of(request, unpriced),
+        **budget.cap_columns(request, unpriced),
     )
     PairJudgement.objects.bulk_create(PairJudgement(run=run, **pair._asdict()) for pair in pairs)
     asked = {"model": run.model, "endpoint": endpoint.label, "pairs": len(pairs)}
-    log_change(run, "start", actor, after=asked | {"cap": budget.limit_of(run)})
+    log_change(run, "start", actor, after=asked | {"cap": budget.describe_caps(run)})
     return run
 
 
@@ -188,7 +188,7 @@ class Judgements(WorkKind[PairJudgement]):
         self._client = client
 
     def waiting(self) -> QuerySet[PairJudgement]:
-        """None of a run that was cancelled or stopped at its cap."""
+        """Return waiting judgements; none of a run that was cancelled or stopped at its cap."""
         return super().waiting().filter(run__state=RunState.RUNNING)
 
     def run(self, row: PairJudgement, held: Lease[PairJudgement]) -> Settlement:
@@ -206,7 +206,7 @@ class Judgements(WorkKind[PairJudgement]):
         except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
         except errors.ModelFault as fault:
-            return Settlement(state=State.FAILED, reason=sentence_of(fault))
+            return Settlement(state=State.FAILED, reason=reason_sentence(fault))
         return Settlement(state=State.DONE, columns=columns)
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
@@ -244,7 +244,7 @@ class JudgeTranscript(CallTranscript):
         return budget.reserve(jobs=self._runs, worst=worst, price=price)
 
     def limit(self) -> str:
-        return budget.limit_of(self._runs.get())
+        return budget.describe_caps(self._runs.get())
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """A judge has no rounds, tools or reviews to note."""

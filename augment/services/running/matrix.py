@@ -43,7 +43,7 @@ class MatrixRow:
     cells: tuple[MatrixCell, ...]
 
 
-def matrix_of(models: Sequence[EndpointModel]) -> list[MatrixRow]:
+def make_matrix(models: Sequence[EndpointModel]) -> list[MatrixRow]:
     """Return variants down, models across."""
     return [
         MatrixRow(

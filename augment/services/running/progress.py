@@ -1,4 +1,4 @@
-"""What a job has done so far: rows by state, its pace, causes of failure, calls of tools.
+"""Progress of a job: rows by state, its pace, causes of failure, calls of tools.
 
 Reasons of failure name what was at hand: a request's id, a count, a place in an answer. Two that
 differ in nothing else have one cause; its key is the same from one look to the next.
@@ -78,13 +78,13 @@ class JobCounts:
 
     @property
     def is_moving(self) -> bool:
-        """Whether any row will change by itself: not where all that is left is held."""
+        """True if any row will change by itself; false if only held ones are left."""
         is_held = self.job.state in GenerationJob.HELD
         return (self.running if is_held else self.under_way) > 0
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing changes by itself; a job runs on for a moment after its last row."""
+        """True if nothing changes by itself; a job runs on for a moment after its last row."""
         return not self.is_moving and self.job.state != GenerationJob.State.RUNNING
 
 
@@ -104,7 +104,7 @@ class FailureGroup:
 
     @property
     def unnamed(self) -> int:
-        """How many more there are than are named."""
+        """Number of further ones without a name."""
         return self.number - len(self.augmentations)
 
 
@@ -144,13 +144,13 @@ def count_each(jobs: Sequence[GenerationJob]) -> list[JobCounts]:
     ]
 
 
-def cells_of(job: GenerationJob) -> QuerySet[Augmentation]:
+def list_cells(job: GenerationJob) -> QuerySet[Augmentation]:
     """Return the augmentations with scenarios and contestants, without long documents."""
     documents = ("modification", "scenario__reference")
     return job.augmentations.select_related("scenario", "contestant").defer(*documents)
 
 
-def cause_of(reason: str) -> str:
+def generalise_reason(reason: str) -> str:
     """Return a reason without what differs from row to row; the HTTP status stays."""
     parts = _STATUS.split(reason[:LOOKED_AT])
     varied = [part if number % 2 else _VARYING.sub("#", part) for number, part in enumerate(parts)]
@@ -165,7 +165,7 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
     causes = _rows_by_cause(job)
     order = sorted(causes, key=lambda key: (key[0] != State.FAILED, -len(causes[key]), key[1]))
     named = [pk for key in order[:SHOWN] for pk, _ in causes[key][:EXAMPLES]]
-    cells = {cell.pk: cell for cell in cells_of(job).filter(pk__in=named)} if named else {}
+    cells = {cell.pk: cell for cell in list_cells(job).filter(pk__in=named)} if named else {}
     return [
         FailureGroup(
             state=state,
@@ -191,7 +191,7 @@ def tool_calls(job: GenerationJob) -> list[ToolCallLine]:
             is_read = "error" not in document.get("result", {})
             flags = bool(document.get("understood", is_read)), bool(document.get("mended", False))
             calls[augmentation_id].append(flags)
-    rows = cells_of(job).filter(pk__in=calls)
+    rows = list_cells(job).filter(pk__in=calls)
     return [
         ToolCallLine(
             contestant=row.contestant.slug,
@@ -216,5 +216,5 @@ def _rows_by_cause(job: GenerationJob) -> dict[tuple[State, str], list[tuple[int
     begun = rows.annotate(start=Substr("reason", 1, LOOKED_AT))
     causes: defaultdict[tuple[State, str], list[tuple[int, str]]] = defaultdict(list)
     for pk, state, reason in begun.values_list("pk", "state", "start").iterator():
-        causes[State(state), cause_of(reason)].append((pk, reason))
+        causes[State(state), generalise_reason(reason)].append((pk, reason))
     return causes

@@ -28,12 +28,17 @@ from augment.scene.density import fit_boxes
 from augment.scene.entities import Scene
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
-from augment.services.endpoints.treatments import Treatment, respondents_of, treatment_of
+from augment.services.endpoints.treatments import Treatment, read_respondents, read_treatment
 from augment.services.running import budget, jobs, workers
-from augment.services.running.calls import RowTranscript, insist_wanted, sentence_of
-from augment.services.running.follow_ups import conversation_of
-from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
-from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
+from augment.services.running.calls import RowTranscript, insist_wanted, reason_sentence
+from augment.services.running.follow_ups import read_conversation_until
+from augment.services.scenarios.pictures import draw_picture, load_camera, original_picture, redraw
+from augment.services.scenarios.scenes import (
+    load_intent,
+    load_reference,
+    load_scene,
+    scenario_seed,
+)
 from augment.services.scenarios.submissions import find_entry
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
@@ -81,7 +86,7 @@ class Augmentations(WorkKind[Augmentation]):
         self._connect = connect
 
     def waiting(self) -> QuerySet[Augmentation]:
-        """None of a held or cancelled job, none that goes on from what is still under way."""
+        """Return waiting rows: not of held or cancelled jobs, nor following an unfinished one."""
         unanswered = self.rows.filter(state__in=Augmentation.UNDER_WAY)
         return super().waiting().exclude(job__in=CLOSED).exclude(follows__in=unanswered)
 
@@ -96,7 +101,7 @@ class Augmentations(WorkKind[Augmentation]):
 
     def _make(self, row: Augmentation, held: Held) -> Settlement:
         try:
-            scene = scene_of(row.scenario)
+            scene = load_scene(row.scenario)
             if row.modification is not None:  # of an earlier attempt that could not draw it
                 outcome = Outcome(
                     status=OutcomeStatus.DONE,
@@ -116,18 +121,18 @@ class Augmentations(WorkKind[Augmentation]):
             if outcome.notes:
                 columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
             try:
-                camera = camera_of(row.scenario, {row.pk: columns["modification"]})
-                image = picture_of(row.scenario, modification, camera)
+                camera = load_camera(row.scenario, {row.pk: columns["modification"]})
+                image = draw_picture(row.scenario, modification, camera)
             except Exception:
                 held.note(**columns)  # a second try only has to draw
                 raise
             return Settlement(state=State.DONE, columns=columns | {"image": image})
         except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
-        except (errors.Unwanted, errors.BudgetSpent):
+        except (errors.NotNeeded, errors.BudgetSpent):
             raise
         except errors.ModelFault as fault:
-            reason = sentence_of(fault)
+            reason = reason_sentence(fault)
         except errors.InvalidModification as error:
             reason = f"The modification does not fit the scene: {error}"
         except errors.AugmentError as error:
@@ -210,7 +215,7 @@ def open_wire(
 def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
     contestant = row.contestant
     if contestant.kind == Kind.REFERENCE:
-        reference = reference_of(row.scenario)
+        reference = load_reference(row.scenario)
         if reference is None:
             raise errors.Conflict("The scenario has no reference modification.")
         return Outcome(status=OutcomeStatus.DONE, modification=reference)
@@ -231,9 +236,9 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         raise errors.Conflict(f"A job can't run {contestant.slug} any more.")
     slug = row.scenario.slug
     # Each sample has a seed of its own; the first keeps that of jobs without samples.
-    seed = seed_of(slug if row.sample == 1 else f"{slug}#{row.sample}")
+    seed = scenario_seed(slug if row.sample == 1 else f"{slug}#{row.sample}")
     try:
-        placed = PLACERS[placer].place(scene, intent_of(row.scenario), seed=seed)
+        placed = PLACERS[placer].place(scene, load_intent(row.scenario), seed=seed)
     except errors.CannotPlace as refusal:
         return Outcome(status=OutcomeStatus.REFUSED, reason=refusal.reason)
     return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
@@ -242,9 +247,9 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
 def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
     begun: Messages = ()
     if row.scenario.follows_id is not None:
-        begun = follow_up_messages(conversation_of(row.follows), row.scenario.instruction)
-    respondents = respondents_of(row.contestant)
-    treatment = treatment_of(row.contestant, respondents)
+        begun = follow_up_messages(read_conversation_until(row.follows), row.scenario.instruction)
+    respondents = read_respondents(row.contestant)
+    treatment = read_treatment(row.contestant, respondents)
     options = treatment.options
     row.options = options.to_document()
     open_client = connect or partial(open_wire, held=held, treatment=treatment)
@@ -269,7 +274,7 @@ def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | N
             pipeline.EditTask(
                 scene=scene,
                 instruction=row.scenario.wording,
-                intent=intent_of(row.scenario),
+                intent=load_intent(row.scenario),
                 begun=begun,
             ),
             modifier=modifier,

@@ -21,7 +21,7 @@ from django.db.models import Prefetch
 
 from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, Contestant, ModelCall, TranscriptNote
-from augment.services.endpoints.treatments import left_out
+from augment.services.endpoints.treatments import list_unsent_options
 from augment.services.running.calls import IMAGES
 
 FORMAT, VERSION = "scenario-arena/transcript", 3
@@ -74,12 +74,12 @@ class TranscriptStep:
 
     @property
     def messages(self) -> list[SaidMessage]:
-        """What was asked, oldest first."""
-        return [] if self.call is None else messages_of(self.call.request)
+        """Messages of the request, oldest first."""
+        return [] if self.call is None else read_messages(self.call.request)
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """What was asked for beside the messages."""
+        """Parameters of the request beside the messages."""
         request = {} if self.call is None else self.call.request
         return {name: request[name] for name in request if name not in ("messages", "model")}
 
@@ -91,7 +91,7 @@ class TranscriptStep:
 
     @property
     def extras_text(self) -> str:
-        """What else the answer carried, such as native tool calls."""
+        """Rest of the answer, such as native tool calls."""
         extras = None if self.call is None else self.call.extras
         return shorten(_pretty(extras), LONGEST_SHOWN) if extras else ""
 
@@ -117,7 +117,7 @@ class Try:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Totals:
-    """What all calls of an augmentation used; None where one call does not say.
+    """Totals of an augmentation's calls; None if a call has no number.
 
     Attributes:
         calls: Calls that were sent.
@@ -134,7 +134,7 @@ class Totals:
     is_cost_estimated: bool
 
 
-def tries_of(augmentation: Augmentation) -> list[Try]:
+def list_tries(augmentation: Augmentation) -> list[Try]:
     """Return every attempt, the first one first; four queries."""
     return tries_by_augmentation([augmentation.pk]).get(augmentation.pk, [])
 
@@ -151,7 +151,7 @@ def tries_by_augmentation(augmentations: Collection[int]) -> dict[int, list[Try]
     return dict(tries)
 
 
-def totals_of(tries: list[Try]) -> Totals:
+def sum_totals(tries: list[Try]) -> Totals:
     """Return the sums over all attempts."""
     calls = _calls(tries)
     paid = [call for call in calls if call.sent_at is not None]
@@ -167,23 +167,23 @@ def totals_of(tries: list[Try]) -> Totals:
     )
 
 
-def messages_of(request: dict[str, Any]) -> list[SaidMessage]:
+def read_messages(request: dict[str, Any]) -> list[SaidMessage]:
     """Return the messages of a stored request."""
     return [_message(message) for message in request.get("messages", [])]
 
 
 def images_in(request: dict[str, Any]) -> list[str]:
     """Return the SHA-256 of every image that a stored request refers to."""
-    return [digest for message in messages_of(request) for digest in message.images]
+    return [digest for message in read_messages(request) for digest in message.images]
 
 
-def transcript_of(augmentation: Augmentation) -> dict[str, Any]:
+def full_transcript(augmentation: Augmentation) -> dict[str, Any]:
     """Return the whole record with its images, ready for JSON."""
-    record = record_of(augmentation, tries_of(augmentation))
+    record = make_record(augmentation, list_tries(augmentation))
     return record | {"images": {digest: _image(digest) for digest in record["images"]}}
 
 
-def record_of(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
+def make_record(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
     """Return the record with the names of its images alone, from attempts that were read."""
     return {
         "format": FORMAT,
@@ -192,7 +192,7 @@ def record_of(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
         "scenario": _columns(augmentation.scenario, ("slug", "type", "instruction")),
         "contestant": contestant_documents([augmentation.contestant])[0],
         "job": _columns(augmentation.job, ("code", "name", "is_fresh", "samples")),
-        "totals": {name: _json(value) for name, value in asdict(totals_of(tries)).items()},
+        "totals": {name: _json(value) for name, value in asdict(sum_totals(tries)).items()},
         "attempts": [
             _columns(one.attempt, _ATTEMPT)
             | {"outcome": one.attempt.outcome or None}
@@ -211,7 +211,7 @@ def contestant_documents(contestants: Sequence[Contestant]) -> list[dict[str, An
         | {
             "variant": row.variant or None,
             "model": row.model or None,
-            "left_out": left_out(row),
+            "left_out": list_unsent_options(row),
             "endpoint": None if row.endpoint is None else _columns(row.endpoint, endpoint),
         }
         for row in contestants

@@ -30,7 +30,7 @@ LATE_ROUNDS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Workforce:
-    """What is known of the workers.
+    """State of the workers.
 
     Attributes:
         living: How many were heard a moment ago.
@@ -49,7 +49,7 @@ class Workforce:
 
     @property
     def works(self) -> bool:
-        """Whether a worker lives and lost work is recovered."""
+        """True if a worker lives and lost work is recovered."""
         return self.living > 0 and self.not_recovered_since is None
 
 

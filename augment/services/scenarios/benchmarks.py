@@ -94,7 +94,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
                 "no task of a benchmark."
             )
     sizes = {
-        row.slug: measure_task(scenes.intent_of(row), scenes.reference_of(row)) for row in rows
+        row.slug: measure_task(scenes.load_intent(row), scenes.load_reference(row)) for row in rows
     }
     strata = choose_strata(sizes)
     past = BenchmarkItem.objects.order_by("split")  # the test last
@@ -118,7 +118,7 @@ def public_origins() -> QuerySet[Scenario, Any]:
 
 
 def list_remarks(row: Benchmark | None) -> tuple[str, ...]:
-    """Return what has to be said with every score: how many test references can be known.
+    """Return the remarks that belong to every score: how many test references can be known.
 
     Those of the catalogue and of what was made from it come with the project. A benchmark from
     before variants had an origin may hand out a variant of a test task with its reference.
@@ -142,7 +142,7 @@ def _candidate(row: Any, stratum: Stratum, earlier: Mapping[UUID | None, Split])
     shared = [f"origin {row.origin}"]
     if row.intent is not None:
         shared.append(json.dumps(["intent", row.intent], sort_keys=True))
-    reference = scenes.reference_of(row)
+    reference = scenes.load_reference(row)
     if reference is not None and not reference.is_empty:
         place = row.place or row.base_scene_id
         shared.append(json.dumps([place, row.reference], sort_keys=True))
@@ -183,7 +183,7 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
         made_on=timezone.now().date(),
         made_by=actor,
     )
-    row.checksum = checksum(_set_of(row, planned))
+    row.checksum = checksum(_make_set(row, planned))
     try:
         with transaction.atomic():
             row.save()
@@ -204,7 +204,7 @@ def benchmark_set(row: Benchmark) -> BenchmarkSet:
         Conflict: Scenarios have changed since it was made.
     """
     items = row.items.select_related("scenario__base_scene", "scenario__paraphrase_of")
-    found = _set_of(row, items)
+    found = _make_set(row, items)
     if checksum(found) != row.checksum:
         raise Conflict(
             f"Scenarios of the benchmark {row} have changed since it was made, so that its "
@@ -249,8 +249,8 @@ def refuse_handed_out(scenario: Scenario) -> None:
         )
 
 
-def _set_of(row: Benchmark, items: Iterable[BenchmarkItem]) -> BenchmarkSet:
-    tasks = [_task_of(item) for item in items]
+def _make_set(row: Benchmark, items: Iterable[BenchmarkItem]) -> BenchmarkSet:
+    tasks = [_make_task(item) for item in items]
     names = {task.name for task in tasks}
     return BenchmarkSet(
         name=row.slug,
@@ -264,7 +264,7 @@ def _set_of(row: Benchmark, items: Iterable[BenchmarkItem]) -> BenchmarkSet:
     )
 
 
-def _task_of(item: BenchmarkItem) -> BenchmarkTask:
+def _make_task(item: BenchmarkItem) -> BenchmarkTask:
     row, recording = item.scenario, item.scenario.base_scene.recording
     return BenchmarkTask(
         name=row.slug,
@@ -273,9 +273,9 @@ def _task_of(item: BenchmarkItem) -> BenchmarkTask:
         language=row.language,
         split=Split(item.split),
         stratum=Stratum(item.stratum),
-        scene=scenes.scene_of(row),
+        scene=scenes.load_scene(row),
         recording=None if recording is None else recording_from_document(recording),
         keeps_traffic=row.keep_traffic,
         paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,
-        reference=scenes.reference_of(row),
+        reference=scenes.load_reference(row),
     )

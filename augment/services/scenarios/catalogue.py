@@ -36,7 +36,7 @@ Read = TypeVar("Read")
 # Files
 
 
-def folder_of(folder: Path, one: CatalogueSet) -> Path:
+def set_folder(folder: Path, one: CatalogueSet) -> Path:
     """Return where the files of a set lie within a catalogue's folder."""
     return folder if one is CatalogueSet.PAPER else folder / one.value
 
@@ -81,7 +81,7 @@ def read_catalogue(
 def _read_files(
     folder: Path, parse: Callable[[object], Read], key: str, problems: Problems
 ) -> dict[str, Read]:
-    """Return what the files of a folder hold, by their names; faults go to the problems."""
+    """Return the content of a folder's files by name; faults go to the problems."""
     found = {}
     for file in sorted(folder.glob("*.json")):
         at = f"{folder.name}/{file.name}"
@@ -102,7 +102,7 @@ def _read_files(
 
 
 class CatalogueStep(StrEnum):
-    """What became of a file; `KEPT` where the stored version is another one and in use."""
+    """Result of loading a file; `KEPT` if the stored version differs and is in use."""
 
     ADDED = "added"
     CHANGED = "changed"
@@ -112,7 +112,7 @@ class CatalogueStep(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CatalogueReport:
-    """How many scenes and scenarios a loading added, changed and found as they should be.
+    """Numbers of scenes and scenarios that a loading added, changed and left.
 
     Attributes:
         kept: Scenarios whose file has changed and that stay as they were stored, because
@@ -159,7 +159,7 @@ def load_catalogue(
         place = folder or settings.BASE_DIR / "fixtures"
         sharing = _SHARED.get(which, ())
         scenes, entries = read_catalogue(
-            folder_of(place, which), scenes_from=[folder_of(place, one) for one in sharing]
+            set_folder(place, which), scenes_from=[set_folder(place, one) for one in sharing]
         )
         scene_steps |= {name: _store_scene(scene, actor) for name, scene in scenes.items()}
         for entry in entries:

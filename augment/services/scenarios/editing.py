@@ -1,4 +1,4 @@
-"""What a person needs to change a scene by hand: its agents, the picture below them, the sizes.
+"""Data of the scene editor: agents, the picture below them, the sizes.
 
 In: a scenario. Out: one JSON document for a page. Back: a modification whose lanes are those under
 its agents, whatever the page said.
@@ -28,7 +28,7 @@ from augment.scene.intent_parts import Amount
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import MotionPreset, NearEgo
-from augment.scene.presets import PresetNumbers, numbers_of, with_preset
+from augment.scene.presets import PresetNumbers, preset_numbers, with_preset
 from augment.scene.schema import CLOSED, Codec, Id, Real
 from augment.services.events import log_change
 from augment.services.scenarios import scenes
@@ -44,7 +44,7 @@ _NUMBERS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PresetEdit:
-    """What somebody is made to do by its name.
+    """Motion of an agent, by its preset.
 
     Attributes:
         agent_id: Of the scene or of those added.
@@ -67,7 +67,7 @@ _PRESET = Codec("preset", TypeAdapter(PresetEdit))
 # Changes by hand
 
 
-def draft_of(scene: BaseScene, scenario: Scenario | None, *, keep_traffic: bool) -> Scenario:
+def make_draft(scene: BaseScene, scenario: Scenario | None, *, keep_traffic: bool) -> Scenario:
     """Return a scenario that is being made or changed, with the traffic that was chosen for it."""
     draft = Scenario(base_scene=scene) if scenario is None else copy(scenario)
     draft.keep_traffic = keep_traffic
@@ -86,20 +86,20 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
-        "recorded": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=True)),
-        "cleared": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=False)),
+        "recorded": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=True)),
+        "cleared": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {
             one.value: dict(zip(("length_m", "width_m"), usual_size_m(scene, one), strict=True))
             for one in PLACED
         },
         "presets": {
-            one.value: {"label": one.label, "number": _NUMBERS[numbers_of(one)[0]]}
+            one.value: {"label": one.label, "number": _NUMBERS[preset_numbers(one)[0]]}
             for one in MotionPreset
         },
     }
 
 
-def _agents_of(draft: Scenario) -> list[dict[str, Any]]:
+def _list_agents(draft: Scenario) -> list[dict[str, Any]]:
     agents = editable_ground(draft).scene.agents
     listed: list[dict[str, Any]] = codec.MODIFICATION.dump(Modification(moved=agents))["move"]
     return listed
@@ -132,7 +132,7 @@ def reference_document(scenario: Scenario, document: object) -> dict[str, Any] |
     """
     if document is None:
         return None
-    modification, intent = read_edit(scenario, document), scenes.intent_of(scenario)
+    modification, intent = read_edit(scenario, document), scenes.load_intent(scenario)
     if modification.is_empty and not (intent and intent.unmet):
         return None
     return codec.modification_to_document(modification)
@@ -146,7 +146,7 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     """
     graph = editable_ground(scenario).graph
     added, moved = (
-        tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
+        tuple(_snap(one, graph) if one.id == agent_id else one for one in agents)
         for agents in (modification.added, modification.moved)
     )
     return replace(modification, added=added, moved=moved)
@@ -167,7 +167,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
     mover = replace(agents[edit.agent_id], motion=None)
     if edit.preset is not None:
         start = None if edit.within_m is None else NearEgo(within_m=edit.within_m)
-        numbers: dict[str, Any] = {"start": start, numbers_of(edit.preset)[0]: edit.number}
+        numbers: dict[str, Any] = {"start": start, preset_numbers(edit.preset)[0]: edit.number}
         mover = with_preset(edit.preset, after, mover, PresetNumbers(**numbers))
         mover = replace(mover, id=mover.id or f"{edit.agent_id}-door")
     is_recorded = any(one.id == mover.id for one in editable_ground(scenario).scene.agents)
@@ -176,7 +176,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
     return replace(change, **{name: (*others, mover)})
 
 
-def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
+def motion_presets(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
     """Return by id which preset a motion is, with its numbers as `PresetEdit` has them."""
     scene, found = editable_ground(scenario).scene, dict[str, dict[str, Any]]()
     everyone = apply(scene, change).agents
@@ -184,7 +184,7 @@ def presets_of(scenario: Scenario, change: Modification) -> dict[str, dict[str, 
         wish = find_wish(agent, scene, everyone)
         if wish is not None:
             preset, near = wish[0].preset, wish[0].start and wish[0].start.ego_distance
-            number: Amount | None = getattr(wish[0], numbers_of(preset)[0])
+            number: Amount | None = getattr(wish[0], preset_numbers(preset)[0])
             found[agent.id] = {
                 "preset": preset.value,
                 "within_m": near and near.low_m,
@@ -199,11 +199,11 @@ def editable_ground(scenario: Scenario) -> Ground:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return _read_ground(_Keyed(scenes.scene_key(scenario), scenario))
+    return _read_ground(_ScenarioByKey(scenes.scene_key(scenario), scenario))
 
 
 @dataclass(frozen=True, slots=True)
-class _Keyed:
+class _ScenarioByKey:
     """A scenario by the key that alone tells when a scene that was read before still holds."""
 
     key: str
@@ -211,15 +211,15 @@ class _Keyed:
 
 
 @lru_cache(maxsize=8)
-def _read_ground(keyed: _Keyed) -> Ground:
-    return scenes.ground_of(keyed.scenario)
+def _read_ground(keyed: _ScenarioByKey) -> Ground:
+    return scenes.load_ground(keyed.scenario)
 
 
 def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, agent.heading_rad))
 
 
-def _snapped(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
+def _snap(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     lane_id = graph.under(agent.x_m, agent.y_m, agent.heading_rad)
     nearest = graph.nearest(agent.x_m, agent.y_m)
     if lane_id is None and nearest is not None and nearest[1].distance_m <= _SNAP_WITHIN_M:
@@ -250,7 +250,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
         InvalidDocument: The document breaks the format, or leaves open what jobs need.
         Conflict: The scenario is the catalogue's, whose intents are authored.
     """
-    return _set_intent(_locked(scenario), document, IntentOrigin.ENTERED, actor)
+    return _set_intent(_lock_scenario(scenario), document, IntentOrigin.ENTERED, actor)
 
 
 @transaction.atomic
@@ -262,7 +262,7 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
         InvalidDocument: What was read leaves open what jobs need.
         Conflict: Nothing that was read waits to be accepted, or the scenario is the catalogue's.
     """
-    row = _locked(scenario)
+    row = _lock_scenario(scenario)
     reading = waiting_reading(row)
     if reading is None:
         raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
@@ -281,8 +281,8 @@ def last_reading(scenario: Scenario) -> IntentReading | None:
     return scenario.readings.select_related("endpoint").first()
 
 
-def statements_of(document: object) -> tuple[str, ...]:
-    """Return what an intent document says, as short statements; none without a document.
+def intent_statements(document: object) -> tuple[str, ...]:
+    """Return the short statements of an intent document; none without a document.
 
     Raises:
         InvalidDocument: The document breaks the format.
@@ -300,7 +300,7 @@ def refuse_catalogue(row: Scenario, part: str = "reference") -> None:
 # Private
 
 
-def _locked(slug: str) -> Scenario:
+def _lock_scenario(slug: str) -> Scenario:
     """The row whose intent is to change, which of the catalogue's its files alone do."""
     rows = Scenario.objects.select_for_update(of=("self",))
     row = rows.get(pk=scenes.scenario_named(slug).pk)

@@ -36,7 +36,7 @@ _Sizes = Sequence[tuple[float, float]]
 
 
 class StepKind(StrEnum):
-    """What a step of an import was."""
+    """Kind of a step of an import."""
 
     LEFT_OUT = "left out"  # something of the file is not kept
     LOG = "log"  # a log was looked through
@@ -47,7 +47,7 @@ class StepKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ImportStep:
-    """What was looked at, kept or skipped, and the sentence that says so."""
+    """Looked-at, kept or skipped scenario, and the sentence that says so."""
 
     kind: StepKind
     text: str
@@ -69,7 +69,7 @@ def import_interplan(
     Raises:
         InvalidDocument: There is not exactly one modification file, or it breaks its format.
     """
-    file = interplan_file.file_of(
+    file = interplan_file.parse_file(
         read_yaml_file(_modification_file_in(folder), what=interplan_file.WHAT)
     )
     by_token = file.modification_details_dictionary
@@ -160,7 +160,7 @@ def _verbatim(
     try:
         json.dumps(document, allow_nan=False)
     except ValueError:
-        problem = (interplan_file.place_of(token, index), "holds a number that is not finite")
+        problem = (interplan_file.entry_place(token, index), "holds a number that is not finite")
         raise InvalidDocument(interplan_file.WHAT, [problem]) from None
     return document
 
@@ -187,7 +187,7 @@ def _keep_entry(
     left_out = f"; left out: {', '.join(losses)}" if losses else ""
     if Scenario.objects.filter(slug=slug, base_scene=row, type=entry.type.value).exists():
         return ImportStep(StepKind.OLD, f"{name}: {slug} was there already{left_out}")
-    density, goal = interplan_file.options_of(entry.config)
+    density, goal = interplan_file.parse_suffix(entry.config)
     # Walkers and cones are put there by interPlan whoever may meet them.
     stopped = [agent for agent in reference.added if agent.type in (_VEHICLE, _BUS)]
     traffic = keep_clear(spawned.agents, stopped)

@@ -18,24 +18,24 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, S
 from augment.render.bev import draw, draw_empty, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink_png
-from augment.render.film import film_of
+from augment.render.film import make_film
 from augment.render.legend import change_keys, scene_keys
 from augment.scene import codec
 from augment.scene.entities import Modification, without_traffic
 from augment.services.events import log_change
 from augment.services.scenarios.scenes import (
     content_hash,
-    recording_of,
-    reference_of,
+    load_recording,
+    load_reference,
+    load_scene,
     scene_key,
-    scene_of,
 )
 from augment.services.texts import is_stored_name
 
 FOLDER = "bev"
 
 
-def window_of(name: str) -> str:
+def camera_key(name: str) -> str:
     """The key of the camera that a picture was drawn with, "" where its name has none.
 
     Pictures of one scenario stand side by side only where this is the same.
@@ -56,15 +56,15 @@ def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    kept, camera = scenario.original_image, camera or camera_of(scenario)
-    if kept and window_of(kept) == camera.key and default_storage.exists(kept):
+    kept, camera = scenario.original_image, camera or load_camera(scenario)
+    if kept and camera_key(kept) == camera.key and default_storage.exists(kept):
         return kept
-    scene = scene_of(scenario)
-    name = picture_of(scenario, Modification(), camera)
-    noted = {camera.key: {"image": name, "view": view_of(camera)}}
-    before = camera_for(scene, reference_of(scenario))
-    if window_of(kept) == before.key:  # of before windows were noted
-        noted |= {before.key: {"image": kept, "view": view_of(before)}}
+    scene = load_scene(scenario)
+    name = draw_picture(scenario, Modification(), camera)
+    noted = {camera.key: {"image": name, "view": picture_view(camera)}}
+    before = camera_for(scene, load_reference(scenario))
+    if camera_key(kept) == before.key:  # of before windows were noted
+        noted |= {before.key: {"image": kept, "view": picture_view(before)}}
     with transaction.atomic():
         held = Scenario.objects.select_for_update(no_key=True).only("windows").get(pk=scenario.pk)
         scenario.windows = held.windows | noted
@@ -73,7 +73,7 @@ def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     return name
 
 
-def camera_of(scenario: Scenario, unsaved: Mapping[int, dict[str, Any]] | None = None) -> Camera:
+def load_camera(scenario: Scenario, unsaved: Mapping[int, dict[str, Any]] | None = None) -> Camera:
     """Return the window that all pictures of a scenario show, as its contestants are today.
 
     Args:
@@ -93,13 +93,13 @@ def _window_around(scenario: Scenario, documents: Iterable[dict[str, Any] | None
     changes = tuple(
         codec.modification_from_document(document) for document in documents if document
     )
-    reference = reference_of(scenario)
+    reference = load_reference(scenario)
     moves = any(one.has_motion for one in (reference, *changes) if one is not None)
-    recording = recording_of(scenario) if moves else None
-    return camera_for(scene_of(scenario), reference, changes, recording)
+    recording = load_recording(scenario) if moves else None
+    return camera_for(load_scene(scenario), reference, changes, recording)
 
 
-def view_of(camera: Camera) -> dict[str, Any]:
+def picture_view(camera: Camera) -> dict[str, Any]:
     """Return where metres lie in a picture: px_per_m, ego_px [x, y], width, height (pixels)."""
     ego = camera.to_pixels(np.zeros((1, 2)))[0]
     return {
@@ -110,13 +110,13 @@ def view_of(camera: Camera) -> dict[str, Any]:
     }
 
 
-def picture_of(scenario: Scenario, modification: Modification, camera: Camera) -> str:
+def draw_picture(scenario: Scenario, modification: Modification, camera: Camera) -> str:
     """Draw a scenario's scene after a change, with its film, and return the picture's name.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    png, film = _drawn(scenario, modification, camera)
+    png, film = _draw(scenario, modification, camera)
     # Pictures that look the same may move differently.
     name = f"{FOLDER}/{camera.key}/{hashlib.sha256(png + film).hexdigest()}.png"
     _keep(name, png, film)
@@ -180,11 +180,13 @@ def redraw(scenario: Scenario) -> int:
             "scenario", "image", "earlier_images", "state", "modification"
         )
         camera = _window_around(scenario, [row.modification for row in rows])
-        outdated = [row for row in rows if row.image and window_of(row.image) != camera.key]
+        outdated = [row for row in rows if row.image and camera_key(row.image) != camera.key]
         if not outdated:
             original_picture(scenario, camera)
             return redrawn
-        drawn = [(row, picture_of(scenario, _shown(row), camera)) for row in outdated]
+        drawn = [
+            (row, draw_picture(scenario, _shown_modification(row), camera)) for row in outdated
+        ]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
             original_picture(scenario, camera)
@@ -204,19 +206,21 @@ def draw_with_ids(row: Augmentation) -> bytes:
         InvalidModification: The modification does not fit the scene.
     """
     scenario = row.scenario
-    return draw_for_review(scene_of(scenario), _shown(row), camera_of(scenario))[0]
+    return draw_for_review(load_scene(scenario), _shown_modification(row), load_camera(scenario))[
+        0
+    ]
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _drawn(scenario: Scenario, modification: Modification, camera: Camera) -> tuple[bytes, bytes]:
+def _draw(scenario: Scenario, modification: Modification, camera: Camera) -> tuple[bytes, bytes]:
     """A picture and its film, which names the picture that it plays over; no bytes for none."""
-    scene = scene_of(scenario)
+    scene = load_scene(scenario)
     if not camera.is_filmed:
         return draw(scene, modification, camera), b""
-    recording = recording_of(scenario)
-    film = film_of(scene, modification, camera, recording, keeps_traffic=scenario.keep_traffic)
+    recording = load_recording(scenario)
+    film = make_film(scene, modification, camera, recording, keeps_traffic=scenario.keep_traffic)
     ground = store(draw_empty(scene, camera), folder=f"{FOLDER}/{camera.key}")
     document = {"ground": ground} | json.loads(film)
     return draw(scene, modification, camera, recording), json.dumps(
@@ -230,8 +234,8 @@ def _keep(picture: str, png: bytes, film: bytes) -> None:
     store_as(picture, png)
 
 
-def _shown(row: Augmentation) -> Modification:
-    """What its picture shows: an answer that could not be read changes nothing."""
+def _shown_modification(row: Augmentation) -> Modification:
+    """Return the shown modification: an unreadable answer changes nothing."""
     if row.state != Augmentation.State.DONE or not row.modification:
         return Modification()
     return codec.modification_from_document(row.modification)
@@ -241,7 +245,7 @@ SCENES = "scenes"
 
 
 class SceneView(StrEnum):
-    """What a picture of a scene shows."""
+    """Content of a scene's picture."""
 
     KEPT = "kept"  # with the recorded traffic
     BACKDROP = "backdrop"  # the ego alone, from far: others are placed on it
@@ -260,19 +264,19 @@ def reference_picture(scenario: Scenario) -> str:
         return ""
     shown = [LOOK, scene_key(scenario), scenario.reference]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-    reference = reference_of(scenario)
+    reference = load_reference(scenario)
     moves = reference is not None and reference.has_motion
     folder = f"references/{LOOK}-film" if moves else "references"
     return f"{folder}/{digest}.png"
 
 
 def is_drawn(name: str) -> bool:
-    """Whether a worker has drawn the picture of that name."""
+    """Return whether a worker has drawn the picture of that name."""
     return bool(name) and default_storage.exists(name)
 
 
 def draw_scene(scene_pk: int) -> None:
-    """What a worker does: every picture of a scene that is not drawn yet.
+    """Draw every picture of a scene that is not drawn yet.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
@@ -290,7 +294,7 @@ def draw_scene(scene_pk: int) -> None:
 
 
 def draw_scenario(scenario_pk: int) -> None:
-    """What a worker does: a scenario before any change, and with its reference.
+    """Draw a scenario before any change, and with its reference.
 
     Raises:
         InvalidDocument: The stored scene or reference can't be read.
@@ -299,12 +303,12 @@ def draw_scenario(scenario_pk: int) -> None:
     row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
     draw_scene(row.base_scene_id)
     redraw(row)
-    name, reference = reference_picture(row), reference_of(row)
+    name, reference = reference_picture(row), load_reference(row)
     if reference is None or is_drawn(name):
         return
-    recording = recording_of(row) if reference.has_motion else None
-    camera = camera_for(scene_of(row), reference, recording=recording)
-    _keep(name, *_drawn(row, reference, camera))
+    recording = load_recording(row) if reference.has_motion else None
+    camera = camera_for(load_scene(row), reference, recording=recording)
+    _keep(name, *_draw(row, reference, camera))
 
 
 THUMBNAILS = "thumbnails"
@@ -315,7 +319,7 @@ screens."""
 _LOOK = 1
 
 
-def thumbnail_of(name: str, widest_px: int) -> str:
+def shrink(name: str, widest_px: int) -> str:
     """Return the name of a stored picture made smaller, "" where there is no such picture."""
     small = f"{THUMBNAILS}/{_LOOK}-{widest_px}/{name}"
     if not name or default_storage.exists(small):
@@ -333,7 +337,7 @@ def legend_of_scene(scenario: Scenario, view: Mapping[str, Any]) -> list[str]:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return sorted(scene_keys(scene_of(scenario), view))
+    return sorted(scene_keys(load_scene(scenario), view))
 
 
 def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[str]]:
@@ -379,14 +383,14 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
     """
     drawn = []
     for row in Scenario.objects.filter(slug__in=scenarios).select_related("base_scene"):
-        reference = reference_of(row)
+        reference = load_reference(row)
         change = None if reference is None else break_reference(reference)
         if change is None:
             continue
         document = codec.modification_to_document(change)
         checks = row.augmentations.filter(contestant__kind=Contestant.Kind.CHECK, state=State.DONE)
         if not checks.filter(modification=document).exists():
-            image = picture_of(row, change, camera_of(row))
+            image = draw_picture(row, change, load_camera(row))
             drawn.append(Augmentation(scenario=row, modification=document, image=image))
     kept = _keep_checks(drawn, actor) if drawn else []
     for made in kept:

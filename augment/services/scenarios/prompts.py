@@ -1,4 +1,4 @@
-"""What a variant would send for a stored scenario. Nobody is asked."""
+"""Prompts of a variant for a stored scenario. No model is asked."""
 
 from django.db import connection
 
@@ -9,12 +9,12 @@ from augment.prompts.fill import prompt_version as prompt_version
 from augment.scene.codec import intent_from_document
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.services.scenarios.scenes import load_reference, load_scene
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import Shown as Shown
-from augment.variants.showing import shown_prompt
+from augment.variants.showing import ShownPrompt as ShownPrompt
+from augment.variants.showing import build_prompt
 
 
 def list_recipes() -> list[Recipe]:
@@ -29,7 +29,7 @@ def preview_prompt(
     role: str,
     native_tools: bool = False,
     options: ContestantOptions | None = None,
-) -> Shown:
+) -> ShownPrompt:
     """Return the first messages to a role; reviewers judge the scenario's reference.
 
     Args:
@@ -50,17 +50,17 @@ def preview_prompt(
         raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")
     if native_tools and (role != ModelRole.MODIFIER or recipe.tools is Tools.NONE):
         raise Conflict(f"The {role} of {recipe.slug} calls no function, natively or otherwise.")
-    return shown_prompt(
+    return build_prompt(
         recipe,
         ModelRole(role),
-        scene_of(scenario),
+        load_scene(scenario),
         scenario.instruction,
-        reference_of(scenario) or Modification(),
+        load_reference(scenario) or Modification(),
         native_tools=native_tools,
     )
 
 
-def stored_tasks(instruction: str) -> list[tuple[Scene, Intent]]:
+def find_stored_tasks(instruction: str) -> list[tuple[Scene, Intent]]:
     """Return scene and intent of the scenarios with that instruction, for the stand-in model.
 
     Asked from the threads of a server: each leaves no connection behind.
@@ -70,6 +70,6 @@ def stored_tasks(instruction: str) -> list[tuple[Scene, Intent]]:
         texts = rows.values_list("pk", "instruction")
         pks = [pk for pk, text in texts if same_text(text) == same_text(instruction)]
         alike = rows.filter(pk__in=pks).select_related("base_scene")
-        return [(scene_of(row), intent_from_document(row.intent)) for row in alike]
+        return [(load_scene(row), intent_from_document(row.intent)) for row in alike]
     finally:
         connection.close()

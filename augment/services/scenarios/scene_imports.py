@@ -88,7 +88,7 @@ def keep_reading(
     return row, True
 
 
-def notes_of(notes: Iterable[Any]) -> list[str]:
+def note_sentences(notes: Iterable[Any]) -> list[str]:
     """Return the sentences on what the source of a scene left open, as rows keep them."""
     return [note if isinstance(note, str) else _earlier_sentence(note) for note in notes]
 
@@ -101,7 +101,7 @@ def free_slug(stem: str) -> str:
 
 
 def _earlier_sentence(note: Mapping[str, Any]) -> str:
-    """Return what an earlier release kept as a kind with numbers and names."""
+    """Return the sentence for an earlier release's kind with numbers and names."""
     words = str(note["kind"]).replace("_", " ").capitalize()
     parts = [*([str(note["number"])] if note.get("number") else []), *note.get("names", [])]
     return f"{words}: {', '.join(parts)}." if parts else f"{words}."

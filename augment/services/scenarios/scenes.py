@@ -15,7 +15,7 @@ from django.db import IntegrityError, transaction
 
 from augment.baselines.rule_placer import list_open
 from augment.checks import Ground
-from augment.checks.derived import describe_change, type_of_change
+from augment.checks.derived import classify_change, describe_change
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import follow_rules, goal_place
 from augment.llm.messages import shorten
@@ -44,12 +44,12 @@ def type_choices() -> list[tuple[str, str]]:
 
 
 def type_label(name: str) -> str:
-    """Return what people read for a type; a type that nobody knows is its own label."""
-    known = type_of(name)
+    """Return the label of a type; an unknown type is its own label."""
+    known = known_type(name)
     return known.label if known else dict(type_choices()).get(name, name)
 
 
-def type_of(name: str) -> ScenarioType | None:
+def known_type(name: str) -> ScenarioType | None:
     """The one of the five, None for a type of one's own."""
     return ScenarioType(name) if name in list(ScenarioType) else None
 
@@ -60,7 +60,7 @@ def label_for(name: str) -> str:
     Raises:
         InvalidDocument: It is neither one of the five nor a slug.
     """
-    if type_of(name) is not None:
+    if known_type(name) is not None:
         return ""
     if name in list(MotionPreset):
         return MotionPreset(name).label
@@ -160,7 +160,7 @@ def add_scenario(new: NewScenario, *, actor: User | None = None) -> Scenario:
         new = replace(
             new,
             interplan=first.interplan,
-            traffic=_spawned_in(first),
+            traffic=_read_spawned(first),
             keep_traffic=first.keep_traffic,
             density=first.traffic_density,
             goal=first.goal,
@@ -199,7 +199,7 @@ def add_variant(
     kept = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
     more = ("spawned", "interplan", "language", "follows", "origin")
     variant = Scenario(
-        slug=_numbered_slug(scenario.slug),
+        slug=_number_slug(scenario.slug),
         instruction=shorten(f"{scenario.instruction} ({difference})", INSTRUCTION_LENGTH),
         reference=codec.modification_to_document(reference),
         instruction_is_generated=True,
@@ -230,7 +230,7 @@ def _new_scenario(scene: BaseScene, type: str, slug: str | None, follows: str) -
     if first is None:
         known = list(scene.scenarios.values_list("slug", flat=True))
         raise UnknownName(f"scenario of the scene “{scene.slug}”", follows, known)
-    slug = slug or _numbered_slug(f"{first.slug}-then")
+    slug = slug or _number_slug(f"{first.slug}-then")
     return Scenario(slug=slug, base_scene=scene, follows=first)
 
 
@@ -273,13 +273,13 @@ def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str,
     Returns:
         Type and instruction, both filled in.
     """
-    reference, scene = reference_of(scenario), scene_of(scenario)
+    reference, scene = load_reference(scenario), load_scene(scenario)
     if reference is None or reference.is_empty:
         if scenario.intent_origin == IntentOrigin.DERIVED:
             scenario.intent, scenario.intent_origin = None, ""
         return type, instruction
-    type = type or type_of_change(reference, scene).value
-    sentence, intent = describe_change(type_of(type), reference, scene)
+    type = type or classify_change(reference, scene).value
+    sentence, intent = describe_change(known_type(type), reference, scene)
     scenario.intent = None if intent is None else codec.intent_to_document(intent)
     scenario.intent_origin = "" if intent is None else IntentOrigin.DERIVED
     if not instruction.strip():
@@ -316,7 +316,7 @@ def change_surroundings(
     if scenario.follows is not None:
         first = scenario.follows.slug
         raise Conflict(f"It follows “{first}”: its traffic and goal are that one's.")
-    traffic = (_spawned_in(scenario) or None) if is_same_traffic else None
+    traffic = (_read_spawned(scenario) or None) if is_same_traffic else None
     if scenario.interplan and "built" in scenario.interplan and not is_same_traffic:
         # Other traffic takes other boxes, and nobody knows them.
         scenario.interplan = {**scenario.interplan, "built": {}}
@@ -324,7 +324,7 @@ def change_surroundings(
     scenario.original_image, scenario.windows = "", {}
 
 
-def _spawned_in(scenario: Scenario) -> tuple[entities.TrafficAgent, ...]:
+def _read_spawned(scenario: Scenario) -> tuple[entities.TrafficAgent, ...]:
     spawned = scenario.spawned
     return () if spawned is None else codec.modification_from_document(spawned).added
 
@@ -363,7 +363,7 @@ def _set_surroundings(
             entities.Modification(added=tuple(traffic))
         )
     if change is not None:
-        check_reference(scene_of(scenario), change)
+        check_reference(load_scene(scenario), change)
         scenario.reference = codec.modification_to_document(change)
 
 
@@ -379,7 +379,7 @@ def scenario_named(slug: str) -> Scenario:
     return row
 
 
-def scene_of(scenario: Scenario) -> entities.Scene:
+def load_scene(scenario: Scenario) -> entities.Scene:
     """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
     scene = codec.scene_from_document(scenario.base_scene.document)
     scene = follow_rules(scene, scenario.interplan)
@@ -396,8 +396,8 @@ def scene_of(scenario: Scenario) -> entities.Scene:
     return replace(scene, options=options)
 
 
-def recording_of(scenario: Scenario) -> Recording | None:
-    """What was recorded after t0, None for nothing; of the ego alone where traffic is cleared.
+def load_recording(scenario: Scenario) -> Recording | None:
+    """Return the recording after t0, None for none; the ego's alone if traffic is cleared.
 
     Raises:
         InvalidDocument: The stored recording can't be read.
@@ -409,17 +409,17 @@ def recording_of(scenario: Scenario) -> Recording | None:
     return recording if scenario.keep_traffic else recording.ego_alone
 
 
-def ground_of(scenario: Scenario) -> Ground:
+def load_ground(scenario: Scenario) -> Ground:
     """Return the ground of a scenario, whose recording is read where something moves.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return Ground.of(scene_of(scenario), partial(recording_of, scenario))
+    return Ground.of(load_scene(scenario), partial(load_recording, scenario))
 
 
 def scene_key(scenario: Scenario) -> str:
-    """A digest of all that `scene_of` reads; two scenarios of one key have the same scene."""
+    """A digest of all that `load_scene` reads; two scenarios of one key have the same scene."""
     scene = scenario.base_scene
     parts = [
         scene.content_hash or content_hash(scene.document),
@@ -432,32 +432,32 @@ def scene_key(scenario: Scenario) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def reference_of(scenario: Scenario) -> entities.Modification | None:
+def load_reference(scenario: Scenario) -> entities.Modification | None:
     """The human modification, None for a scenario without one."""
     if scenario.reference is None:
         return None
     return codec.modification_from_document(scenario.reference)
 
 
-def intent_of(scenario: Scenario) -> Intent | None:
-    """What the instruction asks for, None where nobody has written it down."""
+def load_intent(scenario: Scenario) -> Intent | None:
+    """Return the intent of the instruction, None if nobody has written it down."""
     return None if scenario.intent is None else codec.intent_from_document(scenario.intent)
 
 
 def content_hash(document: dict[str, Any]) -> str:
-    """What two scene documents have in common that differ in name and provenance alone."""
+    """Return a hash that is equal for scene documents differing in name and provenance alone."""
     content = {key: value for key, value in document.items() if key not in ("name", "provenance")}
     text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def seed_of(slug: str) -> int:
+def scenario_seed(slug: str) -> int:
     """The seed of a scenario: the same in every job, another for every slug."""
     return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
 
 
 def check_reference(scene: entities.Scene, modification: entities.Modification) -> None:
-    """Whether a modification fits the scene, with its lanes and motions.
+    """Raise unless a modification fits the scene, with its lanes and motions.
 
     Raises:
         InvalidModification: An agent does not fit, or can't move as it is to.
@@ -475,7 +475,7 @@ def check_reference(scene: entities.Scene, modification: entities.Modification) 
 
 
 def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
-    """Whether a slug can be stored.
+    """Raise unless a slug can be stored.
 
     Raises:
         InvalidDocument: It has other characters, or is too long.
@@ -489,12 +489,12 @@ def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
 
 
 def _free_slug(base_scene: BaseScene, name: str) -> str:
-    kind = type_of(name)
+    kind = known_type(name)
     stem = (name if kind is None else kind.name).lower().replace("_", "-")
-    return _numbered_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}")
+    return _number_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}")
 
 
-def _numbered_slug(stem: str) -> str:
+def _number_slug(stem: str) -> str:
     stem = stem[: SLUG_LENGTH - 6].strip("-")
     taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
     return next(name for n in count(1) if (name := f"{stem}-{n}") not in taken)

@@ -157,15 +157,15 @@ def decide(row: Submission, decision: Decision, *, actor: User, **columns: Any) 
 # --- Reports and answers -----------------------------------------------------------------------
 
 
-def entries_of(row: Submission) -> list[SubmittedEntry]:
-    """Return what was found in a submission, rejections first; nothing before it was read."""
+def get_entries(row: Submission) -> list[SubmittedEntry]:
+    """Return the entries of a submission, rejections first; none before it was read."""
     if row.report is None:
         return []
     entries = report_from_document(row.report).entries
     return sorted(entries, key=lambda entry: entry.status is EntryStatus.READ)
 
 
-def report_of(contestant: Contestant) -> SubmissionReport:
+def submission_report(contestant: Contestant) -> SubmissionReport:
     """Return the report from which a contestant of kind submission answers.
 
     Raises:
@@ -179,12 +179,12 @@ def report_of(contestant: Contestant) -> SubmissionReport:
 
 
 def find_entry(contestant: Contestant, scenario: str, sample: int) -> SubmittedEntry:
-    """Return what a submission answers to a scenario, by its slug.
+    """Return a submission's entry for a scenario, by its slug.
 
     Raises:
         Conflict: It has no such scenario or sample.
     """
-    report = report_of(contestant)
+    report = submission_report(contestant)
     _require_answers(contestant, report, [scenario], sample)
     entries = report.entries
     return next(one for one in entries if (one.task, one.sample) == (scenario, sample))
@@ -196,7 +196,7 @@ def refuse_unanswered(contestant: Contestant, scenarios: Iterable[str], *, sampl
     Raises:
         Conflict: There are such ones.
     """
-    _require_answers(contestant, report_of(contestant), scenarios, samples)
+    _require_answers(contestant, submission_report(contestant), scenarios, samples)
 
 
 def _require_answers(

@@ -20,7 +20,7 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS, reader_of
+from augment.formats.readers import READERS, find_reader
 from augment.formats.reading import Moment, Reading
 from augment.models import SceneUpload, SentFile, UploadMoment
 from augment.render.bev import draw
@@ -73,7 +73,7 @@ def keep_upload(
         Conflict: The file is empty.
     """
     if source:
-        reader_of(source)
+        find_reader(source)
     row = SceneUpload(name=plain_name(name), asked_format=source, uploaded_by=actor)
     keep_file(row, content)
     return row
