@@ -204,7 +204,7 @@ class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-c
 
 
 class ErrorDetail(serializers.Serializer[Any]):
-    """Error of a request: a sentence and its place."""
+    """Error of a request."""
 
     code = serializers.CharField(help_text="For programs.")
     message = serializers.CharField(help_text="A sentence for people.")
