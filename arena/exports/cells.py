@@ -1,4 +1,4 @@
-"""How values stand in a CSV file, and what the columns of a table hold; no Django."""
+"""Values of a CSV file and types of a table's columns; no Django."""
 
 import csv
 import io

@@ -209,7 +209,7 @@ class RatedCsv:
 
     @property
     def has_places(self) -> bool:
-        """Whether some line has places left."""
+        """True if some line has places left."""
         return any(line.rank_best is not None for line in self.board.lines)
 
     @property

@@ -110,7 +110,7 @@ class Snapshot(Work):
 
     @cached_property
     def settled_ties(self) -> int | None:
-        """How many ties count that nobody was shown; None where nobody counted them."""
+        """Number of counted ties that were not shown; None if nobody counted them."""
         return self.results.board.settled_ties
 
     @property

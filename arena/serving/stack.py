@@ -1,4 +1,4 @@
-"""What the product needs on one machine: Redis, workers, the web server, the stand-in model."""
+"""Processes of the product on one machine: Redis, workers, the web server, the stand-in model."""
 
 import fcntl
 import os

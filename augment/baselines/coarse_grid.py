@@ -67,7 +67,7 @@ class Code:
 
 
 def quantise(agent: TrafficAgent) -> Code:
-    """Return what is left of a vehicle."""
+    """Return the coarse code of a vehicle."""
     ahead, left, bins = _find_cells(np.array([[agent.x_m, agent.y_m]]))
     return Code(
         is_ahead=bool(ahead[0]),

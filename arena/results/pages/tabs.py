@@ -288,7 +288,7 @@ def _mark(share: Estimate) -> PlacedInterval | None:
 
 
 def _keyed(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:
-    """What was found of each contestant, with its key in the charts."""
+    """Return each contestant's results, with its key in the charts."""
     return [
         {"key": key, "row": row, "found": found[row.slug]}
         for key, row in key_rows(table)

@@ -41,7 +41,7 @@ class Respondent:
 
     @cached_property
     def facts(self) -> EndpointModel:
-        """What is known of the model there; looked up once."""
+        """Facts about the model there; read once."""
         return read_facts(endpoint=self.endpoint, model=self.model)
 
 

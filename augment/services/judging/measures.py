@@ -142,7 +142,7 @@ def digest_code(*folders: Path) -> str:
 
 
 def compute_once(suffix: str, compute: Callable[[], bytes], *parts: object) -> bytes:
-    """Return what is computed of these parts; a file keeps it for the next time.
+    """Return the bytes computed from these parts; a file keeps them for the next time.
 
     Args:
         suffix: Of the file.

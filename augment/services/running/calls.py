@@ -112,7 +112,7 @@ class CallTranscript(ABC):
         """
 
     def price(self, role: ModelRole, model: str) -> Price | None:
-        """Return what a model costs that plays a role, None where that is unknown."""
+        """Return the price of a role's model, None if unknown."""
         return find_price(read_facts(endpoint=self._endpoint_of(role), model=model))
 
     @abstractmethod

@@ -62,13 +62,13 @@ class JobEstimate:
 
     @property
     def tokens_in(self) -> int | None:
-        """Of the prompts, as far as it is known; None where it is of nobody."""
+        """Tokens of the prompts, as far as known; None if none are."""
         known = [line.tokens_in for line in self.lines if line.tokens_in is not None]
         return sum(known) if known or not self.lines else None
 
     @property
     def tokens_out(self) -> int | None:
-        """Of the answers, likewise."""
+        """Tokens of the answers, as far as known; None if none are."""
         known = [line.tokens_out for line in self.lines if line.tokens_out is not None]
         return sum(known) if known or not self.lines else None
 

@@ -1,4 +1,4 @@
-"""What people mean when they name scenarios or their types."""
+"""Scenarios and types by the names that people use."""
 
 import fnmatch
 from collections.abc import Sequence
