@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from django.db import migrations, models
 
-from augment.llm.wire_transport import server_of
+from augment.llm.wire_transport import host_and_port
 
 
 def bind_keys(apps, schema_editor):
@@ -10,7 +10,7 @@ def bind_keys(apps, schema_editor):
     bindings = apps.get_model("augment", "KeyBinding").objects
     named = apps.get_model("augment", "Endpoint").objects.exclude(key_variable="")
     for variable, base_url in named.values_list("key_variable", "base_url"):
-        if server := server_of(base_url):
+        if server := host_and_port(base_url):
             bindings.get_or_create(variable=variable, server=server)
 
 
