@@ -137,7 +137,7 @@ def test_a_place_that_can_not_be_given_back_costs_no_answer(
         (runner.Augmentations, "take"),
         (budget, "reserve"),
         (calls.CallTranscript, "sending"),
-        (runner, "picture_of"),
+        (runner, "draw_picture"),
         (Lease, "settle"),
         (jobs, "finish_if_over"),
     ],
@@ -163,5 +163,5 @@ def test_a_wrong_statement_is_no_lock(monkeypatch: pytest.MonkeyPatch) -> None:
         cause.sqlite_errorcode = sqlite3.SQLITE_ERROR
         raise OperationalError("no such column") from cause
 
-    monkeypatch.setattr(runner, "picture_of", break_down)
+    monkeypatch.setattr(runner, "draw_picture", break_down)
     assert ran(only_row(llama_job()), Model()).reason.startswith("unexpected: ")
