@@ -21,9 +21,9 @@ from augment.services.judging.simulations import DRIVES, Options
 from augment.services.judging.sweeps import (
     SweepRequest,
     add_family,
+    list_options,
     plan_sweep,
     swept_numbers,
-    tested_ways,
 )
 from augment.services.judging.thresholds import conclude, sweep_result
 from augment.services.scenarios.editing import enter_intent
@@ -94,7 +94,7 @@ def settle_others(**scores: float) -> None:
 
 def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
     sweep = planned()
-    assert Simulation.objects.count() == 8 * len(tested_ways(STRAIGHT)) == 32
+    assert Simulation.objects.count() == 8 * len(list_options(STRAIGHT)) == 32
     drive_tested()
     result = sweep_result(sweep)
     by_hand = {}

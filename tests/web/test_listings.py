@@ -69,7 +69,7 @@ LISTS = {
     "jobs": ("Job ", 25),
     "studies": ('">Study ', 25),
     "contestants": ('/">Who ', 50),
-    "scenarios": ("<b>street-", 60),
+    "scenarios": ("<b>street-", 16),
 }
 
 

@@ -112,7 +112,7 @@ def plan_sweep(
             Simulation(scenario=scenario, swept=row, subject=SWEPT, **asdict(way))
             for row in rows
             if row.modification is not None
-            for way in tested_ways(request.options)
+            for way in list_options(request.options)
         )
     return sweep
 
@@ -167,7 +167,7 @@ def delete_sweep(sweep: Sweep, *, actor: User | None = None) -> None:
     sweep.delete()
 
 
-def tested_ways(tested: Options) -> list[Options]:
+def list_options(tested: Options) -> list[Options]:
     """Return the ways in which each value is driven, the tested one first."""
     named = [
         Options(planner=IDM, is_reactive=tested.is_reactive),
