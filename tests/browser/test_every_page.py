@@ -12,7 +12,7 @@ from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import faults
 from tests.web.every_page import ShownPage, pages_of_a_rated_study, pages_of_an_open_study
 
-pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True), pytest.mark.slow]
 OPENED = """() => {
   for (const one of document.querySelectorAll("details")) one.open = true;
   for (const one of document.querySelectorAll("[data-findings]"))

@@ -49,6 +49,7 @@ def refuse(path: Path, source: str | None) -> Refusal:
     return Refusal(str(fault.value), cpu_s, after.ru_maxrss / 1024)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused_in_good_time_and_a_gigabyte(
     name: str, tmp_path: Path, reader: ProcessPoolExecutor

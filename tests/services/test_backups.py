@@ -145,6 +145,7 @@ def command_on(url: str, folder: Path, *arguments: str) -> subprocess.Popen[str]
     )
 
 
+@pytest.mark.slow
 def test_a_restore_that_was_killed_while_it_made_tables_is_repeated(tmp_path: Path) -> None:
     backup = str(tmp_path / "b.zip")
     take_backup(Path(backup), now=NOW, say=quiet)
@@ -155,6 +156,7 @@ def test_a_restore_that_was_killed_while_it_made_tables_is_repeated(tmp_path: Pa
         assert "Restored." in said, faults
 
 
+@pytest.mark.slow
 def test_three_prepare_an_empty_database_at_once(tmp_path: Path) -> None:
     with a_new_database(tmp_path) as url:
         started = [command_on(url, tmp_path, "manage.py", "prepare") for _ in range(3)]
