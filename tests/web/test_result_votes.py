@@ -22,7 +22,7 @@ from tests.web.cast import people, png, signed_in
 pytestmark = pytest.mark.django_db
 
 LINK = re.compile(r'<a[^>]*href="([^"]*/results/votes/\?[^"]*)"([^>]*)>(.*?)</a>', re.S)
-FOUND = re.compile(r'<b id="found">(\d+) votes?</b>')
+FOUND = re.compile(r'<b id="found" data-votes="(\d+)">')
 
 
 @pytest.fixture
@@ -151,3 +151,15 @@ def test_an_open_study_keeps_its_votes_until_an_early_look(reader: Client) -> No
         b"".join(answer)
         assert answer.status_code == 200, address
         assert eva.get(address).status_code == 403
+
+
+def test_ties_that_nobody_was_shown_are_told_apart_from_votes(
+    study: Study, reader: Client
+) -> None:
+    study.rules["identical"] = [[study.scenarios.all()[0].slug, "ann", "bob"]]
+    study.save()
+    snapshot = rate(study=study, rounds=10)
+    head = (
+        f'data-votes="{snapshot.votes_counted}">{snapshot.votes_counted - 1} votes and 1 tie that'
+    )
+    assert head in listed(reader, study, rating=str(snapshot.code))

@@ -17,7 +17,7 @@ from arena.results.exports.votes import vote_list_csv
 from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import vote_page
 from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
-from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
+from arena.results.queries.votes import AUTOMATIC, COUNTED, RatedVote, is_imported
 from arena.site.access import STAFF, page_for
 from arena.site.listing import page_asked
 from arena.site.pictures import resize_picture
@@ -65,7 +65,9 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     snapshot, form, context = _read_search(request, code)
     if not form.is_valid():
         return render(request, "results/votes.html", context, status=422)
-    context["page"] = vote_page(snapshot, form.search(), page_asked(request))
+    page = vote_page(snapshot, form.search(), page_asked(request))
+    unshown = sum(isinstance(line, RatedVote) for line in page.paginator.object_list)
+    context |= {"page": page, "unshown": unshown, "cast": page.paginator.count - unshown}
     return render(request, "results/votes.html", context)
 
 
