@@ -1,9 +1,7 @@
 """The moving set, driven: `python -m bench.moving_set` writes a table into docs/catalogue.md.
 
 PDM-Closed drives every scenario's scene with the reference in it, in closed loop. Time to
-collision and required braking are those towards what the reference changes. The required braking
-is DRAC, the deceleration rate to avoid a crash (Almqvist, Hyden and Risser 1991; SUMO's SSM
-device): closing speed^2 / (2 gap), along the ego's way, of who is in front of it.
+collision and required braking are those towards what the reference changes.
 """
 
 import argparse
@@ -14,12 +12,11 @@ import numpy as np
 
 from augment.scene.planned_motion import EGO_ID, MotionPreset
 from augment.scene.planned_mover import PlannedMover
-from augment.simulation import shapes
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import PDM_CLOSED, planner_named
 from augment.simulation.road import Road
 from augment.simulation.score import collisions, criticality, score_drive
-from augment.simulation.states import HEADING, SPEED, STEP_S, Objects
+from augment.simulation.states import STEP_S, Objects
 from augment.simulation.traffic import DriveSetting
 from bench.report import ROOT, table, write_block
 from tests.fixtures.shelf import MOVING_SLUGS, entry, shown_scene
@@ -71,30 +68,11 @@ def meet(slug: str) -> Met:
         slug=slug,
         fired_s=_fired_s(setting, road, drive),
         least_ttc_s=critical["least_ttc_s"],
-        braking_mps2=max(required_braking_mps2(changed)),
+        braking_mps2=critical["required_braking_mps2"] or 0.0,
         least_m=critical["least_distance_m"],
         fault=any(one.at_fault for one in met),
         score=score_drive(drive, find_expert(setting, road)).value,
     )
-
-
-def required_braking_mps2(drive: Drive) -> list[float]:
-    """Return DRAC at every moment, 0 where nobody in the ego's way is slower."""
-    line, needed = drive.road.centreline, []
-    for box, state, objects in zip(drive.boxes, drive.states, drive.objects, strict=True):
-        everybody = shapes.corners(np.vstack([box[None], objects.boxes])).reshape(-1, 2)
-        along_m, left_m = (found.reshape(-1, 4) for found in line.beside(everybody))
-        heading_rad = line.poses(along_m.mean(axis=1))[:, 2]
-        gaps_m = along_m[1:].min(axis=1) - along_m[0].max()
-        in_way = (left_m[1:].min(axis=1) < left_m[0].max()) & (
-            left_m[1:].max(axis=1) > left_m[0].min()
-        )
-        theirs = objects.speeds_mps * np.cos(objects.boxes[:, 2] - heading_rad[1:])
-        closing = state[SPEED] * np.cos(state[HEADING] - heading_rad[0]) - theirs
-        counts = in_way & (gaps_m > 0.0) & (closing > 0.0)
-        rates = closing[counts] ** 2 / (2.0 * gaps_m[counts])
-        needed.append(float(rates.max(initial=0.0)))
-    return needed
 
 
 def list_all(met: list[Met]) -> str:

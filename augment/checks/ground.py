@@ -69,6 +69,10 @@ class Surface:
         _, distances = self._tree.query_nearest(point, return_distance=True, all_matches=False)
         return float(distances[0])
 
+    def within(self, area: shapely.Geometry) -> shapely.Geometry:
+        """Return the part of the surface in an area, without seams between its pieces."""
+        return shapely.intersection(self._joined, area)
+
     def edge_m(self, x_m: float, y_m: float) -> float | None:
         """Return the way from a point to the edge, negative off the surface; None without one."""
         if self.is_empty:

@@ -218,9 +218,10 @@ def progress_ratio(drive: Drive, expert: Expert) -> float:
 
 
 def criticality(drive: Drive, met: tuple[Collision, ...]) -> dict[str, float | None]:
-    """Return the smallest time to collision below 3 s, and the least distance between bodies.
+    """Return the smallest time to collision below 3 s, the least distance, the hardest braking.
 
-    None where nothing of the kind happened.
+    The distance is that between bodies. None where nothing of the kind happened; braking that
+    nothing requires is 0.
     """
     ttc_s = float(_ttc_series(drive, met, only_relevant=False).min())
     closest = [
@@ -232,7 +233,34 @@ def criticality(drive: Drive, met: tuple[Collision, ...]) -> dict[str, float | N
     return {
         "least_ttc_s": None if math.isinf(ttc_s) else ttc_s,
         "least_distance_m": min(closest, default=None),
+        "required_braking_mps2": float(required_braking_mps2(drive).max()),
     }
+
+
+def required_braking_mps2(drive: Drive) -> FloatArray:
+    """Return the deceleration rate to avoid a crash (T,), 0 where nobody in the way is slower.
+
+    DRAC = closing speed^2 / (2 gap), along the ego's way, of who is in front of it (Almqvist,
+    Hyden and Risser 1991; SUMO's SSM device).
+    """
+    line, needed = drive.road.centreline, np.zeros(len(drive.states))
+    for moment, (box, state, objects) in enumerate(
+        zip(drive.boxes, drive.states, drive.objects, strict=True)
+    ):
+        # (A + 1, 4) corners along the way and left of it, the ego's first.
+        everybody = shapes.corners(np.vstack([box[None], objects.boxes])).reshape(-1, 2)
+        along_m, left_m = (places.reshape(-1, 4) for places in line.beside(everybody))
+        heading_rad = line.poses(along_m.mean(axis=1))[:, 2]
+        gaps_m = along_m[1:].min(axis=1) - along_m[0].max()
+        in_way = (left_m[1:].min(axis=1) < left_m[0].max()) & (
+            left_m[1:].max(axis=1) > left_m[0].min()
+        )
+        theirs = objects.speeds_mps * np.cos(objects.boxes[:, 2] - heading_rad[1:])
+        closing = state[SPEED] * np.cos(state[HEADING] - heading_rad[0]) - theirs
+        counts = in_way & (gaps_m > 0.0) & (closing > 0.0)
+        rates = closing[counts] ** 2 / (2.0 * gaps_m[counts])
+        needed[moment] = rates.max(initial=0.0)
+    return needed
 
 
 # Private

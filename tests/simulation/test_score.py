@@ -16,6 +16,7 @@ from augment.simulation.score import (
     collisions,
     combine,
     criticality,
+    required_braking_mps2,
     score_drive,
 )
 from augment.simulation.states import FloatArray
@@ -226,4 +227,26 @@ def test_interplan_wants_the_furthest_obstacle_passed(
 def test_criticality_of_a_drive_towards_a_parked_car() -> None:
     # 8 m/s for 2 s from a bumper gap of 40 m: 24 m remain, and 3 s, which is the horizon.
     drive = driven(states_along(np.full(21, 8.0)), [vehicle("A", 40.0 + 2.588 + 2.4, 0.0)])
-    assert criticality(drive, ()) == {"least_distance_m": pytest.approx(24.0), "least_ttc_s": None}
+    assert criticality(drive, ()) == {
+        "least_distance_m": pytest.approx(24.0),
+        "least_ttc_s": None,
+        "required_braking_mps2": pytest.approx(8.0**2 / (2.0 * 24.0)),
+    }
+
+
+@pytest.mark.parametrize(
+    ("other", "speed_mps", "needed_mps2"),
+    [
+        # 30 m from centre to centre less half of 5.176 m and of 4.8 m leaves 25.012 m.
+        (vehicle("Agent2", 30.0, 0.0), 0.0, 8.0**2 / (2.0 * 25.012)),
+        (vehicle("Agent2", 30.0, 0.0), 5.0, 3.0**2 / (2.0 * 25.012)),
+        (vehicle("Agent2", 30.0, 0.0), 8.0, 0.0),
+        (vehicle("Agent2", 30.0, 3.5), 0.0, 0.0),
+        (vehicle("Agent2", -30.0, 0.0), 0.0, 0.0),
+    ],
+)
+def test_the_required_braking_is_that_of_who_is_in_the_way(
+    other: TrafficAgent, speed_mps: float, needed_mps2: float
+) -> None:
+    drive = driven(states_along([8.0, 8.0]), [replace(other, speed_mps=speed_mps)])
+    assert required_braking_mps2(drive)[0] == pytest.approx(needed_mps2, abs=1e-6)

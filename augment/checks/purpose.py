@@ -1,0 +1,125 @@
+"""What an open wish is for, measured: how late a pedestrian is seen, how wide a way is left.
+
+Nobody's answer is held against another one: of a change only the effect counts. The ego drives as
+`find_motion` has it, whatever it sees. Frame: the scene's. T steps.
+"""
+
+import numpy as np
+import shapely
+from shapely.ops import substring
+
+from augment.checks.ground import ChangedScene, is_stopped
+from augment.geometry.frames import Pose, corners
+from augment.geometry.polyline import FloatArray
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.motion import Motion, Movement
+
+HIDING = (AgentType.VEHICLE, AgentType.BUS)
+"""Who hides a pedestrian; all else is too low or too slim."""
+WIDEST_M = 8.0
+"""Wider ways are not told apart."""
+_ASIDE_M, _BEYOND_M, _LOOKS_M = 15.0, 10.0, 60.0
+_SETS_OUT_WITHIN_M = 2.0
+_HALVINGS = 10
+
+
+def measure_sight(situation: ChangedScene) -> dict[str, float]:
+    """Return how near in m the ego is to pedestrians when it first sees them, by their ids.
+
+    Between the centres of both. Only of those who are hidden at t0 and get into the ego's way
+    ahead of it. Any part of a pedestrian that the middle of the ego has a free line to is seen.
+    """
+    route, seen_m = situation.ground.route, dict[str, float]()
+    if route is None:
+        return seen_m
+    motion = situation.motion
+    for walker in motion.others:
+        is_walker = walker.agent.type is AgentType.PEDESTRIAN
+        if not is_walker or not _gets_in_way(walker, motion.ego, route):
+            continue
+        if step := _find_first_sight(walker, motion):
+            apart = walker.states[step, :2] - motion.ego.states[step, :2]
+            seen_m[walker.agent.id] = float(np.hypot(*apart))
+    return seen_m
+
+
+def measure_passage(situation: ChangedScene) -> float:
+    """Return the width in m of the widest way on the road past what stands, 0 for none.
+
+    That is the diameter of the largest disc that gets from the ego, or from 2 m beside it, past
+    the furthest change; either side of the road counts. Who stands and never sets out is an
+    obstacle.
+    """
+    route, ground = situation.ground.route, situation.ground
+    if route is None:
+        return 0.0
+    ends_m = [route.locate_agent(agent).ahead_m for agent in situation.changed]
+    end_m = min(max(ends_m, default=_LOOKS_M) + _BEYOND_M, route.ends_m[-1] - _BEYOND_M)
+    line = shapely.LineString(route.line.points_m)
+    span = substring(line, route.ego_s_m - _BEYOND_M, route.ego_s_m + end_m + _BEYOND_M)
+    road = ground.road.within(span.buffer(_ASIDE_M, cap_style="flat"))
+    standing = [
+        shapely.Polygon(situation.boxes[agent.id].corners_m)
+        for agent in situation.everyone
+        if agent.type is not AgentType.EGO_VEHICLE and _stays(agent)
+    ]
+    free = shapely.difference(road, shapely.union_all(standing))
+    begin = shapely.Point(situation.ground.scene.ego.x_m, situation.ground.scene.ego.y_m)
+    goal = shapely.LineString([route.position(end_m, left_m) for left_m in (-_ASIDE_M, _ASIDE_M)])
+
+    def lets_through(width_m: float) -> bool:
+        # A disc fits where its centre is at least its radius away from every edge.
+        rooms = shapely.get_parts(shapely.buffer(free, -width_m / 2.0))
+        begins = shapely.distance(rooms, begin) <= _SETS_OUT_WITHIN_M
+        return bool((begins & shapely.intersects(rooms, goal)).any())
+
+    low_m, high_m = 0.0, WIDEST_M
+    if lets_through(high_m):
+        return high_m
+    for _ in range(_HALVINGS):
+        middle_m = (low_m + high_m) / 2.0
+        low_m, high_m = (middle_m, high_m) if lets_through(middle_m) else (low_m, middle_m)
+    return low_m
+
+
+# Private
+
+
+def _stays(agent: TrafficAgent) -> bool:
+    return is_stopped(agent) and agent.motion is None and agent.walk_to_m is None
+
+
+def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:
+    """Return whether its body gets in front of the ego's, before the ego has passed."""
+    half_m = (walker.agent.width_m + ego.agent.width_m) / 2.0
+    there = walker.is_present
+    ways = zip(ego.states[there, :2].tolist(), walker.states[there, :2].tolist(), strict=True)
+    for mine, theirs in ways:
+        place = route.locate(*theirs)
+        if abs(place.left_m) <= half_m and place.ahead_m > route.locate(*mine).ahead_m:
+            return True
+    return False
+
+
+def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
+    """Return the first step at which the ego sees any of its corners or its middle."""
+    screens = [one for one in motion.others if one.agent.type in HIDING]
+    for step, ((x_m, y_m), state) in enumerate(
+        zip(motion.ego.states[:, :2].tolist(), walker.states, strict=True)
+    ):
+        if not walker.is_present[step]:
+            continue
+        points = np.vstack([_corners(walker, state), state[:2]])
+        eye = np.broadcast_to((x_m, y_m), points.shape)
+        lines = np.asarray(shapely.linestrings(np.stack([eye, points], axis=1)))  # (5,)
+        boxes = [_corners(one, one.states[step]) for one in screens if one.is_present[step]]
+        bodies = np.asarray(shapely.polygons(np.array(boxes).reshape(-1, 4, 2)))  # (B,)
+        if not shapely.intersects(lines[:, None], bodies[None, :]).any(axis=1).all():
+            return step
+    return None
+
+
+def _corners(one: Movement, state: FloatArray) -> FloatArray:
+    pose = Pose(x_m=float(state[0]), y_m=float(state[1]), heading_rad=float(state[2]))
+    return corners(pose, one.agent.length_m, one.agent.width_m)
