@@ -24,10 +24,10 @@ from augment.scene.presets import find_bend_end
 _CARRIED_OUT_S = 15.0
 _THERE_M = 0.3
 """So near to where a lane change ends it is over."""
-_BRAKES = Bounds(3.0, math.inf, 0.0)
+BRAKES = Bounds(3.0, math.inf, 0.0)
 """Hard braking where no number is said, in m/s^2."""
 _TURNS_ROUND = Bounds(180.0, 180.0, 20.0)
-_DOOR = Bounds(0.6, 1.2, 0.3)
+DOOR = Bounds(0.5, 1.2, 0.3)
 """How far a door opens, in metres."""
 
 
@@ -53,7 +53,7 @@ def check_course(asked: Case) -> Iterator[Finding]:
                 words = "{agents[0]} has left the map before its motion begins."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
-            yield from _course(asked, agent, wish, states)
+            yield from check_path(asked, agent, wish, states)
             yield from _numbers(asked, agent, wish, states)
 
 
@@ -66,7 +66,11 @@ def _start(
     start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
     if wish.after_s is not None and isinstance(start, AtTime):
         wanted = motion_bounds("after_s", wish.after_s.low, wish.after_s.high)
-        yield hold(kind, [agent], "The start of {agents[0]}", start.after_s, wanted, unit="s")
+        what, value_s = "The start of {agents[0]}", start.after_s
+        ends_s = value_s + (motion.speeds[-1][0] if motion.speeds else 0.0)
+        if wish.may_end and wanted.off(ends_s) < wanted.off(value_s):
+            what, value_s = "The end of the motion of {agents[0]}", ends_s
+        yield hold(kind, [agent], what, value_s, wanted, unit="s")
         return
     is_at_mark = isinstance(start, AtPlace) and start.agent_id == planned.EGO_ID
     if wish.after_s is None and (is_at_mark if wish.mark else isinstance(start, NearEgo)):
@@ -99,7 +103,7 @@ def _carry_out(asked: Case, agent: TrafficAgent, motion: PlannedMotion) -> Float
     return states[~np.isnan(states[:, 0])]
 
 
-def _course(
+def check_path(
     asked: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
     """Check the place that the motion reaches."""
@@ -133,7 +137,7 @@ def _course(
         case MotionPreset.DOOR_OPENING:
             toward_m = abs(first.left_m) - abs(last.left_m)
             what = "How far {agents[0]} comes towards the ego's way"
-            yield hold(FindingKind.ASKED_MOTION, [agent], what, toward_m, _DOOR)
+            yield hold(FindingKind.ASKED_MOTION, [agent], what, toward_m, DOOR)
 
 
 def _numbers(
@@ -154,7 +158,7 @@ def _numbers(
         "braking_mps2": ("The braking of {agents[0]}", max(braking, default=0.0), "m/s²"),
         "duration_s": ("The duration for {agents[0]}", STEP_S * np.count_nonzero(moves), "s"),
     }
-    usual = {"speed_mps": Bounds(0.0, 0.0, 1.0), "braking_mps2": _BRAKES} if slows else {}
+    usual = {"speed_mps": Bounds(0.0, 0.0, 1.0), "braking_mps2": BRAKES} if slows else {}
     for name, (what, value, unit) in measured.items():
         amount = getattr(wish, name)
         wanted = motion_bounds(name, amount.low, amount.high) if amount else usual.get(name)

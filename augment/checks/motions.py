@@ -119,7 +119,7 @@ def motion_limits(situation: ChangedScene) -> Iterator[Finding]:
             continue
         window = min(round(WINDOW_S / step_s), len(mover.states) - 1)
         gained = (mover.states[window:, 3] - mover.states[:-window, 3]) / (window * step_s)
-        sideways, curvature = _bends(mover.states[first:])
+        sideways, curvature = measure_bends(mover.states[first:])
         kind = name_type(mover.agent.type)
         for words, most, limit in (
             ("speeds up by", np.nanmax(gained, initial=0.0), limits.speeding_up),
@@ -215,7 +215,7 @@ def _first_step(situation: ChangedScene, mover: Movement) -> int | None:
     return first if first < len(mover.states) and mover.is_present[first] else None
 
 
-def _bends(states: FloatArray) -> tuple[float, float]:
+def measure_bends(states: FloatArray) -> tuple[float, float]:
     """The most that one is pulled sideways (m/s^2), and the largest curvature (1/m).
 
     Of the circles through three places of the way: here, and as far before as behind.

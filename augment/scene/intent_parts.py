@@ -116,11 +116,13 @@ class StartWish:
         after_s: Since t0.
         ego_distance: Of the ego from who moves, or from the mark where one is named.
         mark: A place of the map that the ego comes to; without a distance it is there.
+        may_end: The sentence may as well say when the motion is over.
     """
 
     after_s: Amount | None = None
     ego_distance: Length | None = None
     mark: MapPlace | None = None
+    may_end: Yes = False
 
     @model_validator(mode="after")
     def _says_when(self) -> Self:

@@ -1,0 +1,336 @@
+"""Distance of a motion from the nearest one that an intent admits.
+
+In: an agent over time, and the admissible place nearest to where it is at t0. Out: metres, the
+mean over `HORIZON_S`. What the sentence fixes holds without tolerance; what it leaves open is
+taken from the answer as far as its kind manages that, then from usual motions, and the nearest of
+them is refined. Only what a film shows counts: where somebody is, not how a motion is written.
+Frame: the scene's. T steps.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from augment.checks.asked_motions import BRAKES, DOOR, check_path
+from augment.checks.lanes_across import find_mark
+from augment.checks.motions import LIMITS, measure_bends
+from augment.checks.parties import Case
+from augment.errors import CannotPlace
+from augment.scene import planned_motion, presets
+from augment.scene.entities import TrafficAgent
+from augment.scene.intent_parts import MotionWish
+from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement, walking_pace_mps
+from augment.scene.planned_mover import PlannedMover, way_and_speed
+
+_FURTHER_S = 15.0
+"""So long after its start a motion is followed to see where it leads."""
+_NONE_M = 0.005
+"""Nothing nearer than this is looked for."""
+_GENTLEST_MPS2 = 1.0
+"""Who is to come to a speed does so at least as briskly, where nobody says."""
+_CHANGES_M = 10.0, 60.0
+"""How long a lane change may be that is looked for beside the answer's own."""
+_SHARES = 0.25, 0.05
+"""Steps by which open numbers are varied, as shares of their ranges; three to either side."""
+_MIDDLE_M = 0.1
+"""So near to a lane's centre a path ends in it: maps have corners."""
+_HINGED_M = 0.15
+"""A closed door's edge is so near to its car's side."""
+_OPENS_S = 0.3, 3.0
+_SLOWS = planned_motion.MotionPreset.HARD_BRAKING, planned_motion.MotionPreset.EMERGENCY_STOP
+
+Speeds = tuple[tuple[float, float], ...]
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionCase:
+    """One agent that is to move, and what its motion is held against.
+
+    Attributes:
+        asked: The modification that it is of.
+        motion: Everybody after it.
+        answer: The agent among them.
+        placed: The agent at the admissible place nearest to it, as fast as is asked for at t0.
+        wish: None where no motion is asked for: it is to go on as it is at t0.
+        car: Of a door, at its admissible place.
+    """
+
+    asked: Case
+    motion: Motion
+    answer: Movement
+    placed: TrafficAgent
+    wish: MotionWish | None
+    car: TrafficAgent | None = None
+
+    @property
+    def own(self) -> planned_motion.PlannedMotion:
+        """The answer's motion, its walk as one, else one that changes nothing."""
+        agent = self.answer.agent
+        if agent.motion is None and agent.walk_to_m is not None:
+            path = planned_motion.PointPath(points_m=(agent.walk_to_m,))
+            return planned_motion.PlannedMotion(
+                path=path, speeds=((0.0, walking_pace_mps(agent)),)
+            )
+        return agent.motion or planned_motion.PlannedMotion()
+
+    @property
+    def own_start_s(self) -> float:
+        """When the answer sets out, infinite where it never does."""
+        if self.own == planned_motion.PlannedMotion():
+            return 0.0
+        return math.inf if self.answer.started_s is None else self.answer.started_s
+
+    def carry_out(self, agent: TrafficAgent, until_s: float = HORIZON_S) -> FloatArray:
+        """Return the states (T, 4) of an agent whose motion waits for nobody."""
+        mover, rows = PlannedMover(agent, self.asked.route.graph), []
+        for time_s in np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist():
+            mover.advance(time_s)
+            rows.append(mover.state())
+        return np.array(rows)
+
+    def measure(self, agent: TrafficAgent) -> float:
+        """Return how far the answer is from an agent on average, in m."""
+        states = self.carry_out(agent)
+        apart_m = np.hypot(*(states[:, :2] - self.answer.states[: len(states), :2]).T)
+        return float(np.nanmean(apart_m))
+
+
+def measure_motion(case: MotionCase) -> float:
+    """Return the mean distance in m between the answer and the nearest admissible motion."""
+    if case.wish is None:
+        return case.measure(replace(case.placed, motion=planned_motion.PlannedMotion()))
+    if case.car is not None:
+        return min(map(case.measure, _list_doors(case, case.car, case.wish)))
+    return _Search(case, case.wish).run()
+
+
+# Private
+
+
+class _Search:
+    """The nearest admissible motion, and the nearest of those that are none."""
+
+    def __init__(self, case: MotionCase, wish: MotionWish) -> None:
+        self._case, self._wish, self._best = case, wish, planned_motion.PlannedMotion()
+        self._best_m = self._else_m = math.inf
+
+    def run(self) -> float:
+        """Return how far off the nearest is."""
+        case, wish = self._case, self._wish
+        for speeds in _list_speeds(case, wish):
+            for span in _list_starts(case, wish, case.placed, speeds):
+                after_s = _shift(case.own_start_s, 0.0, span)
+                for path in _list_paths(case, wish, after_s, speeds):
+                    self._try(path, speeds, after_s)
+        for share in _SHARES:
+            self._vary(share)
+        return min(self._best_m, self._else_m) if math.isinf(self._best_m) else self._best_m
+
+    def _try(self, path: planned_motion.Path | None, speeds: Speeds, after_s: float) -> None:
+        if self._best_m <= _NONE_M:
+            return
+        motion = planned_motion.PlannedMotion(
+            path=path, speeds=speeds, start=planned_motion.AtTime(after_s=after_s)
+        )
+        agent = replace(self._case.placed, walk_to_m=None, motion=motion)
+        mean_m = self._case.measure(agent)
+        self._else_m = min(self._else_m, mean_m)
+        if mean_m < self._best_m and _is_admissible(self._case, agent, self._wish, after_s):
+            self._best_m, self._best = mean_m, motion
+
+    def _vary(self, share: float) -> None:
+        """Vary the ramp, the start and the length of a lane change of the nearest, in turn."""
+        steps = [share * step for step in (-3, -2, -1, 1, 2, 3)]
+        ramp = _find_ramp(self._case, self._wish)
+        for step in steps if self._best.speeds else ():
+            takes_s = _shift(self._best.speeds[-1][0], step, (ramp.least_s, ramp.most_s))
+            self._try_from(((takes_s, ramp.to_mps),), 0.0)
+        for step in steps:
+            self._try_from(self._best.speeds, step)
+        for step in () if self._wish.duration_s else steps:
+            path, start = self._best.path, self._best.start
+            if isinstance(path, planned_motion.LanePath) and isinstance(
+                start, planned_motion.AtTime
+            ):
+                changed = replace(path, change_m=_shift(path.change_m, step, _CHANGES_M))
+                self._try(changed, self._best.speeds, start.after_s)
+
+    def _try_from(self, speeds: Speeds, step: float) -> None:
+        start = self._best.start
+        assert isinstance(start, planned_motion.AtTime)
+        for span in _list_starts(self._case, self._wish, self._case.placed, speeds):
+            self._try(self._best.path, speeds, _shift(start.after_s, step, span))
+
+
+def _shift(value: float, share: float, span: Span) -> float:
+    """Return a number moved by a share of its range, within that."""
+    low, high = span
+    return min(max(value + (share * (high - low) if share else 0.0), low), high)
+
+
+def _is_admissible(
+    case: MotionCase, agent: TrafficAgent, wish: MotionWish, after_s: float
+) -> bool:
+    """Return whether a motion leads where the wish has it, on a path that its kind can drive."""
+    begins_s = min(after_s, HORIZON_S)
+    states = case.carry_out(agent, begins_s + _FURTHER_S)[round(begins_s / STEP_S) :]
+    states = states[~np.isnan(states[:, 0])]
+    exact = replace(case.asked, tolerances=replace(case.asked.tolerances, middle_m=_MIDDLE_M))
+    if not len(states) or any(
+        finding.is_fault for finding in check_path(exact, agent, wish, states)
+    ):
+        return False
+    limits = LIMITS.get(agent.type)
+    if limits is None:
+        return True
+    sideways, curvature = measure_bends(states)
+    return sideways <= limits.sideways and curvature <= 1.0 / limits.radius_m
+
+
+def _list_starts(
+    case: MotionCase, wish: MotionWish, placed: TrafficAgent, speeds: Speeds
+) -> Iterator[Span]:
+    """Yield from when to when a motion may begin, once for each reading of the sentence."""
+    start, times_s = wish.start, case.motion.times_s
+    if start is None:
+        yield case.own_start_s, case.own_start_s
+    elif start.after_s is not None:
+        low_s, high_s = start.after_s.low, start.after_s.high
+        yield low_s, high_s
+        takes_s = speeds[-1][0] if speeds else 0.0
+        if start.may_end and high_s >= takes_s:
+            yield max(low_s - takes_s, 0.0), high_s - takes_s
+    else:
+        waits = planned_motion.PlannedMotion(start=planned_motion.AtTime(after_s=math.inf))
+        places = case.carry_out(replace(placed, walk_to_m=None, motion=waits), times_s[-1])[:, :2]
+        mark_m = find_mark(case.asked.lanes, start.mark) if start.mark else None
+        if mark_m is not None:
+            places[:] = case.asked.route.position(mark_m)
+        apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
+        near = start.ego_distance
+        reaches_m = (near.high_m, near.low_m) if near else (planned_motion.REACHED_M,) * 2
+        steps = (np.flatnonzero(apart_m <= reach_m) for reach_m in reaches_m)
+        first_s, last_s = (float(times_s[at[0]]) if len(at) else math.inf for at in steps)
+        yield first_s, last_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Ramp:
+    """A speed that is come to, evenly, and how long that may take."""
+
+    to_mps: float
+    least_s: float
+    most_s: float
+
+
+def _find_ramp(case: MotionCase, wish: MotionWish) -> _Ramp:
+    from_mps, slows = case.placed.speed_mps, wish.preset in _SLOWS
+    to_mps = case.own.speeds[-1][1] if case.own.speeds else from_mps
+    if wish.speed_mps is not None:
+        to_mps = _shift(to_mps, 0.0, (wish.speed_mps.low, wish.speed_mps.high))
+    elif slows or from_mps > 0.0:
+        to_mps = 0.0 if slows else from_mps
+    limits = LIMITS.get(case.placed.type)
+    most_mps2 = math.inf
+    if limits is not None:
+        most_mps2 = limits.braking if to_mps < from_mps else limits.speeding_up
+    least_mps2 = BRAKES.low if slows else _GENTLEST_MPS2
+    if wish.braking_mps2 is not None:
+        least_mps2, most_mps2 = wish.braking_mps2.low, wish.braking_mps2.high
+    change_mps = abs(to_mps - from_mps)
+    return _Ramp(to_mps=to_mps, least_s=change_mps / most_mps2, most_s=change_mps / least_mps2)
+
+
+def _list_speeds(case: MotionCase, wish: MotionWish) -> Iterator[Speeds]:
+    """Yield the answer's speeds where they are admissible, and the ramp nearest to them."""
+    ramp, speeds = _find_ramp(case, wish), case.own.speeds
+    from_mps = case.placed.speed_mps
+    change_mps = abs(ramp.to_mps - from_mps)
+    rows = speeds if speeds and speeds[0][0] == 0.0 else ((0.0, from_mps), *speeds)
+    steps = np.abs(np.diff(np.array(rows), axis=0))  # (R - 1, 2) of seconds and m/s
+    steepest = (steps[:, 1] / steps[:, 0]).tolist()
+    if rows[0][1] != from_mps:
+        steepest.append(math.inf)  # a jump, which people manage
+    takes_s = change_mps / max(steepest, default=math.inf) if change_mps else 0.0
+    if rows[-1][1] == ramp.to_mps and ramp.least_s <= takes_s <= ramp.most_s:
+        yield speeds
+    takes_s = _shift(speeds[-1][0] if speeds else 0.0, 0.0, (ramp.least_s, ramp.most_s))
+    yield ((takes_s, ramp.to_mps),) if change_mps else ()
+
+
+def _list_paths(
+    case: MotionCase, wish: MotionWish, after_s: float, speeds: Speeds
+) -> Iterator[planned_motion.Path | None]:
+    """Yield the answer's path, the same from where it has to begin, and the usual one."""
+    own = case.own.path
+    if wish.preset in (*_SLOWS, planned_motion.MotionPreset.RED_LIGHT):
+        yield None
+    if wish.preset in _SLOWS:
+        return
+    if isinstance(own, planned_motion.LanePath) and wish.duration_s is not None:
+        mean_mps = (case.placed.speed_mps + _find_ramp(case, wish).to_mps) / 2.0
+        span = wish.duration_s.low * mean_mps, wish.duration_s.high * mean_mps
+        own = replace(own, change_m=_shift(own.change_m, 0.0, span))
+    if own is not None:
+        yield own
+    if isinstance(own, planned_motion.PointPath):
+        waits = replace(
+            case.placed,
+            walk_to_m=None,
+            motion=planned_motion.PlannedMotion(start=planned_motion.AtTime(after_s=math.inf)),
+        )
+        here = case.carry_out(waits, min(after_s, HORIZON_S))[-1, :2]
+        began_s = min(case.own_start_s, HORIZON_S)
+        points = own.points_m + here - case.answer.states[round(began_s / STEP_S), :2]
+        if not np.isnan(points).any():
+            yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
+    numbers = presets.PresetNumbers(start=planned_motion.AtTime(after_s=min(after_s, HORIZON_S)))
+    if speeds and "speed_mps" in presets.preset_numbers(wish.preset):
+        numbers = replace(numbers, speed_mps=speeds[-1][1])
+    try:
+        usual = presets.with_preset(wish.preset, case.asked.ground.scene, case.placed, numbers)
+    except CannotPlace:
+        return
+    assert usual.motion is not None
+    yield usual.motion.path
+
+
+def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterator[TrafficAgent]:
+    """Yield doors in the car's side, along it or across it, that come out on the ego's side."""
+    door, own, place = case.answer.agent, case.own, case.asked.route.locate_agent(car)
+    toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
+    side = np.array([1.0, math.copysign(1.0, math.sin(toward_rad - car.heading_rad))])
+    points = own.path.points_m[-1:] if isinstance(own.path, planned_motion.PointPath) else ()
+    local = car.pose.to_local(np.array([(door.x_m, door.y_m), *points])) * side
+    half_m, slab_m, reach_m = car.width_m / 2.0, presets.DOOR_WIDTH_M, presets.DOOR_LENGTH_M
+    ends_m = (car.length_m - reach_m) / 2.0
+    opens_s = (wish.duration_s.low, wish.duration_s.high) if wish.duration_s else _OPENS_S
+    for low_m, high_m in (
+        (half_m - slab_m / 2.0, half_m + slab_m / 2.0 + _HINGED_M),
+        ((half_m - reach_m / 2.0) - _HINGED_M, (half_m - reach_m / 2.0) + _HINGED_M),
+    ):
+        # (2,) ahead in the car and out of it; a hinge moves the centre by half its length at most.
+        closed = np.clip(local[0], (-ends_m, low_m), (ends_m, high_m))
+        way = np.clip(local[-1] - closed, (-reach_m / 2.0, DOOR.low), (reach_m / 2.0, DOOR.high))
+        (x_m, y_m), end = car.pose.to_parent(np.array([closed, closed + way]) * side).tolist()
+        way_m = float(np.hypot(*way))
+        takes_s = _shift(_takes_s(own.speeds, way_m), 0.0, opens_s)
+        speeds, placed = ((0.0, way_m / takes_s),), replace(door, x_m=x_m, y_m=y_m)
+        path = planned_motion.PointPath(points_m=((end[0], end[1]),), keeps_heading=True)
+        for span in _list_starts(case, wish, placed, speeds):
+            start = planned_motion.AtTime(after_s=_shift(case.own_start_s, 0.0, span))
+            yield replace(
+                placed, motion=planned_motion.PlannedMotion(path=path, speeds=speeds, start=start)
+            )
+
+
+def _takes_s(speeds: Sequence[tuple[float, float]], way_m: float) -> float:
+    """Return how long somebody who stands takes for so many metres."""
+    times_s = np.arange(0.0, _FURTHER_S, STEP_S).tolist()
+    gone_m = (way_and_speed(tuple(speeds), 0.0, time_s)[0] for time_s in times_s)
+    return next(
+        (time_s for time_s, at_m in zip(times_s, gone_m, strict=True) if at_m >= way_m), _FURTHER_S
+    )

@@ -1,0 +1,177 @@
+"""Answers of a strong model to six moving scenarios, and careless ones, against their wishes.
+
+Of each answer the numbers of its block alone; on the scenes, sentences and intents of the moving
+set. Careless answers copy the example values of the prompt's rules.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from augment.checks import Ground, Severity
+from augment.checks.lanes_across import LanesAcross, find_picked
+from augment.checks.parties import USUAL
+from augment.checks.registry import _assign_parties, check_against_intent
+from augment.checks.wish_motion import MotionCase, measure_motion
+from augment.metrics.displacement import displacement
+from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.intent import Intent, VehicleRequest
+from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, PointPath
+from tests.fixtures.shelf import entry, shown_scene
+
+CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
+U_TURN, DOOR, CHILD = "u-turn-quarry-narrows", "door-lime-street", "late-pedestrian-lime-street"
+BUS = "red-light-brewery-crossing"
+
+ROUND = ((2.55, -0.68), (4.42, -2.55), (5.1, -5.1), (4.42, -7.65), (2.55, -9.52), (0.0, -10.2))
+"""Half a circle, from where it begins."""
+BACK = ((30.0, -10.2), (-30.0, -10.2))
+
+
+def agent(x_m: float, y_m: float, heading_rad: float = 0.0, **parts: Any) -> TrafficAgent:
+    motion = {name: parts.pop(name) for name in ("path", "speeds", "start") if name in parts}
+    made: dict[str, Any] = {"type": AgentType.VEHICLE, "width_m": 2.0, "length_m": 4.8} | parts
+    return TrafficAgent(
+        id="New1",
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        motion=PlannedMotion(**motion) if motion else None,
+        **made,
+    )
+
+
+def cutting_in(change_m: float, *speeds: tuple[float, float]) -> TrafficAgent:
+    path = LanePath(lane_ids=("Lane2", "Lane1"), change_m=change_m)
+    car: dict[str, Any] = {"speed_mps": 12.0, "lane_id": "Lane2", "path": path, "speeds": speeds}
+    return agent(8.0, 3.5, start=AtTime(after_s=2.0), **car)
+
+
+def braking(after_s: float, takes_s: float, length_m: float = 5.9) -> TrafficAgent:
+    van: dict[str, Any] = {"length_m": length_m, "speed_mps": 8.5, "lane_id": "Lane1"}
+    return agent(16.0, 0.0, start=AtTime(after_s=after_s), speeds=((takes_s, 0.0),), **van)
+
+
+def turning(
+    after_s: float, takes_s: float, *points_m: tuple[float, float], straight_m: float = 0.0
+) -> TrafficAgent:
+    arc = [(straight_m + x_m, y_m) for x_m, y_m in ((0.0, 0.0), *ROUND)] if straight_m else []
+    path = PointPath(points_m=(*arc, *points_m))
+    car: dict[str, Any] = {
+        "speed_mps": 8.0,
+        "lane_id": "Lane1",
+        "path": path,
+        "speeds": ((takes_s, 5.0),),
+    }
+    return agent(28.0, 0.0, start=AtTime(after_s=after_s), **car)
+
+
+def door(
+    place: tuple[float, float, float],
+    end: tuple[float, float],
+    *speeds: tuple[float, float],
+    keeps: bool = True,
+) -> TrafficAgent:
+    path = PointPath(points_m=(end,), keeps_heading=keeps)
+    slab: dict[str, Any] = {"type": AgentType.GENERIC_OBJECT, "width_m": 0.15, "length_m": 1.1}
+    return agent(*place, path=path, speeds=speeds, start=NearEgo(within_m=15.0), **slab)
+
+
+def child(*place: float, **parts: Any) -> TrafficAgent:
+    return agent(*place, type=AgentType.PEDESTRIAN, width_m=0.8, length_m=0.9, **parts)
+
+
+def running(end: tuple[float, float], *place: float) -> TrafficAgent:
+    path = PointPath(points_m=(end,))
+    return child(*place, path=path, speeds=((0.0, 2.0),), start=NearEgo(within_m=20.0))
+
+
+def bus(y_m: float, **parts: Any) -> TrafficAgent:
+    size: dict[str, Any] = {"type": AgentType.BUS, "width_m": 2.1, "length_m": 7.5}
+    return agent(34.3, y_m, 1.571, speed_mps=8.0, lane_id="Lane16", **size, **parts)
+
+
+CROSSING = LanePath(lane_ids=("Lane16", "Connector13", "Lane8"))
+RIGHT = {
+    "a cut-in over 22 m": (CUT_IN, cutting_in(22.0, (2.5, 7.0))),
+    "a cut-in over 24 m": (CUT_IN, cutting_in(24.0, (2.5, 7.0))),
+    "who stands 2 s from now": (BRAKING, braking(0.94, 1.0625)),
+    "who brakes 2 s from now": (BRAKING, braking(2.0, 1.0625)),
+    "a circle after 3 m": (U_TURN, turning(1.0, 0.8, *BACK, straight_m=39.0)),
+    "a circle after 2 m": (U_TURN, turning(1.0, 0.6, *BACK, straight_m=38.0)),
+    "a door across its car": (DOOR, door((20.87, -4.18, 1.399), (21.06, -3.09), (0.0, 1.1))),
+    "a door along its car": (DOOR, door((20.95, -3.71, -0.172), (21.12, -2.72), (0.0, 1.0))),
+    "a child that runs": (CHILD, running((37.5, 2.72), 33.56, -9.56, 1.261)),
+    "a child elsewhere": (CHILD, running((37.45, 2.74), 33.59, -9.57, 1.267)),
+    "a bus over the crossing": (BUS, bus(-33.46, path=CROSSING)),
+}
+CARELESS = {
+    "stops in the next lane": (CUT_IN, cutting_in(20.0, (2.0, 0.0))),
+    "brakes softly": (BRAKING, braking(2.0, 2.0, 4.8)),
+    "goes back and forth": (U_TURN, turning(2.0, 2.0, (36.0, 0.0), (36.0, -6.8), (20.0, -6.8))),
+    "never opens": (DOOR, door((20.87, -4.18, 1.399), (21.06, -3.09), (2.0, 0.0), keeps=False)),
+    "walks at once": (CHILD, child(33.56, -9.56, 1.261, speed_mps=1.4, walk_to_m=(37.5, 2.72))),
+}
+
+
+def both_readings(intent: Intent) -> Intent:
+    """The intent with both readings of "brakes to a standstill, 2 s from now"."""
+    (request,) = intent.requests
+    assert isinstance(request, VehicleRequest)
+    assert request.motion is not None
+    assert request.motion.start is not None
+    start = replace(request.motion.start, may_end=True)
+    motion = replace(request.motion, start=start)
+    return replace(intent, requests=(replace(request, motion=motion),))
+
+
+def wish_m(slug: str, agent: TrafficAgent) -> float:
+    """How far a motion is from its wish, from where it begins."""
+    ground, intent = Ground.of(shown_scene(slug)), entry(slug).intent
+    assert intent is not None
+    change = Modification(added=(agent,))
+    lanes = LanesAcross.of(ground, intent.route)
+    assert lanes is not None
+    (request,) = intent.requests if slug != BRAKING else both_readings(intent).requests
+    parked = request.spot.landmark
+    motion = ground.motion_after(change, of_all=False)
+    (answer,) = [one for one in motion.others if one.agent.id == agent.id]
+    speed_mps = getattr(request, "speed_mps", None)
+    case = MotionCase(
+        asked=_assign_parties(ground, change, intent, lanes, USUAL),
+        motion=motion,
+        answer=answer,
+        placed=replace(agent, speed_mps=agent.speed_mps if speed_mps is None else speed_mps),
+        wish=getattr(request, "motion", None),
+        car=find_picked(lanes, parked)[0] if parked else None,
+    )
+    return measure_motion(case)
+
+
+def is_wrong(slug: str, agent: TrafficAgent) -> bool:
+    intent = entry(slug).intent
+    assert intent is not None
+    intent = both_readings(intent) if slug == BRAKING else intent
+    ground = Ground.of(shown_scene(slug))
+    found = check_against_intent(ground, Modification(added=(agent,)), intent)
+    return any(one.severity is Severity.WRONG for one in found)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_answer_is_at_its_wish_and_nothing_is_wrong(name: str) -> None:
+    assert wish_m(*RIGHT[name]) <= 0.3
+    assert not is_wrong(*RIGHT[name])
+
+
+@pytest.mark.parametrize("name", CARELESS)
+def test_a_careless_answer_is_far_off_or_wrong_and_no_further_than_the_reference(
+    name: str,
+) -> None:
+    slug, made = CARELESS[name]
+    distance_m = wish_m(slug, made)
+    assert distance_m > 1.0 or is_wrong(slug, made)
+    ground = Ground.of(shown_scene(slug))
+    found = displacement(Modification(added=(made,)), entry(slug).reference, ground)
+    assert found.mean_m is not None
+    assert distance_m <= found.mean_m + 0.02
