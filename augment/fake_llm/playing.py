@@ -29,6 +29,14 @@ from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import FloatArray, find_motion
 from augment.variants.respondents import ModelRole
 
+REFUSALS = (
+    "Insights: {}\n\nSummary: none\n\nModification Dict: none\n\n"
+    "Modification Calculations: none\n\nModified Vectors: none",
+    "The wish can't be met: {}",
+    "{} So I have to decline.",
+    "Der Wunsch lässt sich nicht erfüllen: {}",
+    "无法满足这个要求：{}",
+)
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
 
 _MOST_CALLS = 8
@@ -49,12 +57,14 @@ class Character:
     Attributes:
         bend: What becomes of a right modification; None for an answer that nobody can read.
         judge: What a reviewer finds.
+        in_prose: Whether it refuses wishes without a block.
         never_stops: Whether it calls as long as it may, and longer.
         leans: Whether as a judge it often prefers whatever comes first.
     """
 
     bend: Callable[[Task, Modification, Heard], Modification | None] = lambda _, right, __: right
     judge: Callable[[Task], list[Problem]] = lambda task: review_problems(task)
+    in_prose: bool = False
     never_stops: bool = False
     leans: bool = False
 
@@ -91,6 +101,9 @@ class Character:
         try:
             right = place(task.scene, task.intent).modification
         except CannotPlace as refused:
+            if self.in_prose:
+                rng = careless.dice(task.prompt)
+                return rng.choice(REFUSALS).format(refused.reason), ()
             return _write_answer(Modification(), f"I can't do it: {refused.reason}"), ()
         placed = self.bend(task, right, heard)
         if placed is None:
@@ -328,4 +341,5 @@ LEARNING = Character(
     )
 )
 STUBBORN = Character(bend=lambda task, right, _: careless.too_far(task.scene, right))
+TALKATIVE = Character(in_prose=True)
 LOOPING = Character(never_stops=True)

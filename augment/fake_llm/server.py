@@ -226,6 +226,7 @@ _500 = _always(wire.error(500, "The server had an error."))
 MODELS: dict[str, Behaviour] = {
     "fake-good": _good,
     "fake-careless": _as(playing.CARELESS),
+    "fake-refuse-prose": _as(playing.TALKATIVE),
     "fake-qa-low": _as(playing.LEARNING),
     "fake-qa-never": _as(playing.STUBBORN),
     "fake-tool-loop": _as(playing.LOOPING),

@@ -140,6 +140,14 @@ class Augmentation(Work):
             models.Index(fields=("state", "sent_at")),
         )
 
+    @property
+    def is_answer(self) -> bool:
+        """True if a change came out: its own, or the one before a follow-up that was refused."""
+        return self.modification is not None and self.state in (
+            self.State.DONE,
+            self.State.REFUSED,
+        )
+
 
 class Attempt(models.Model):
     """One try at an augmentation, from claim to outcome; a killed worker leaves it unfinished."""

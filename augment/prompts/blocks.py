@@ -20,6 +20,11 @@ LONGEST_VALUE = 4_000
 """Characters that one value within a text may run over."""
 
 _LONGEST_REFUSAL = 2_000
+_NOTHING = re.compile(
+    r"(?:\A|^[ \t#*_]*Modified Vectors[ \t#*_]*:)[\s*`]*(?:json)?\s*"
+    r"(?:none|null|nothing|n/a|\{\s*\}|\[\s*\])[\s.*`]*\Z",
+    re.IGNORECASE | re.MULTILINE,
+)
 _CHANGES = re.compile(r"""["'](?:add|move|remove)["']\s*:""")
 _FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
 # Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
@@ -136,6 +141,18 @@ def declines(answer: str) -> bool:
     text = without_thoughts(answer).strip()
     is_prose = len(text) <= _LONGEST_REFUSAL and "{" not in text
     return is_prose and says("declines", text)
+
+
+def refuses(answer: str) -> bool:
+    """Return whether a modifier's answer without a block is a refusal.
+
+    It says so in prose, or holds nothing where the block belongs.
+    """
+    text = without_thoughts(answer).strip()
+    rest = _NOTHING.sub("", text)
+    is_short = len(text) <= _LONGEST_REFUSAL
+    says_so = is_short and (says("declines", text) or says("unmet", text))
+    return "{" not in rest and (rest != text or says_so)
 
 
 def without_thoughts(answer: str) -> str:

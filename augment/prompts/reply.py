@@ -16,7 +16,14 @@ from pydantic import BeforeValidator, Field
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
 from augment.geometry.frames import wrap
 from augment.prompts import vectors
-from augment.prompts.blocks import LONGEST_ANSWER, Strict, last_object, validate, without_thoughts
+from augment.prompts.blocks import (
+    LONGEST_ANSWER,
+    Strict,
+    last_object,
+    refuses,
+    validate,
+    without_thoughts,
+)
 from augment.scene.codec import intent_from_parts
 from augment.scene.density import fit_boxes
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
@@ -30,6 +37,7 @@ FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
 LONGEST_ENTRY = 1000
 MOST_FEEDBACK = 20
 _MOST_PROBLEMS = 8
+_HEADS = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
 
 _TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 
@@ -86,11 +94,14 @@ class ReadReply:
     Attributes:
         notes: The answer's own Insights and Summary.
         mended: Whether comments or trailing commas had to be taken out of its JSON.
+        is_refusal: Whether it changes nothing and names no action either; an answer to a
+            follow-up may take back all that was placed.
     """
 
     modification: Modification
     notes: str
-    mended: bool
+    mended: bool = False
+    is_refusal: bool = False
 
 
 class Correction(Strict):
@@ -163,7 +174,7 @@ class JudgeAnswer(Strict):
 def read_reply(
     answer: str, scene: Scene, *, radius_m: float = vectors.DEFAULT_RADIUS_M
 ) -> ReadReply:
-    """Return the modification that the answer asks for.
+    """Return the modification that the answer asks for, an empty one of a refusal.
 
     Args:
         answer: The raw text of the model.
@@ -173,7 +184,13 @@ def read_reply(
     Raises:
         ReplyUnreadable: Whatever is wrong with the answer.
     """
-    document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
+    try:
+        document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
+    except ReplyUnreadable:
+        if not refuses(answer):
+            raise
+        said = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
+        return ReadReply(modification=Modification(), notes=said, is_refusal=True)
     block, names = validate(_Block, document), vectors.short_names(scene)
     problems = []
     for agent in [*block.add, *block.move]:
@@ -192,13 +209,18 @@ def read_reply(
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = fit_boxes(scene, _modification(block, scene, names))
-    return ReadReply(modification=modification, notes=answer_notes(answer), mended=mended)
+    actions = _sections(answer, _HEADS).get("Modification Dict", "")
+    return ReadReply(
+        modification=modification,
+        notes=answer_notes(answer),
+        mended=mended,
+        is_refusal=modification.is_empty and "{" not in actions,
+    )
 
 
 def answer_notes(answer: str) -> str:
     """Return the sections Insights and Summary of an answer, shortened; empty without them."""
-    heads = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
-    bodies = _sections(answer, heads)
+    bodies = _sections(answer, _HEADS)
     notes = [bodies.get("Insights", ""), bodies.get("Summary", "")]
     return "\n\n".join(part for part in notes if part)[:LONGEST_NOTES]
 

@@ -7,7 +7,8 @@ review never takes a result away: where it is unusable, or a later round can't b
 modifier made before stands, and the notes say so.
 
 An answer that nobody can read and a refusal are outcomes of the model and count as such; whoever
-changes nothing refuses. A broken wire is nobody's outcome and is raised.
+changes nothing refuses, in a block or in prose, and reviews judge that as any other answer. A
+broken wire is nobody's outcome and is raised.
 """
 
 import json
@@ -197,7 +198,9 @@ class _Work:
             return Outcome(status=OutcomeStatus.UNREADABLE, reason=reason)
         except ModelRefused as refused:
             return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
-        if kept.read.modification.is_empty:
+        # After a follow-up an empty block may also take back what was placed before.
+        changes_nothing = kept.read.modification.is_empty and not self.task.begun
+        if kept.read.is_refusal or changes_nothing:
             return Outcome(status=OutcomeStatus.REFUSED, reason=kept.read.notes or LEFT_ALONE)
         return Outcome(
             status=OutcomeStatus.DONE,

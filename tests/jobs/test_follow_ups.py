@@ -163,6 +163,33 @@ def test_whoever_has_no_answer_of_its_own_has_none_to_the_follow_up(
     assert second.reason.startswith("It would go on from an answer that is none: ")
 
 
+@pytest.mark.parametrize(
+    ("said", "state", "shown_m"),
+    [
+        (answer(block()).replace('{"Action": "add"', "none ("), State.REFUSED, [20.0]),
+        ("There is no lane left of it, so this can't be done.", State.REFUSED, [20.0]),
+        (answer(block()).replace('"Action": "add"', '"Action": "remove"'), State.DONE, []),
+    ],
+)
+def test_a_refused_follow_up_keeps_the_last_answer_and_the_next_goes_on(
+    server: Scripted, said: str, state: str, shown_m: list[float]
+) -> None:
+    two_steps()
+    add(server, "ann")
+    server.script = [car(20.0), said, car(22.0)]
+    first, second = launched("ann")
+    run(first, second)
+    assert (second.state, bool(second.reason)) == (state, state == State.REFUSED)
+    assert [one["x_m"] for one in (second.modification or {})["add"]] == shown_m
+    assert (second.image == first.image) == (state == State.REFUSED)
+    (measured,) = [one for one in of_job(second.job) if one.row.pk == second.pk]
+    assert all(thing.is_kept == bool(shown_m) for thing in measured.kept)
+    third = ask_follow_up(second, FollowUpRequest(instruction="Further."))
+    run(third)
+    assert third.state == State.DONE
+    assert server.bodies[2]["messages"][-2]["content"] == said
+
+
 def test_a_fault_of_the_first_is_one_of_the_second_and_both_run_again(server: Scripted) -> None:
     two_steps()
     add(server, "ann")

@@ -18,7 +18,7 @@ from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
 from tests.checks.worlds import findings
-from tests.fixtures.shelf import SLUGS, entry, shown_scene
+from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 from tests.intents import known
 from tests.variants.memory import MemoryTranscript
 
@@ -36,6 +36,11 @@ CALLS_OF_LOW = {"tqa": "mrmr", "vqa": "mevemeve", "fc+tqa": "mmrmmr", "fc+vqa": 
 KINDS = ("crash", "jaywalker", "nudge", "overtake", "roadworks")
 
 
+UNMET = {
+    slug: intent.unmet
+    for slug in HARD_SLUGS
+    if (intent := entry(slug).intent) is not None and intent.unmet
+}
 SOME = [next(slug for slug in SLUGS if slug.startswith(kind)) for kind in KINDS]
 
 
@@ -106,10 +111,21 @@ def test_moves_removals_and_far_places_come_through(server: FakeServer, slug: st
     assert min(found.distances_m) < 0.5
 
 
-def test_a_wish_that_can_t_be_met_is_refused_and_not_unreadable(server: FakeServer) -> None:
-    outcome, _ = played(server, "fake-good", "otm", "hairpin-hill-no-bus")
+@pytest.mark.parametrize("variant", ["tqa", "vqa"])
+@pytest.mark.parametrize(
+    ("model", "slug"),
+    [
+        *(("fake-refuse-prose", slug) for slug in UNMET),
+        *(("fake-good", slug) for slug in [*UNMET][:2]),
+    ],
+)
+def test_a_wish_that_can_t_be_met_is_refused_and_reviewers_accept_that(
+    server: FakeServer, model: str, slug: str, variant: str
+) -> None:
+    outcome, transcript = played(server, model, variant, slug)
     assert (outcome.status, outcome.modification) == (OutcomeStatus.REFUSED, None)
-    assert "There is no bus in the scene" in outcome.reason
+    assert UNMET[slug] in outcome.reason
+    assert order(transcript) == CALLS_OF_GOOD[variant]
 
 
 @pytest.mark.parametrize("slug", SOME[:2])

@@ -49,23 +49,42 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
 
 
 @pytest.mark.parametrize(
-    ("script", "status"),
+    "said",
     [
-        (["I'm sorry, but I can't help with that."] * 2, OutcomeStatus.REFUSED),
-        (["<think>Hm.</think>Sorry, this is unsafe.", "I cannot do this."], OutcomeStatus.REFUSED),
-        (["[THINK]Hm.[/THINK]Regrettably, I can't.", "Lo siento."], OutcomeStatus.REFUSED),
-        (["Thank you, but I'm not comfortable.", "I have to decline."], OutcomeStatus.REFUSED),
-        (["I can\u2019t assist with this request.", GOOD], OutcomeStatus.DONE),
-        (["I'm sorry, I can't.", "The car stands ahead."], OutcomeStatus.UNREADABLE),
-        (["I must place the car ahead of the ego."] * 2, OutcomeStatus.UNREADABLE),
-        (["I can't: " + GOOD.replace('"', "'")] * 2, OutcomeStatus.UNREADABLE),
+        "I'm sorry, but I can't help with that.",
+        "<think>Hm.</think>Sorry, this is unsafe.",
+        "[THINK]Hm.[/THINK]Regrettably, I can't.",
+        "Thank you, but I'm not comfortable.",
+        "Insights: There is no bus stop.\n\nSummary: none\n\nModified Vectors: none",
+        "**Modified Vectors:**\n```json\n{}\n```",
+        "There is no crosswalk in this scene, so the car can't be placed before it.",
+        "Looking at the lanes, this wish cannot be met: no lane comes the other way.",
+        "Es gibt keinen Zebrastreifen; der Wunsch kann nicht erfüllt werden.",
+        "Il n'y a pas de bus : cette demande ne peut pas être satisfaite.",
+        "No hay ningún autobús, así que no es posible.",
+        "场景中没有公交车，所以无法完成。",
     ],
 )
-def test_a_refusal_in_prose_that_is_repeated_is_a_refusal(
-    script: list[str], status: OutcomeStatus
-) -> None:
-    made = Play("otm", script)
-    assert (made.outcome.status, len(made.client.requests)) == (status, 2)
+def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -> None:
+    made = Play("otm", [said])
+    assert (made.outcome.status, len(made.client.requests)) == (OutcomeStatus.REFUSED, 1)
+    assert made.outcome.reason
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "I must place the car ahead of the ego.",
+        "The car should stand some way ahead of the ego, a little aside.",
+        "I can't: " + GOOD.replace('"', "'"),
+        "The place at 20 m is taken, so the car can stand at 24 m instead.",
+        "There is no traffic behind, so the car stands 20 m ahead.",
+        "",
+    ],
+)
+def test_prose_that_does_not_decline_is_unreadable(said: str) -> None:
+    made = Play("otm", [said] * 2)
+    assert (made.outcome.status, len(made.client.requests)) == (OutcomeStatus.UNREADABLE, 2)
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,8 @@ def _explain(cell: Augmentation | None) -> str:
     if cell.state == Augmentation.State.DONE:
         return ""
     if cell.state in Augmentation.SHOWABLE:
-        return f"{cell.get_state_display()}: unchanged scene"
+        shown = "the answer before" if cell.is_answer else "unchanged scene"
+        return f"{cell.get_state_display()}: {shown}"
     return f"no picture: {cell.get_state_display().lower()}"
 
 

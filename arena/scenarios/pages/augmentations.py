@@ -42,7 +42,7 @@ class FollowUpForm(RequestForm):
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
-    can_go_on = augmentation.state == State.DONE and augmentation.contestant.endpoint is not None
+    can_go_on = augmentation.is_answer and augmentation.contestant.endpoint is not None
     tries, checked = list_tries(augmentation), check_augmentation(augmentation)
     context = {
         "augmentation": augmentation,

@@ -199,9 +199,9 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
     rows = Augmentation.objects.filter(pk__in=[row.pk for row in cells.values()])
     shown: dict[int, Modification | None] = {}
     for pk, state, document in rows.values_list("pk", "state", "modification").iterator():
-        shown[pk] = Modification()
-        if state == State.DONE:
-            shown[pk] = modification_from_document(document) if document else None
+        shown[pk] = None if state == State.DONE else Modification()
+        if document:
+            shown[pk] = modification_from_document(document)
     by_scenario: defaultdict[str, list[tuple[str, Modification]]] = defaultdict(list)
     for scenario, contestant in sorted(cells):
         change = shown[cells[scenario, contestant].pk]
@@ -257,11 +257,12 @@ def _measure_row(
         found = displacement(answer, reference, standard_of(row).ground if moves else None)
     except (InvalidDocument, InvalidModification):
         return Distance(why_not=MissingReason.UNFIT_MOTION)
-    own = None if before is None else _read_answer(before)
+    own = _read_shown(before) if before is not None else None
     earlier = None if before is None else standard_of(before).reference
     kept: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
-        kept = find_kept_objects(own, answer, reference_before=earlier, reference_after=reference)
+        shown = _read_shown(row)
+        kept = find_kept_objects(own, shown, reference_before=earlier, reference_after=reference)
     return Distance(displacement=found, kept=kept)
 
 
@@ -286,6 +287,11 @@ class _Standard:
 
 def _read_answer(row: Augmentation) -> Modification | None:
     return _read(row.modification) if row.state == State.DONE else None
+
+
+def _read_shown(row: Augmentation) -> Modification | None:
+    """Return the change that a row shows: also that before a follow-up that was refused."""
+    return _read(row.modification) if row.is_answer else None
 
 
 def _read(document: object) -> Modification | None:

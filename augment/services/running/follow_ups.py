@@ -100,7 +100,7 @@ def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
     """
     if answer is None:
         raise Conflict("The answer that it goes on from was deleted.")
-    if answer.state != Augmentation.State.DONE:
+    if not answer.is_answer:
         raise Conflict(
             f"There is no answer to go on from: {answer.contestant.name} on "
             f"{answer.scenario.slug} is {answer.get_state_display().lower()}."

@@ -124,9 +124,14 @@ class Augmentations(WorkKind[Augmentation]):
                 camera = load_camera(row.scenario, {row.pk: columns["modification"]})
                 image = draw_picture(row.scenario, modification, camera)
             except Exception:
-                held.note(**columns)  # a second try only has to draw
+                is_done = outcome.status is OutcomeStatus.DONE
+                held.note(**(columns if is_done else {}))  # a second try only has to draw
                 raise
-            return Settlement(state=State.DONE, columns=columns | {"image": image})
+            return Settlement(
+                state=outcome.status.value,
+                reason=outcome.reason,
+                columns=columns | {"image": image},
+            )
         except errors.JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
         except (errors.NotNeeded, errors.BudgetSpent):
@@ -227,10 +232,15 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         )
     if contestant.endpoint is not None:
         before = row.follows
-        if before is not None and before.state in (State.UNREADABLE, State.REFUSED):
+        ends = (State.UNREADABLE, State.REFUSED)
+        if before is not None and before.state in ends and not before.is_answer:
             reason = f"It would go on from an answer that is none: {before.reason}"
             return Outcome(status=OutcomeStatus(before.state), reason=reason)
-        return _ask_model(row, scene, held, connect)
+        outcome = _ask_model(row, scene, held, connect)
+        if before is None or outcome.status is not OutcomeStatus.REFUSED:
+            return outcome
+        # A refused wish changes nothing: the answer before stays.
+        return replace(outcome, modification=modification_from_document(before.modification))
     placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
     if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
         raise errors.Conflict(f"A job can't run {contestant.slug} any more.")

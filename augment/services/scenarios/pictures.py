@@ -236,7 +236,7 @@ def _keep(picture: str, png: bytes, film: bytes) -> None:
 
 def _shown_modification(row: Augmentation) -> Modification:
     """Return the shown modification: an unreadable answer changes nothing."""
-    if row.state != Augmentation.State.DONE or not row.modification:
+    if not row.is_answer:
         return Modification()
     return codec.modification_from_document(row.modification)
 
