@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from augment.baselines.placing_ground import PlacingGround
-from augment.checks.lanes_across import LanesAcross, find_mark
+from augment.checks.lanes_across import LanesAcross, find_mark, list_arms
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
 from augment.scene import planned_motion, presets
-from augment.scene.entities import LaneConnector, TrafficAgent, TrafficLight, TurnType
+from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Side
 from augment.scene.intent_parts import MotionWish, StartWish
 
@@ -50,31 +50,18 @@ def find_arm(
     Raises:
         CannotPlace: No such arm leads over the ego's way.
     """
-    options = []
-    for connector in ground.graph.lanes.values():
-        if not isinstance(connector, LaneConnector) or connector.from_lane is None:
-            continue
-        crossing = presets.find_crossing(connector, ground.route)
-        if crossing is None or connector.traffic_light is TrafficLight.GREEN:
-            continue
-        begin = ground.route.locate(*connector.centerline.position(0.0))
-        is_asked = side is None or (begin.left_m > 0.0) is (side is Side.LEFT)
-        if connector.from_lane in ground.graph.lanes and is_asked:
-            ahead_m = ground.route.locate(*crossing).ahead_m
-            away_m = connector.centerline.project(*crossing).s_m
-            turns = connector.turn_type is not TurnType.STRAIGHT
-            options.append((turns, ahead_m, connector.id, connector.from_lane, away_m))
-    if not options:
+    arms = list_arms(ground.lanes, side)
+    if not arms:
         where = f" from the {side}" if side else ""
         raise CannotPlace(f"No arm of a junction{where} leads over the ego's way at red.")
-    _, ahead_m, _, lane_id, away_m = min(options)
+    arm = arms[0]
     before_m = _STOP_LINE_M
     if speed_mps > 0.0:
         before_m = max(
-            speed_mps * ahead_m / presets.ego_pace_mps(ground.scene) - away_m, _STOP_LINE_M
+            speed_mps * arm.ahead_m / presets.ego_pace_mps(ground.scene) - arm.away_m, _STOP_LINE_M
         )
-    length_m = ground.graph.lane(lane_id).centerline.length_m
-    place = ground.graph.along(lane_id, length_m, nearer_m - before_m)
+    length_m = ground.graph.lane(arm.lane_id).centerline.length_m
+    place = ground.graph.along(arm.lane_id, length_m, nearer_m - before_m)
     if place is None:
         raise CannotPlace(f"The lanes end less than {before_m:.0f} m before the junction.")
     return place.pose, place.lane_id

@@ -8,17 +8,14 @@ from statistics import median
 from augment.checks.asked_crash import in_order
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
-from augment.checks.parties import CRASH_M, WORKER_M, Bounds, Case, Party, apart_m, hold
+from augment.checks.parties import CRASH_M, Bounds, Case, Party, apart_m, hold, meets_route
+from augment.checks.wish_places import find_across
+from augment.checks.wish_shapes import CONE_M, WORKER_M
 from augment.scene import intent as wish
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Point, TrafficAgent
+from augment.scene.entities import TrafficAgent
 
-_SLIGHT_M = 1.5
-"""The end of the paper's range for a slight offset."""
-_FAR_OUT_M = 3.0
-"""How far beside the road something may stand that is to stand beside it."""
 _TAPER_M = 1.0
 """Cones of which the last is this far across from the first run from one side to the other."""
-_CONE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1]
 
 
 def check_distance(asked: Case) -> Iterator[Finding]:
@@ -65,7 +62,7 @@ def _measure_ahead(asked: Case, party: Party, wanted: Bounds) -> tuple[TrafficAg
         first = in_order(party, request, asked.route)[0]
         return first, asked.ahead_m(first)
     if isinstance(request, wish.WalkRequest):
-        meetings = [(_meets_route(asked, agent), agent) for agent in party.placed]
+        meetings = [(meets_route(asked.route, agent), agent) for agent in party.placed]
         ahead += [(asked.route.locate(*at).ahead_m, agent) for at, agent in meetings if at]
     elif not isinstance(request, wish.CrashRequest) and party.is_exact:
         return first, first_m
@@ -80,18 +77,6 @@ def _to_next_m(party: Party) -> float:
     if party.missing and isinstance(party.request, wish.ConesRequest) and party.request.spacing:
         return party.request.spacing.high_m
     return 0.0
-
-
-def _meets_route(asked: Case, agent: TrafficAgent) -> Point | None:
-    """Return the point where a walk crosses the middle of the ego's route, None without one."""
-    if agent.walk_to_m is None:
-        return None
-    start, end = asked.left_m(agent), asked.route.locate(*agent.walk_to_m).left_m
-    if start * end >= 0.0:
-        return None
-    share = start / (start - end)
-    x_m, y_m = agent.walk_to_m
-    return agent.x_m + share * (x_m - agent.x_m), agent.y_m + share * (y_m - agent.y_m)
 
 
 def check_across(asked: Case) -> Iterator[Finding]:
@@ -142,20 +127,7 @@ def _bounds(asked: Case, lateral: wish.Lateral | None, band: Band, half_box_m: f
         return Bounds(-half_lane_m, half_lane_m, asked.tolerances.edge_m)
     if sign == 0.0:
         return Bounds(0.0, 0.0, asked.tolerances.middle_m)
-    if lateral.offset is not None:
-        near_m, far_m = lateral.offset.low_m, lateral.offset.high_m
-    else:
-        near_m, far_m = {
-            None: (0.0, half_lane_m),
-            wish.Nearness.SLIGHTLY: (0.0, _SLIGHT_M),
-            wish.Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
-            wish.Nearness.HALF_OUT: (half_lane_m, half_lane_m),
-            wish.Nearness.OUTSIDE: (
-                half_lane_m + half_box_m,
-                half_lane_m + half_box_m + _FAR_OUT_M,
-            ),
-        }[lateral.nearness]
-    low_m, high_m = sorted((sign * near_m, sign * far_m))
+    low_m, high_m = find_across(lateral, sign, band.width_m, 2.0 * half_box_m)
     return Bounds(low_m, high_m, asked.tolerances.across_m)
 
 
@@ -169,7 +141,7 @@ def _cones(asked: Case, party: Party, request: wish.ConesRequest, band: Band) ->
     if is_line:
         edge_m = sign * band.width_m / 2.0
         # A cone at a boundary stands inside of it or outside: half a cone to either side.
-        wanted = Bounds(edge_m, edge_m, max(asked.tolerances.across_m, _CONE_M))
+        wanted = Bounds(edge_m, edge_m, max(asked.tolerances.across_m, CONE_M))
     everyone = [*cones, *party.workers]
     yield _across(everyone, middle_m, wanted, subject="the middle of the cones")
     if is_line:

@@ -5,6 +5,7 @@ of `EgoRoute`: ahead along the route from the ego, left across it in its directi
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,10 +20,12 @@ from augment.scene.entities import (
     AreaKind,
     LaneConnector,
     TrafficAgent,
+    TrafficLight,
     TrafficSide,
     TurnType,
 )
 from augment.scene.lane_graph import Beside, best_aligned
+from augment.scene.presets import find_crossing
 
 _SAME_LANE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
@@ -136,7 +139,7 @@ def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, .
 def find_mark(lanes: LanesAcross, mark: intents.MapPlace) -> float | None:
     """Return how far ahead of the ego a place of the map is, None where there is none ahead."""
     if mark is intents.MapPlace.CROSSWALK:
-        return _crosswalk_m(lanes)
+        return next((sum(ends_m) / 2.0 for ends_m in list_crosswalks(lanes)), None)
     route, begins_m = lanes.route, -lanes.route.ego_s_m
     for name, ends_m in zip(route.lane_ids, route.ends_m, strict=True):
         if isinstance(route.graph.lane(name), LaneConnector) and ends_m > 0.0:
@@ -158,16 +161,25 @@ def resolve_spots(intent: intents.Intent, lanes: LanesAcross) -> intents.Intent:
             # Level with its car.
             level = intents.Length(low_m=0.0, high_m=0.0)
             spot = replace(spot, distance=level, relation=intents.Relation.AHEAD)
-        spot = _from_ego(spot, lanes, named)
+        spot = resolve_spot(spot, lanes, named)
         named[request.name] = spot
         requests.append(replace(request, spot=spot))
-    moves = tuple(replace(move, spot=_from_ego(move.spot, lanes, named)) for move in intent.moves)
+    moves = tuple(
+        replace(move, spot=resolve_spot(move.spot, lanes, named)) for move in intent.moves
+    )
     return replace(intent, requests=tuple(requests), moves=moves)
 
 
-def _from_ego(
-    spot: intents.Spot, lanes: LanesAcross, named: dict[str, intents.Spot]
+def resolve_spot(
+    spot: intents.Spot, lanes: LanesAcross, named: Mapping[str, intents.Spot]
 ) -> intents.Spot:
+    """Return a spot with its distance counted from the ego; open where that can't be told.
+
+    Args:
+        spot: As the intent has it.
+        lanes: Of the scene.
+        named: The spots of earlier requests by name, counted from the ego.
+    """
     own, base, is_approximate = spot.span_m, None, False
     if spot.anchor is not None:
         anchor = named[spot.anchor]
@@ -232,14 +244,55 @@ def _fits(
     return abs(place.left_m - band.left_m) <= band.width_m / 2.0
 
 
-def _crosswalk_m(lanes: LanesAcross) -> float | None:
-    """The middle of the first crosswalk that the route leads over."""
-    line, ego_s_m, stations_m = lanes.route.line, lanes.route.ego_s_m, list[float]()
+@dataclass(frozen=True, slots=True, kw_only=True, order=True)
+class Arm:
+    """A lane that leads over a junction and the ego's way at red or without a light.
+
+    Attributes:
+        turns: It does not lead straight on.
+        ahead_m: How far ahead of the ego it crosses the ego's way.
+        connector_id, lane_id: What crosses, and the lane before it.
+        away_m: From the end of that lane to where it crosses.
+    """
+
+    turns: bool
+    ahead_m: float
+    connector_id: str
+    lane_id: str
+    away_m: float
+
+
+def list_arms(lanes: LanesAcross, side: intents.Side | None) -> list[Arm]:
+    """Return the arms from a side, or from any, straight and near ones first."""
+    route, arms = lanes.route, list[Arm]()
+    for connector in route.graph.lanes.values():
+        if not isinstance(connector, LaneConnector) or connector.from_lane is None:
+            continue
+        crossing = find_crossing(connector, route)
+        if crossing is None or connector.traffic_light is TrafficLight.GREEN:
+            continue
+        begin = route.locate(*connector.centerline.position(0.0))
+        is_asked = side is None or (begin.left_m > 0.0) is (side is intents.Side.LEFT)
+        if connector.from_lane in route.graph.lanes and is_asked:
+            arm = Arm(
+                turns=connector.turn_type is not TurnType.STRAIGHT,
+                ahead_m=route.locate(*crossing).ahead_m,
+                connector_id=connector.id,
+                lane_id=connector.from_lane,
+                away_m=connector.centerline.project(*crossing).s_m,
+            )
+            arms.append(arm)
+    return sorted(arms)
+
+
+def list_crosswalks(lanes: LanesAcross) -> list[tuple[float, float]]:
+    """Return where ahead the route leads over crosswalks, nearest first: the near and far edge."""
+    line, ego_s_m, spans_m = lanes.route.line, lanes.route.ego_s_m, []
     way = shapely.LineString(line.between(ego_s_m, line.length_m).points_m)
     for area in lanes.route.scene.areas:
         if area.kind is AreaKind.CROSSWALK:
             part = shapely.intersection(way, shapely.Polygon(area.boundary_m))
             points = shapely.points(shapely.get_coordinates(part))
             ends_m = np.asarray(shapely.line_locate_point(way, points))
-            stations_m += [float(ends_m.min() + ends_m.max()) / 2.0] if len(ends_m) else []
-    return min(stations_m, default=None)
+            spans_m += [(float(ends_m.min()), float(ends_m.max()))] if len(ends_m) else []
+    return sorted(spans_m)

@@ -11,7 +11,7 @@ from enum import StrEnum
 
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import Ground
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
@@ -63,8 +63,6 @@ USUAL = Tolerances(
 
 CRASH_M = 6.0
 """From one crashed vehicle to the next at most: the widest of interPlan's."""
-WORKER_M = 6.0
-"""From a worker to the nearest cone; interPlan's stand 0.8 to 4.0 m off."""
 SPEED_MPS, SPEED_SHARE = 1.0, 0.2
 """Of what moves, whichever is more."""
 MARK_M = 5.0
@@ -263,6 +261,43 @@ class Case:
         return Bounds(wanted.low_m, wanted.high_m, max(self.tolerances.spacing_m, share_m))
 
 
+def assign_parties(
+    ground: Ground,
+    modification: Modification,
+    intent: wish.Intent,
+    lanes: LanesAcross,
+    tolerances: Tolerances = USUAL,
+) -> Case:
+    """Return a modification with who answers what; a move is a request for one vehicle.
+
+    Args:
+        ground: Of the scene before it.
+        modification: What was changed.
+        intent: What was asked for.
+        lanes: Of the intent's route.
+        tolerances: Of the checks.
+    """
+    counted = resolve_spots(intent, lanes)
+    parties, surplus = match_to_requests(counted, modification.added, lanes)
+    moved = {agent.id: agent for agent in modification.moved}
+    picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
+    for move, name in picked:
+        if name in moved:
+            parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
+    gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
+    return Case(
+        ground=ground,
+        modification=modification,
+        lanes=lanes,
+        parties=tuple(parties),
+        surplus=surplus,
+        tolerances=tolerances,
+        to_move=frozenset(name for _, name in picked),
+        to_remove=frozenset(gone),
+        unmet=intent.unmet,
+    )
+
+
 AskedCheck = Callable[[Case], Iterator[Finding]]
 
 
@@ -321,3 +356,15 @@ def hold(
 def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
     """Return the distance from centre to centre."""
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
+
+
+def meets_route(route: EgoRoute, agent: TrafficAgent) -> Point | None:
+    """Return the point where a walk crosses the middle of the ego's route, None without one."""
+    if agent.walk_to_m is None:
+        return None
+    start, end = route.locate_agent(agent).left_m, route.locate(*agent.walk_to_m).left_m
+    if start * end >= 0.0:
+        return None
+    share = start / (start - end)
+    x_m, y_m = agent.walk_to_m
+    return agent.x_m + share * (x_m - agent.x_m), agent.y_m + share * (y_m - agent.y_m)

@@ -25,7 +25,7 @@ from augment.checks.asked_things import (
 from augment.checks.bodies import overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import ChangedScene, Ground
-from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
+from augment.checks.lanes_across import LanesAcross
 from augment.checks.motions import (
     motion_blocked,
     motion_limits,
@@ -33,7 +33,7 @@ from augment.checks.motions import (
     motion_start,
     motion_trigger,
 )
-from augment.checks.parties import USUAL, AskedCheck, Case, Party, Tolerances, match_to_requests
+from augment.checks.parties import USUAL, AskedCheck, Case, Tolerances, assign_parties
 from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, VehicleRequest
@@ -88,38 +88,9 @@ def check_against_intent(
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
         return alone
-    asked = _assign_parties(ground, modification, intent, lanes, tolerances)
+    asked = assign_parties(ground, modification, intent, lanes, tolerances)
     held = [finding for check in ASKED_CHECKS for finding in check(asked)]
     return (*held, *_drop_answered(alone, held, asked))
-
-
-def _assign_parties(
-    ground: Ground,
-    modification: Modification,
-    intent: Intent,
-    lanes: LanesAcross,
-    tolerances: Tolerances,
-) -> Case:
-    """The modification with who answers what; a move is a request for one vehicle elsewhere."""
-    counted = resolve_spots(intent, lanes)
-    parties, surplus = match_to_requests(counted, modification.added, lanes)
-    moved = {agent.id: agent for agent in modification.moved}
-    picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
-    for move, name in picked:
-        if name in moved:
-            parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
-    gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
-    return Case(
-        ground=ground,
-        modification=modification,
-        lanes=lanes,
-        parties=tuple(parties),
-        surplus=surplus,
-        tolerances=tolerances,
-        to_move=frozenset(name for _, name in picked),
-        to_remove=frozenset(gone),
-        unmet=intent.unmet,
-    )
 
 
 def _drop_answered(

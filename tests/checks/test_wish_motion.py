@@ -11,8 +11,8 @@ import pytest
 
 from augment.checks import Ground, Severity
 from augment.checks.lanes_across import LanesAcross, find_picked
-from augment.checks.parties import USUAL
-from augment.checks.registry import _assign_parties, check_against_intent
+from augment.checks.parties import USUAL, assign_parties
+from augment.checks.registry import check_against_intent
 from augment.checks.wish_motion import MotionCase, measure_motion
 from augment.metrics.displacement import displacement
 from augment.scene.entities import AgentType, Modification, TrafficAgent
@@ -139,7 +139,7 @@ def wish_m(slug: str, agent: TrafficAgent) -> float:
     (answer,) = [one for one in motion.others if one.agent.id == agent.id]
     speed_mps = getattr(request, "speed_mps", None)
     case = MotionCase(
-        asked=_assign_parties(ground, change, intent, lanes, USUAL),
+        asked=assign_parties(ground, change, intent, lanes, USUAL),
         motion=motion,
         answer=answer,
         placed=replace(agent, speed_mps=agent.speed_mps if speed_mps is None else speed_mps),

@@ -23,7 +23,10 @@ HEAVY = {
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
     "scipy.interpolate": ("augment.scene",),
-    "scipy.optimize": ("augment.benchmark", "augment.metrics", "arena.pairing"),
+    "scipy.optimize": (
+        *("augment.benchmark", "augment.metrics", "arena.pairing"),
+        "augment.checks.wish_patterns",
+    ),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
     "scipy.spatial": ("augment.formats", "augment.simulation"),

@@ -1,0 +1,161 @@
+"""Objects of one request that hang together: in rows and shapes, or each against another one.
+
+A `Pattern` has a slot for every object, which lie where some numbers within their ranges put
+them; a `Chain` puts each object so far from one before it. Both say where an intent admits the
+objects together, and which of these placements is nearest to another one.
+
+Notation: N slots, M objects (at most N), K numbers. Points are in the scene's frame.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from augment.checks.wish_places import Span
+from augment.geometry.polyline import FloatArray
+from augment.scene.entities import Point
+
+MOST_ORDERED = 5
+"""Objects of which every order is tried."""
+THERE_M = 1e-3
+"""Coordinates are written in millimetres."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pattern:
+    """Slots that depend on a few numbers.
+
+    Attributes:
+        ranges: From and to of each of the K numbers.
+        slots: From the numbers (K,) to the ends of a line per slot, (N, 2, 2), anywhere on which
+            its object may stand; both ends are the same where it is a point.
+    """
+
+    ranges: tuple[Span, ...]
+    slots: Callable[[FloatArray], FloatArray]
+
+    def nearest(self, points: FloatArray, guess: Sequence[float]) -> FloatArray:
+        """Return the nearest placement (M, 2) to points (M, 2).
+
+        Args:
+            points: Where the objects stand, in any order.
+            guess: The numbers (K,) to begin with.
+        """
+        from scipy.optimize import minimize
+
+        low, high = np.array(self.ranges, dtype=np.float64).T
+        numbers = np.clip(np.array(guess, dtype=np.float64), low, high)
+        free = np.flatnonzero(high > low)
+
+        def total_m(values: FloatArray) -> float:
+            tried = numbers.copy()
+            tried[free] = np.clip(values, low[free], high[free])
+            return float(np.hypot(*(self._assign(points, tried) - points).T).sum())
+
+        if len(free) and total_m(numbers[free]) > THERE_M * len(points):
+            # Infinite ranges are searched as far around the guess as anything is looked for.
+            far = np.column_stack([numbers - 60.0, numbers + 60.0])[free]
+            bounds = np.clip(far, low[free, None], high[free, None])
+            starts: list[FloatArray] = [numbers[free], bounds.mean(axis=1)]
+            options: Any = {"xtol": 1e-4, "ftol": 1e-7}
+            results = [
+                minimize(total_m, start, method="Powell", bounds=bounds.tolist(), options=options)
+                for start in starts
+            ]
+            numbers[free] = min(results, key=lambda result: float(result.fun)).x
+        return self._assign(points, numbers)
+
+    def _assign(self, points: FloatArray, numbers: FloatArray) -> FloatArray:
+        """Return where in its slot each point belongs, (M, 2), the sum of all ways the least."""
+        from scipy.optimize import linear_sum_assignment
+
+        ends = self.slots(numbers)
+        begin, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+        # Foot of each point on each slot's line: (M, N) shares of its length, clipped to it.
+        length2 = np.maximum((along**2).sum(axis=1), 1e-12)
+        shares = ((points[:, None] - begin) * along).sum(axis=2) / length2
+        feet = begin + np.clip(shares, 0.0, 1.0)[..., None] * along
+        _, columns = linear_sum_assignment(np.hypot(*(feet - points[:, None]).transpose(2, 0, 1)))
+        return np.asarray(feet[np.arange(len(points)), columns])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """Where an object stands from another one of its chain.
+
+    Attributes:
+        base: The index of that one, which comes before.
+        gap_m: From centre to centre.
+        toward_rad: In which direction, or at most `aside_rad` to either side of it.
+    """
+
+    base: int
+    gap_m: Span
+    toward_rad: float = 0.0
+    aside_rad: float = math.pi
+
+    def nearest(self, base: Point, point: Point) -> Point:
+        """Return the nearest admitted point to another one: in a sector of a ring."""
+        low_m, high_m = self.gap_m
+        dx_m, dy_m = point[0] - base[0], point[1] - base[1]
+        away_m = math.hypot(dx_m, dy_m)
+        turn_rad = math.remainder(math.atan2(dy_m, dx_m) - self.toward_rad, 2.0 * math.pi)
+        inside_rad = min(max(turn_rad, -self.aside_rad), self.aside_rad)
+        # Beside the sector the nearest point lies on its edge, at the foot of the way there.
+        reach_m = away_m * max(math.cos(turn_rad - inside_rad), 0.0)
+        reach_m = min(max(reach_m, low_m), high_m)
+        if inside_rad == turn_rad and reach_m == away_m:
+            return point
+        toward_rad = self.toward_rad + inside_rad
+        return base[0] + reach_m * math.cos(toward_rad), base[1] + reach_m * math.sin(toward_rad)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chain:
+    """A first object with a place of its own, and others that stand so and so far from it.
+
+    Attributes:
+        first: From a point to the nearest one that is admitted for the first object.
+    """
+
+    first: Callable[[Point], Point]
+    links: tuple[Link, ...]
+
+    def nearest(self, points: Sequence[Point]) -> list[Point]:
+        """Return the nearest placement to some points, whichever of them is the first."""
+        orders = [tuple(range(len(points)))]
+        if len(points) <= MOST_ORDERED:
+            orders = list(permutations(orders[0]))
+        placed = [self._place([points[at] for at in order], None) for order in orders]
+        _, order = min((_sum_m(points, p, o), o) for p, o in zip(placed, orders, strict=True))
+        ordered = [points[at] for at in order]
+        best = min(
+            (self._place(ordered, start) for start in (None, *self._starts(ordered))),
+            key=lambda tried: sum(map(math.dist, tried, ordered)),
+        )
+        back = dict(zip(order, best, strict=True))
+        return [back[at] for at in range(len(points))]
+
+    def _starts(self, points: Sequence[Point]) -> list[Point]:
+        """Return where the first may stand as well: where another one would have it stand."""
+        moved = []
+        for link, point in zip(self.links, points[1:], strict=False):
+            base = points[link.base]
+            there = link.nearest(base, point)
+            moved.append((base[0] + point[0] - there[0], base[1] + point[1] - there[1]))
+        sums = [(x + points[0][0], y + points[0][1]) for x, y in moved]
+        return [*moved, *((x / 2.0, y / 2.0) for x, y in sums)]
+
+    def _place(self, points: Sequence[Point], start: Point | None) -> list[Point]:
+        placed = [self.first(start or points[0])]
+        for link, point in zip(self.links, points[1:], strict=False):
+            placed.append(link.nearest(placed[link.base], point))
+        return placed
+
+
+def _sum_m(points: Sequence[Point], placed: Sequence[Point], order: Sequence[int]) -> float:
+    return sum(math.dist(points[at], there) for at, there in zip(order, placed, strict=True))

@@ -1,0 +1,155 @@
+"""Distance to the wish, against values worked out by hand, and its properties."""
+
+import math
+
+import pytest
+
+from augment.checks import Ground
+from augment.checks.wish import measure_wish
+from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.intent import (
+    Bearing,
+    Body,
+    CrashedCar,
+    Intent,
+    LaneChoice,
+    Nearness,
+    Post,
+    Setting,
+    Shape,
+    Side,
+    Spot,
+    VehicleRequest,
+)
+from tests.intents import (
+    CENTRED,
+    LEFT_EDGE,
+    RIGHT_EDGE,
+    cones,
+    crash,
+    metres,
+    parked,
+    towards,
+    walk,
+)
+from tests.scenes import cone, curve, junction, pedestrian, scene, vehicle
+
+STREET, BEND = scene(), curve()
+"""Lanes are 3.5 m wide. The bend begins 10 m ahead, on 40 m to the left."""
+
+
+def bent(ahead_m: float, left_m: float = 0.0) -> tuple[float, float]:
+    """A place on the bend: so far along the lane, left of it."""
+    turn = (ahead_m - 10.0) / 40.0
+    return 10.0 + (40.0 - left_m) * math.sin(turn), 40.0 - (40.0 - left_m) * math.cos(turn)
+
+
+def car(ahead_m: float, left_m: float, number: int = 2) -> TrafficAgent:
+    return vehicle(f"Agent{number}", ahead_m, left_m)
+
+
+def named(*settings: Setting) -> Intent:
+    """One car in the ego's lane at a named place."""
+    where = Spot(lane=LaneChoice.OWN, settings=settings)
+    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, count=1),))
+
+
+def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
+    return tuple(cone(f"Agent{number}", *place) for number, place in enumerate(places, start=2))
+
+
+AT_20 = parked(20.0)
+SIDE = parked(20.0, lateral=towards(LEFT_EDGE, 1.2))
+RANGE = parked(20.0, lateral=towards(LEFT_EDGE, how=Nearness.SLIGHTLY))
+OUTSIDE = parked(20.0, lateral=towards(RIGHT_EDGE, how=Nearness.OUTSIDE))
+ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
+LINE = cones(20.0, 3, Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.0, 3.0))
+ROW = cones(20.0, 3, Shape.ROW, spacing=metres(1.2))
+TAPER = cones(20.0, 3, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, ends_in_middle=True)
+RING = cones(20.0, 4, Shape.RING, spacing=metres(2.0), has_worker=True)
+WORKED = cones(20.0, 2, Shape.ROW, spacing=metres(1.0), has_worker=True, post=Post.BEHIND)
+PAIR = crash(20.0, 2, CrashedCar(gap=metres(4.0), bearing=Bearing.LEFT))
+WALK = walk(20.0, Side.LEFT)
+FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
+
+HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]] = [
+    # One object along the lane and across it.
+    (STREET, AT_20, (car(20.0, 1.5),), [0.0]),
+    (STREET, AT_20, (car(23.0, 0.0),), [3.0]),
+    (STREET, AT_20, (car(23.0, 5.75),), [5.0]),  # 3 m on, 4 m past the lane's edge
+    (STREET, parked(20.0, about=True), (car(21.9, 0.0),), [0.0]),
+    (STREET, parked(20.0, about=True), (car(24.0, 0.0),), [2.0]),
+    (STREET, parked(20.0, lateral=CENTRED), (car(20.0, -0.4),), [0.4]),
+    (STREET, SIDE, (car(20.0, 0.9),), [0.3]),
+    (STREET, SIDE, (car(20.3, 0.8),), [0.5]),
+    (STREET, RANGE, (car(20.0, 1.5),), [0.0]),
+    (STREET, RANGE, (car(20.0, -0.5),), [0.5]),
+    (STREET, OUTSIDE, (car(20.0, -2.75),), [0.0]),  # the box touches the lane
+    (STREET, OUTSIDE, (car(20.0, -2.5),), [0.25]),
+    (STREET, ONCOMING, (car(20.0, 2.0),), [0.0]),
+    (STREET, ONCOMING, (car(20.0, 0.75),), [1.0]),
+    (STREET, AT_20, (), []),
+    # Where the lane bends.
+    (BEND, parked(40.0), (vehicle("Agent2", *bent(40.0, 1.0)),), [0.0]),
+    (BEND, parked(40.0, lateral=CENTRED), (vehicle("Agent2", *bent(40.0, 0.8)),), [0.8]),
+    (BEND, parked(40.0, lateral=CENTRED), (vehicle("Agent2", 40.0, 0.0),), [11.07]),
+    # Objects of one request together.
+    (STREET, LINE, file_of_cones((20, -1.75), (22.5, -1.75), (25, -1.75)), [0.0, 0.0, 0.0]),
+    (STREET, LINE, file_of_cones((20, -1.75), (23, -1.75), (27, -1.75)), [0.0, 0.0, 1.0]),
+    (STREET, LINE, file_of_cones((20, 1.75), (22, 1.75), (24, 1.75)), [3.2, 3.2, 3.2]),
+    (STREET, ROW, file_of_cones((20, 1.2), (20, 0.0), (20, -1.2)), [0.0, 0.0, 0.0]),
+    (STREET, ROW, file_of_cones((21, 1.2), (21, 0.0), (21, -1.2)), [1.0, 1.0, 1.0]),
+    (
+        STREET,
+        TAPER,
+        file_of_cones(*((20 + i * math.sqrt(2.5**2 - 0.75**2), 1.5 - i * 0.75) for i in range(3))),
+        [0.0, 0.0, 0.0],
+    ),
+    (
+        STREET,
+        RING,
+        (
+            *file_of_cones((18.586, 0), (20, -1.414), (21.414, 0), (20, 1.414)),
+            pedestrian("Agent6", 20.0, 2.414),
+        ),
+        [0.0, 0.0, 0.0, 0.0, 1.0],
+    ),
+    (
+        STREET,
+        WORKED,
+        (*file_of_cones((20, 0.5), (20, -0.5)), pedestrian("Agent4", 18.0, 0.0)),
+        [0.0, 0.0, 2.0],
+    ),
+    (STREET, PAIR, (car(20.0, 0.0), car(20.0, 4.0, 3)), [0.0, 0.0]),
+    (STREET, PAIR, (car(20.0, 0.0), car(20.0, 4.5, 3)), [0.0, 0.5]),
+    # People: where they begin, or where they meet the ego's way.
+    (STREET, WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), [0.0]),
+    (STREET, WALK, (pedestrian("Agent2", 18.0, 4.0, (22.0, -4.0)),), [0.0]),
+    (STREET, WALK, (pedestrian("Agent2", 17.0, 6.0, (17.0, -3.0)),), [3.0]),
+    (
+        STREET,
+        FILE,
+        (
+            pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
+            pedestrian("Agent3", 20.0, 4.4, (20.0, -3.0)),
+        ),
+        [0.0, 0.4],
+    ),
+    # Named places: the junction lies 20 to 36 m ahead.
+    (junction(), named(Setting.BEFORE_INTERSECTION), (car(10.0, 0.0),), [0.0]),
+    (junction(), named(Setting.BEFORE_INTERSECTION), (car(22.0, 0.0),), [2.0]),
+    (junction(), named(Setting.IN_INTERSECTION), (car(30.0, 0.0),), [0.0]),
+    (junction(), named(Setting.IN_INTERSECTION), (car(17.5, 0.0),), [2.5]),
+    (junction(), named(Setting.AFTER_INTERSECTION), (car(30.0, 0.0),), [6.0]),
+    (BEND, named(Setting.IN_BEND), (car(-10.0, 0.0),), [6.0]),
+]
+
+
+@pytest.mark.parametrize(("where", "intent", "added", "distances_m"), HAND_COMPUTED)
+def test_the_distance_is_the_way_to_the_nearest_admitted_placement(
+    where: Scene, intent: Intent, added: tuple[TrafficAgent, ...], distances_m: list[float]
+) -> None:
+    found = measure_wish(Ground.of(where), Modification(added=added), intent)
+    assert found is not None
+    assert found.distances_m == pytest.approx(distances_m, abs=0.01)
+    assert (found.missing, found.surplus) == (0 if added else 1, ())
