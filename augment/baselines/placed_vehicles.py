@@ -30,7 +30,7 @@ from augment.scene.intent import (
 )
 from augment.scene.lane_graph import LanePosition
 
-_SIZES_M = {Body.VAN: (5.4, 2.0), Body.TRUCK: (8.0, 2.4)}
+_SIZES_M = {Body.VAN: (5.9, 2.0), Body.TRUCK: (8.0, 2.4)}
 _FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
 _EDGE_GAP_M = 0.1
 """What is left between a box at the edge of a lane and that edge."""
