@@ -19,12 +19,13 @@ from celery import current_app, shared_task
 from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
+from django.contrib.auth.models import User
 from django.db import connection
 from django.db.models import OuterRef, Q, QuerySet, Subquery
 from kombu.exceptions import OperationalError
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
-from augment.models import Augmentation, GenerationJob
+from augment.models import Augmentation, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
 from augment.services.judging.analyses import count_unmeasured, measure_job
@@ -306,3 +307,19 @@ def _lost_after(queue: str) -> timedelta:
         declare = broker.default_channel.queue_declare
         waiting = [int(declare(queue=name).message_count) for name in (queue, QUEUE_BEFORE)]
     return RESEND_AFTER if any(waiting) else timedelta(seconds=settings.STALE_AFTER_S)
+
+
+@shared_task(name="arena.draw_checks", acks_late=True, ignore_result=True)
+def draw_checks(actor_pk: int) -> None:
+    """Draw the attention checks that scenarios with a reference lack; again, none is left."""
+    slugs = list(Scenario.objects.exclude(reference=None).values_list("slug", flat=True))
+    pictures.draw_checks(scenarios=slugs, actor=User.objects.filter(pk=actor_pk).first())
+
+
+def send_checks(actor_pk: int) -> None:
+    """Ask a worker to draw attention checks; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses; nothing is drawn until somebody asks again.
+    """
+    send(draw_checks, actor_pk)

@@ -5,8 +5,8 @@ from random import Random
 
 from arena.models import Board, BoardTable, Study
 from arena.results.exports.board_files import write_table
+from arena.results.services.batches import BatchRequest, open_batch
 from arena.results.services.boards import make_board, publish_table
-from arena.studies.services.batches import BatchRequest, open_batch
 from arena.studies.services.opening import close_study
 from augment.models import Contestant, Scenario
 from tests.study_rows import a_study, contestant, picture, vote

@@ -7,10 +7,10 @@ from rest_framework.authentication import BaseAuthentication
 from rest_framework.permissions import SAFE_METHODS, BasePermission
 from rest_framework.request import Request
 
+from arena.api.tokens import use_api_token
 from arena.errors import TokenOver
 from arena.models import ApiToken
-from arena.people.links import use_api_token
-from arena.people.queries import top_role
+from arena.shell.accounts import top_role
 
 SCHEME = "bearer"
 ADMINS = ("admin",)

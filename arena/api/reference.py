@@ -16,7 +16,7 @@ from arena.api.views import ApiView
 @cache
 def make_document() -> dict[str, Any]:
     """Return the OpenAPI document; it is the same for everybody."""
-    patterns = [path("api/v1/", include("arena.api.urls"))]
+    patterns = [path("api/v1/", include("arena.site.api_urls"))]
     generator = SchemaGenerator(patterns=patterns)  # type: ignore[no-untyped-call]
     document: dict[str, Any] = generator.get_schema(request=None, public=True)  # type: ignore[no-untyped-call]
     return document

@@ -29,7 +29,7 @@ from rest_framework.views import APIView
 from arena.api.access import RoleAllowed
 from arena.api.fields import SoundJSONParser, StrictSerializer
 from arena.exports.formats import Export
-from arena.site.receipts import StoredAnswer, answer_once, digest_body
+from arena.shell.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)

@@ -2,7 +2,12 @@
 
 from django.urls import include, path
 
-urlpatterns = [path("api/v1/", include("arena.api.urls")), path("", include("arena.site.urls"))]
+import arena.tasks  # noqa: F401 - pages send messages of the kinds that it registers
+
+urlpatterns = [
+    path("api/v1/", include("arena.site.api_urls")),
+    path("", include("arena.site.urls")),
+]
 
 handler400 = "arena.config.faults.answer_unreadable"
 handler403 = "arena.config.faults.answer_refused"

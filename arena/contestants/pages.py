@@ -12,11 +12,11 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.contestants.queries import probe_lines, probe_state, show_options
-from arena.people.queries import top_role
-from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
-from arena.site.acts import refusals_in, send_later, wait_for_workers
-from arena.site.forms import RequestForm, offer
-from arena.site.listing import read_listing, read_page
+from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
+from arena.shell.accounts import top_role
+from arena.shell.acts import refusals_in, send_later, wait_for_workers
+from arena.shell.forms import RequestForm, offer
+from arena.shell.listing import read_listing, read_page
 from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints

@@ -74,3 +74,11 @@ def _take_written(sheet: io.StringIO) -> bytes:
     sheet.seek(0)
     sheet.truncate()
     return content
+
+
+SIMULATED = " (simulated)"
+
+
+def show_name(who: Any) -> str:
+    """Return the name of a contestant or a line, with "(simulated)" where that is so."""
+    return f"{who.name}{SIMULATED if who.is_simulated else ''}"

@@ -1,5 +1,6 @@
 """Files that are there whole or not at all."""
 
+import hashlib
 import io
 import os
 import tempfile
@@ -7,7 +8,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from arena.errors import ArenaError
 
@@ -110,3 +111,19 @@ def _entry(name: str) -> zipfile.ZipInfo:
     entry.external_attr = _READABLE
     entry.create_system = _UNIX
     return entry
+
+
+def sha256_hex(content: bytes) -> str:
+    """SHA-256 of a file, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def describe_files(files: Mapping[str, bytes]) -> dict[str, Any]:
+    """Return the hash and the size of each file, for a manifest."""
+    return {
+        name: {"sha256": sha256_hex(content), "bytes": len(content)}
+        for name, content in files.items()
+    }
+
+
+WARNING = "WARNING.txt"

@@ -9,9 +9,9 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
+from arena.exports.written_files import ask_for
 from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
-from arena.results.services.written_files import ask_for
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_change

@@ -38,12 +38,17 @@ from pydantic import TypeAdapter
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
+from arena.exports.written_files import FOLDERS
 from arena.results.exports.closure import TRAVELLING
 from arena.results.exports.study_folder import FORMAT as STUDY
 from arena.results.services import stored_rows
-from arena.results.services.written_files import FOLDERS
+from arena.results.services.restored_rows import (
+    check_row,
+    check_votes,
+    end_restored_work,
+    is_unfinished,
+)
 from arena.serving.readiness import find_unapplied_migrations
-from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
 from augment.services.judging.simulations import list_allowed_planners
 from augment.services.scenarios.pictures import THUMBNAILS

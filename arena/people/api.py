@@ -8,10 +8,11 @@ from rest_framework import serializers
 
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
+from arena.api.tokens import make_api_token
 from arena.api.views import ApiView, Given, operation
-from arena.people.links import accept, find_invitation, make_api_token, make_link_path
-from arena.people.queries import ROLES, role_given, top_role
+from arena.people.links import accept, find_invitation, make_link_path
 from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin
+from arena.shell.accounts import ROLES, role_given, top_role
 
 DAYS = 30
 """Lifetime of the token that a link is exchanged for."""

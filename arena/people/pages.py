@@ -21,22 +21,12 @@ from django.utils.translation import gettext_lazy, ngettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods
 
+from arena.api.tokens import DAYS, REQUESTS, make_api_token, revoke_api_token
 from arena.errors import LinkOver
 from arena.models import ApiToken, Invitation, Study
 from arena.people import links, services
-from arena.people.links import DAYS, REQUESTS, make_api_token, revoke_api_token
-from arena.people.queries import (
-    ROLES,
-    TOKEN_ROLES,
-    Language,
-    by_pseudonym,
-    chosen_language,
-    has_admin,
-    is_forgotten,
-    role_given,
-    top_role,
-)
-from arena.site.access import (
+from arena.people.queries import by_pseudonym, has_admin, is_forgotten
+from arena.shell.access import (
     ADMIN,
     BACKEND,
     CREATED,
@@ -51,8 +41,16 @@ from arena.site.access import (
     get_user,
     keep_secret,
 )
-from arena.site.acts import refusals_in
-from arena.site.forms import offer
+from arena.shell.accounts import (
+    ROLES,
+    TOKEN_ROLES,
+    Language,
+    chosen_language,
+    role_given,
+    top_role,
+)
+from arena.shell.acts import refusals_in
+from arena.shell.forms import offer
 
 ROLE_NAMES = {
     "admin": gettext_lazy("Admin"),

@@ -15,7 +15,8 @@ from django.utils import timezone
 
 from arena.errors import LinkOver
 from arena.models import Person
-from arena.people.queries import ROLES, has_admin, is_forgotten, top_role
+from arena.people.queries import has_admin, is_forgotten
+from arena.shell.accounts import ROLES, top_role
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.services.events import log_change
 from augment.services.texts import one_line

@@ -12,7 +12,6 @@ from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
 
-from arena import tasks
 from arena.api.access import STAFF
 from arena.api.fields import RequestBody
 from arena.api.views import (
@@ -30,11 +29,12 @@ from arena.models.ratings import STORED
 from arena.rating.leaderboard import Line
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import RATING_FILES, download_rating
-from arena.results.queries.access import must_read_results
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
+from arena.shell import sending
 from arena.studies.api import get_study
+from arena.voting.queries.blinding import must_read_results
 from augment.services.inputs import read_request
 
 _FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
@@ -132,10 +132,10 @@ class SnapshotsView(ApiView):
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
             snapshot = rate(study=study, **choices)
-            keep_and_send(lambda: snapshot, tasks.send_charts)
+            keep_and_send(lambda: snapshot, sending.send_charts)
             return snapshot
         plan = partial(plan_snapshot, study=study, **choices)
-        planned, warnings = keep_and_send(plan, tasks.send_snapshot)
+        planned, warnings = keep_and_send(plan, sending.send_snapshot)
         planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
 

@@ -24,7 +24,7 @@ from arena.api.views import (
     operation,
     page_serializer,
 )
-from arena.jobs.exports.sweeps import sweep_sheet
+from arena.scenarios.exports.sweeps import sweep_sheet
 from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment

@@ -10,21 +10,12 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db.models import Case, Count, Q, QuerySet, When
 
-from arena.people.queries import top_role
+from arena.shell.accounts import top_role
+from arena.shell.forms import TypeGroup
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
 from augment.services.scenarios.benchmarks import Split, Stratum, public_origins
 from augment.services.scenarios.scenes import type_choices
 from augment.services.texts import motion_in_words
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TypeGroup:
-    """All scenarios of one type."""
-
-    type: str
-    label: str
-    scenarios: list[Scenario]
-
 
 OWN = "own"
 """The scenarios that are in no set of the catalogue."""

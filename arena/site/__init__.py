@@ -1,1 +1,1 @@
-"""The site itself: home, first steps, audit, health, and what all pages share."""
+"""The top of the site: its addresses, home, first steps, audit and health."""

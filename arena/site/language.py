@@ -7,7 +7,7 @@ from django.http import HttpRequest
 from django.middleware.locale import LocaleMiddleware
 from django.utils import translation
 
-from arena.people.queries import Language
+from arena.shell.accounts import Language
 
 VOTER_VIEWS = frozenset(
     {

@@ -17,19 +17,19 @@ from prometheus_client.registry import Collector
 from arena.jobs import queries
 from arena.models import Study
 from arena.people.pages import keep_language
-from arena.people.queries import Language, Theme, top_role
 from arena.people.services import keep_preference
-from arena.results.queries.access import ResultsAccess, results_access
 from arena.scenarios.queries import count_waiting, submissions_for
 from arena.serving.readiness import look_at_parts, opens_metrics
+from arena.shell.access import ADMIN, act_for, get_user, page_for
+from arena.shell.accounts import Language, Theme, top_role
+from arena.shell.acts import send_later
+from arena.shell.listing import read_listing, read_page
 from arena.site import demo
-from arena.site.access import ADMIN, act_for, get_user, page_for
-from arena.site.acts import send_later
 from arena.site.language import use_english
-from arena.site.listing import read_listing, read_page
 from arena.site.queries import actors, count_failed, distinct, first_steps, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
+from arena.voting.queries.blinding import ResultsAccess, results_access
 from augment.models import Benchmark, Event, GenerationJob
 from augment.services.running.progress import count_each
 from augment.tasks import enqueue_job

@@ -13,7 +13,6 @@ from arena.models import Matchup, Study, Vote
 from augment import models
 from augment.services.running.workers import workforce
 
-CHECK_PERCENT = 2
 NANO = 1e9
 """Money is counted in whole nano-dollars."""
 
@@ -136,11 +135,3 @@ def count_failed() -> int:
     """Count augmentations that failed and can be tried again; nobody waits for a cancelled job."""
     failed = models.Augmentation.objects.filter(state=models.Augmentation.State.FAILED)
     return failed.exclude(job__state=models.GenerationJob.State.CANCELLED).count()
-
-
-def usual_checks() -> int:
-    """Return the usual share of attention checks in percent: none before any are drawn."""
-    is_drawn = models.Augmentation.objects.filter(
-        contestant__kind=models.Contestant.Kind.CHECK
-    ).exists()
-    return CHECK_PERCENT if is_drawn else 0

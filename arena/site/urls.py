@@ -9,6 +9,7 @@ from arena.people import pages as people
 from arena.results.pages import boards, judges
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
+from arena.results.pages.closing import close_page
 from arena.results.pages.comparison import comparison_page
 from arena.results.pages.shared import send_shared, show_shared
 from arena.scenarios.urls import urlpatterns as SCENARIOS
@@ -60,7 +61,7 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/experts/invite/", experts.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
     path(f"{STUDY}/experts/authors/", experts.mark, name="author"),
-    path(f"{STUDY}/close/", studies.close, name="study-close"),
+    path(f"{STUDY}/close/", close_page, name="study-close"),
     path(f"{STUDY}/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path(f"{STUDY}/vote/", voting.vote_page, name="vote"),
     path(f"{STUDY}/vote/practice/", voting.practice_page, name="vote-practice"),

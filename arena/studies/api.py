@@ -11,7 +11,7 @@ from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
 from arena.api.views import ApiView, Given, PageQuery, operation, page_serializer
 from arena.models import Study
-from arena.people.queries import top_role
+from arena.shell.accounts import top_role
 from arena.studies.queries import StudyProgress, count_progress, list_studies
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan

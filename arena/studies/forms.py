@@ -7,7 +7,7 @@ from django import forms
 from django.contrib.auth.models import User
 
 from arena.models import Question, Study
-from arena.site.forms import ChoiceForm, form_field, offer
+from arena.shell.forms import ChoiceForm, form_field, offer
 from arena.studies.queries import list_finished, scenario_sources
 from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import StudyEstimate, estimate_plan

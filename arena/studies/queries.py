@@ -4,16 +4,14 @@ from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import BooleanField, Count, ExpressionWrapper, F, Max, Q, QuerySet
+from django.db.models import Count, F, Q, QuerySet
 from django.utils import timezone
 
 from arena.models import (
     Authorship,
-    EnrolledVoter,
     Enrolment,
     Invitation,
     Matchup,
@@ -24,7 +22,15 @@ from arena.models import (
 )
 from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
-from arena.voting.queries.ballots import ExpertTally, VotingProgress, of_skipped_pair, tallies
+from arena.voting.queries.ballots import (
+    ExpertTally,
+    Voters,
+    VotingProgress,
+    list_voters,
+    of_skipped_pair,
+    tallies,
+)
+from augment import models
 from augment.errors import UnknownName
 from augment.models import (
     Augmentation,
@@ -254,35 +260,6 @@ def expert_lines(study: Study) -> list[ExpertLine]:
 
 # --- Enrolments --------------------------------------------------------------------------------
 
-Voters = QuerySet[Any]
-"""Of EnrolledVoter, with what is counted about each."""
-
-
-def list_voters(study: Study) -> Voters:
-    """Return everybody who ever took a place in a study; one query.
-
-    Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well),
-    `last_vote_at` and `is_done`.
-    """
-    mine = Q(expert__matchups__study=study)
-    skipped = mine & Q(
-        expert__matchups__votes__outcome="skip", expert__matchups__votes__superseded_by=None
-    )
-    answered = skipped | (mine & Q(expert__matchups__votes__question=study.questions[-1]))
-    is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
-    return (
-        EnrolledVoter.objects.filter(enrolment__study=study)
-        .select_related("expert__person", "enrolment")
-        .annotate(
-            planned=Count("expert__matchups", filter=mine, distinct=True),
-            answered=Count("expert__matchups", filter=answered, distinct=True),
-            skipped=Count("expert__matchups", filter=skipped, distinct=True),
-            last_vote_at=Max("expert__matchups__votes__at", filter=mine),
-        )
-        .annotate(is_done=ExpressionWrapper(is_done, output_field=BooleanField()))
-        .order_by("enrolled_at", "pk")
-    )
-
 
 def find_unfinished(study: Study) -> Voters:
     """Return who has a place and pairs without an answer."""
@@ -308,3 +285,14 @@ def state_of(enrolment: Enrolment) -> dict[str, int]:
         dropped=Count("pk", filter=~is_in),
     )
     return state | {"free": max(enrolment.places - state["taken"], 0)}
+
+
+CHECK_PERCENT = 2
+
+
+def usual_checks() -> int:
+    """Return the usual share of attention checks in percent: none before any are drawn."""
+    is_drawn = models.Augmentation.objects.filter(
+        contestant__kind=models.Contestant.Kind.CHECK
+    ).exists()
+    return CHECK_PERCENT if is_drawn else 0

@@ -9,7 +9,7 @@ from django.urls import reverse
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from arena.people.queries import frame_profile
+from arena.shell.accounts import frame_profile
 
 register = template.Library()
 

@@ -23,11 +23,11 @@ from arena.api.fields import (
 from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Vote
 from arena.people.services import keep_voting
-from arena.studies.services.experts import SIDES, Complaint, report
 from arena.voting.queries.ballots import require_open, upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, Decision, receive_vote
+from arena.voting.services.reports import SIDES, Complaint, report
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}

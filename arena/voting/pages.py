@@ -14,13 +14,13 @@ from django.views.decorators.cache import never_cache
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Study, Vote
-from arena.site.access import ADMIN, EXPERT, form_for, get_user, page_for
-from arena.site.pictures import send_picture
-from arena.studies.services.experts import answer_practice, is_due, practice_pairs, skip_practice
+from arena.shell.access import ADMIN, EXPERT, form_for, get_user, page_for
+from arena.shell.pictures import send_picture
 from arena.voting.queries.ballots import own_votes
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import drives_of_pair, picture_shown
 from arena.voting.screen import no_pair_context, vote_context
+from arena.voting.services.practice import answer_practice, is_due, practice_pairs, skip_practice
 
 View = Callable[..., HttpResponseBase]
 

@@ -12,11 +12,10 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
-from arena.studies.queries import list_voters
-from arena.studies.services.experts import SIDES
-from arena.voting.queries.ballots import own_votes, upcoming, voting_progress
+from arena.voting.queries.ballots import list_voters, own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import as_shown
+from arena.voting.services.reports import SIDES
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""

@@ -8,7 +8,7 @@ from drf_spectacular.drainage import GENERATOR_STATS
 from drf_spectacular.validation import validate_schema
 
 from arena.api.reference import make_document
-from arena.api.urls import urlpatterns
+from arena.site.api_urls import urlpatterns
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db

@@ -9,12 +9,12 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from arena.api.urls import urlpatterns
 from arena.models import Invitation, Snapshot
 from arena.people.links import revoke
 from arena.people.services import make_first_link_token
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
+from arena.site.api_urls import urlpatterns
 from arena.studies.services.opening import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import error_of

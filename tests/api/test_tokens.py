@@ -9,11 +9,11 @@ from django.urls import reverse
 from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
+from arena.api import tokens
+from arena.api.tokens import make_api_token
 from arena.models import ApiToken
-from arena.people import links
-from arena.people.links import make_api_token
-from arena.people.queries import effective_role
 from arena.people.services import set_active, set_role
+from arena.shell.accounts import effective_role
 from augment.errors import UnknownName
 from tests.api.asking import error_of
 from tests.api.tokens import program, program_of, secret_of
@@ -40,7 +40,7 @@ def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
     shown = page.post(reverse("api-tokens"), given).content.decode()
     row = ApiToken.objects.get()
     secret = shown.partition('id="secret" value="')[2].partition('"')[0]
-    assert secret.startswith(links.PREFIX)
+    assert secret.startswith(tokens.PREFIX)
     assert role_at(program(secret)) == "researcher"
     stored = [str(value) for value in ApiToken.objects.values_list().get()]
     assert not any(secret in value for value in stored)
@@ -142,7 +142,7 @@ def test_a_token_needs_no_csrf_token_and_a_session_does() -> None:
 
 
 def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(links.REQUESTS, "expert", 3)
+    monkeypatch.setitem(tokens.REQUESTS, "expert", 3)
     accounts = people()
     asking, other = program_of(accounts["expert"]), program_of(accounts["researcher"])
     assert ApiToken.objects.exclude(last_used_at=None).count() == 0
@@ -164,4 +164,4 @@ def test_a_request_is_counted_by_one_statement_so_that_none_between_is_refused(
     for began in (None, timezone.now() - timedelta(seconds=61), timezone.now()):
         ApiToken.objects.update(window_began_at=began)
         with django_assert_num_queries(3):  # the token with its owner, their roles, the count
-            links.use_api_token(secret)
+            tokens.use_api_token(secret)

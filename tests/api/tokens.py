@@ -3,8 +3,8 @@
 from django.contrib.auth.models import User
 from django.test import Client
 
-from arena.people.links import make_api_token
-from arena.people.queries import top_role
+from arena.api.tokens import make_api_token
+from arena.shell.accounts import top_role
 
 
 def secret_of(user: User, role: str | None = None) -> str:

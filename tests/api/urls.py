@@ -9,6 +9,6 @@ def image(request: HttpRequest, token: str) -> HttpResponse:
 
 
 urlpatterns = [
-    path("api/v1/", include("arena.api.urls")),
+    path("api/v1/", include("arena.site.api_urls")),
     path("i/<str:token>", image, name="matchup-image"),
 ]

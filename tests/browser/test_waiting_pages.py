@@ -11,7 +11,7 @@ from pytest_django import Settings
 from pytest_django.live_server_helper import LiveServer
 
 from arena.models import BenchmarkFile, Study
-from arena.scenarios.exports import BENCHMARK_FILES
+from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from augment.models import BaseScene, SceneUpload
 from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.scenarios.pictures import draw_scene

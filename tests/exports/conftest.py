@@ -7,5 +7,5 @@ import pytest
 def drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw every chart that is asked for; no file keeps one."""
     monkeypatch.setattr(
-        "arena.results.exports.drawing.compute_once", lambda suffix, compute, *parts: compute()
+        "arena.exports.drawing.compute_once", lambda suffix, compute, *parts: compute()
     )

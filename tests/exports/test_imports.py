@@ -9,7 +9,7 @@ from arena.models import ImportedVote, Study, VoteFile
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.vote_files import import_votes
+from arena.studies.services.importing import import_votes
 from augment.models import Event
 
 pytestmark = pytest.mark.django_db

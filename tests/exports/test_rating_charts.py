@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from arena import tasks
+from arena.exports.drawing import SIMULATED
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     DisplacementSummary,
@@ -30,10 +30,10 @@ from arena.results.exports.charts import (
     scatter_chart,
     type_charts,
 )
-from arena.results.exports.drawing import SIMULATED
 from arena.results.exports.tables import Row, leaderboard_table
 from arena.results.exports.writers import CHARTS
 from arena.results.services.ratings import rate_now as rate
+from arena.shell import sending
 from tests.full_study import Size, full_study
 from tests.web.cast import people, signed_in
 
@@ -108,7 +108,7 @@ def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None
 def test_a_worker_draws_the_charts_and_pages_only_read_them(
     snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    draw, what = tasks.send_charts.args  # the message
+    draw, what = sending.send_charts.args  # the message
     draw(what, snapshot.pk)
     monkeypatch.setattr("arena.results.exports.charts.write_figure", None)
     reader = signed_in(people()["researcher"])

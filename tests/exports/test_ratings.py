@@ -6,10 +6,11 @@ from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
 from arena.people.services import create_person
 from arena.results.pages.tabs import describe
-from arena.results.queries.access import ResultsAccess, ready_snapshots, results_access
+from arena.results.queries.access import ready_snapshots
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
+from arena.voting.queries.blinding import ResultsAccess, results_access
 from arena.voting.services.simulation import simulate_votes
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario

@@ -14,9 +14,9 @@ from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
+from arena.exports.written_files import MadeFile, keep_file
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
-from arena.results.services.written_files import MadeFile, keep_file
 from arena.studies.services.opening import product_version
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob

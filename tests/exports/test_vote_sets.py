@@ -9,7 +9,9 @@ import pytest
 from django.template.loader import render_to_string
 from pyarrow import parquet
 
+from arena.exports.files import sha256_hex
 from arena.models import Snapshot, Study, Vote
+from arena.rating.vote_columns import COLUMNS
 from arena.results.api import SnapshotDocument
 from arena.results.exports.tables import leaderboard_table, method_text
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
@@ -19,7 +21,7 @@ from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import Filters, last_vote_id, vote_set
 from arena.results.services.ratings import plan_snapshot, read_votes
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.vote_files import COLUMNS, sha256_hex, vote_rows, votes_csv
+from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Scenario

@@ -13,7 +13,7 @@ from django.test import Client
 from django.urls import URLPattern, URLResolver, get_resolver, reverse
 
 from arena.models import BenchmarkFile, Study
-from arena.scenarios.exports import BENCHMARK_FILES
+from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Benchmark, Scenario, Submission
 from augment.scene.codec import modification_to_document

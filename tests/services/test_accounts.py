@@ -4,8 +4,9 @@ import pytest
 from django.contrib.auth.models import Group, User
 from pytest_django import DjangoAssertNumQueries
 
-from arena.people.queries import AccountBackend, has_admin, top_role
+from arena.people.queries import AccountBackend, has_admin
 from arena.people.services import create_person
+from arena.shell.accounts import top_role
 
 pytestmark = pytest.mark.django_db
 

@@ -8,9 +8,10 @@ from django.utils import timezone
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
 from arena.people.services import create_person
-from arena.studies.queries import list_voters, state_of
+from arena.studies.queries import state_of
 from arena.studies.services.opening import close_study
 from arena.studies.services.taking_part import drop_silent, enrol, forget_identity, set_enrolment
+from arena.voting.queries.ballots import list_voters
 from augment.errors import Conflict
 from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote

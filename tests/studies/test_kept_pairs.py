@@ -5,8 +5,8 @@ import uuid
 import pytest
 
 from arena.models import Matchup
-from arena.studies.services.experts import Complaint, report
 from arena.studies.services.taking_part import hand_over
+from arena.voting.services.reports import Complaint, report
 from tests.opening import open_study
 from tests.study_rows import cast_of, matchups_of, vote
 

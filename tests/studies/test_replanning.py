@@ -8,8 +8,8 @@ import pytest
 from arena.errors import NotYours
 from arena.models import Study
 from arena.pairing.order import MAIN
-from arena.studies.services.experts import Complaint, report
 from arena.studies.services.taking_part import hand_over
+from arena.voting.services.reports import Complaint, report
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
 from tests.opening import open_study

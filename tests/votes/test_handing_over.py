@@ -13,9 +13,9 @@ from django.db import connection
 
 from arena.errors import NothingToPlan, NotYours
 from arena.models import Matchup, Report, Study, Vote
-from arena.studies.services.experts import Complaint, report
 from arena.studies.services.taking_part import hand_over
 from arena.voting.services.casting import Decision, receive_vote
+from arena.voting.services.reports import Complaint, report
 from augment.models import Event
 from tests.study_rows import a_study
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from django.urls import reverse
 
-from arena.api.urls import urlpatterns as API
 from arena.models import Authorship, Board
 from arena.people.links import invite, mark_author
+from arena.site.api_urls import urlpatterns as API
 from arena.site.urls import urlpatterns
 from arena.studies.services.drafts import keep_draft
 from augment.models import (

@@ -10,7 +10,7 @@ from django.urls import reverse
 from pytest_django import Settings
 
 from arena.models import BenchmarkFile
-from arena.scenarios.exports import BENCHMARK_FILES
+from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from augment.models import Benchmark
 from augment.scene.codec import modification_from_document
 from tests.services.test_benchmarks import add_street

@@ -7,9 +7,10 @@ from django.urls import reverse
 
 from arena.errors import NoSnapshot, StudyNotOpen
 from arena.models import Study, Vote
-from arena.results.queries.access import ResultsAccess, results_access, snapshot_to_export
+from arena.results.queries.access import snapshot_to_export
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import cancel_study, close_study
+from arena.voting.queries.blinding import ResultsAccess, results_access
 from augment.errors import Conflict
 from augment.models import Event
 from tests import study_rows

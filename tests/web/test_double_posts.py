@@ -17,10 +17,10 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.api.urls import urlpatterns as OPERATIONS
 from arena.models import ApiToken, Receipt, Study
 from arena.results.services.ratings import rate_now
-from arena.site import receipts
+from arena.shell import receipts
+from arena.site.api_urls import urlpatterns as OPERATIONS
 from arena.site.urls import urlpatterns as PAGES
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Benchmark, EndpointModel, GenerationJob, Scenario

@@ -26,7 +26,7 @@ def researcher(monkeypatch: pytest.MonkeyPatch) -> Client:
     monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_job", run_job)
-    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.shell.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["researcher"])
 
 

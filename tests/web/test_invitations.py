@@ -9,9 +9,10 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
+from arena.api.tokens import make_api_token
 from arena.config.logs import HideKeys
 from arena.models import Invitation, Study
-from arena.people.links import invite, make_api_token
+from arena.people.links import invite
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 

@@ -7,8 +7,8 @@ from django.urls import reverse
 
 from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
-from arena.studies.services.experts import practice_pairs
 from arena.voting.queries.ballots import voting_progress
+from arena.voting.services.practice import practice_pairs
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

@@ -3,8 +3,9 @@
 import pytest
 from django.utils.translation import override
 
+from arena.api.tokens import make_api_token
 from arena.models import Snapshot
-from arena.people.links import invite, make_api_token
+from arena.people.links import invite
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import RATINGS, plan_snapshot
 from arena.studies.services.taking_part import hand_over

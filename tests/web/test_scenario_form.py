@@ -32,7 +32,7 @@ def reader(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
     monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scene", draw_scene)
     monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scenario", draw_scenario)
-    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.shell.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["researcher"])
 
 

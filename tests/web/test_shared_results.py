@@ -11,7 +11,7 @@ from django.urls import reverse
 from arena.models import SharedRating, Snapshot, Study
 from arena.results.services.boards import make_board, share_board
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.vote_files import import_votes
+from arena.studies.services.importing import import_votes
 from augment.models import Event
 from tests import study_rows
 from tests.web.cast import people, signed_in

@@ -4,8 +4,9 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena import tasks
 from arena.models import Study
+from arena.studies.pages import setup
+from augment import tasks
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
@@ -98,7 +99,7 @@ def test_attention_checks_are_drawn_by_a_worker_with_one_click(
     place.save()
     study_rows.scenario("without")
     sent: list[int] = []
-    monkeypatch.setattr(tasks, "send_checks", sent.append)
+    monkeypatch.setattr(setup, "send_checks", sent.append)
     admin = people()["admin"]
     entered = {"name": "Half filled in", "draw": "1"}
     shown = signed_in(admin).post(reverse("study-new"), entered).content.decode()

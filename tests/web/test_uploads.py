@@ -35,7 +35,7 @@ def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks:
     )
     for page in ("uploads", "editor"):
         monkeypatch.setattr(f"arena.scenarios.pages.{page}.enqueue_scene", pictures.draw_scene)
-    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.shell.acts.transaction.on_commit", lambda done: done())
 
 
 def send(client: Client, content: bytes = STREET, name: str = "street.json") -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from arena.exports.cells import show_name
+from arena.exports.drawing import MARK, draw_once, house_style, name_lines, write_figure
 from arena.exports.formats import (
     Columns,
     Dtype,
@@ -16,8 +18,6 @@ from arena.exports.formats import (
     make_sheet,
     table_formats,
 )
-from arena.results.exports.drawing import MARK, draw_once, house_style, name_lines, write_figure
-from arena.results.exports.tables import show_name
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     HORIZON_S,

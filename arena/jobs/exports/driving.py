@@ -3,10 +3,10 @@
 from functools import partial
 from typing import Any
 
+from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, escape, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from arena.results.exports.tables import show_name
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
 from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
 

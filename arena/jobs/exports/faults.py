@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from django.db.models import Count, Q
 
+from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, latex_values
 from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
-from arena.results.exports.tables import show_name
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
 

@@ -10,18 +10,16 @@ from pathlib import Path
 from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
-from arena.exports.files import zip_bytes
+from arena.exports.files import WARNING, describe_files, zip_bytes
 from arena.exports.formats import Format, formats, json_bytes
+from arena.exports.written_files import FileWork, MadeFile
 from arena.models import ScenarioFile
-from arena.results.services.vote_files import describe_files
-from arena.results.services.written_files import FileWork, MadeFile
 from arena.studies.services.opening import product_version
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Archive, export_job
 from augment.services.running.transcript_records import make_record, tries_by_augmentation
 
 MANIFEST = "manifest.json"
-WARNING = "WARNING.txt"
 WRITTEN_WITH = ("numpy", "scenariogeneration", "shapely", "PyYAML")
 """What the bytes of the files depend on besides our own code."""
 

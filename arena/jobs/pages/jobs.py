@@ -13,10 +13,10 @@ from arena.jobs.exports.realism import realism_context
 from arena.jobs.pages.measures import ask_to_measure, displacement_section, driving_section
 from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
-from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
-from arena.site.forms import CapsForm
-from arena.site.listing import choice_asked, page_asked, read_listing, read_page, search_asked
+from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
+from arena.shell.acts import Confirmation, ask, is_sure, refusals_told, send_later
+from arena.shell.forms import CapsForm
+from arena.shell.listing import choice_asked, page_asked, read_listing, read_page, search_asked
 from augment.models import Augmentation, GenerationJob
 from augment.services.inputs import read_request
 from augment.services.judging.analyses import repeatability

@@ -18,10 +18,11 @@ from arena.jobs.exports.faults import fault_table
 from arena.jobs.pages.jobs import job_crumbs
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
-from arena.people.queries import by_pseudonym, experts, top_role
-from arena.site.access import ADMIN, EXPERT, STAFF, form_for, get_user
-from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
-from arena.site.forms import offer
+from arena.people.queries import by_pseudonym, experts
+from arena.shell.access import ADMIN, EXPERT, STAFF, form_for, get_user
+from arena.shell.accounts import top_role
+from arena.shell.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
+from arena.shell.forms import offer
 from arena.voting.queries.showings import original_beside
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass

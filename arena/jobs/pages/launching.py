@@ -14,9 +14,9 @@ from django.shortcuts import redirect, render
 
 from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
-from arena.site.access import ADMIN, form_for, get_user
-from arena.site.acts import refusals_in, send_later
-from arena.site.forms import ChoiceForm, Offer, offer
+from arena.shell.access import ADMIN, form_for, get_user
+from arena.shell.acts import refusals_in, send_later
+from arena.shell.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
 from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.inputs import read_request, read_values, to_inputs

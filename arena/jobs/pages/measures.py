@@ -18,7 +18,6 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
 from django.views.decorators.http import require_POST
 
-from arena import tasks
 from arena.exports.files import CONTENT_TYPE
 from arena.exports.formats import TABLE_FORMATS, download
 from arena.jobs.exports import displacement, driving
@@ -27,9 +26,10 @@ from arena.jobs.exports.tables import JOB_FILES
 from arena.jobs.queries import find_unmodified_drive
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, allow_only, get_user, page_for
-from arena.site.acts import looks_again, refusals_told, send_later
-from arena.site.listing import choice_asked, read_page
+from arena.shell import sending
+from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
+from arena.shell.acts import looks_again, refusals_told, send_later
+from arena.shell.listing import choice_asked, read_page
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import driving_scores, simulations
 from augment.services.judging.analyses import ANALYSES, SEED, count_unmeasured, read_answers
@@ -204,7 +204,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
         raise Http404
     with refusals_told(request), transaction.atomic():
         row = ask_for_file(job=job, file_format=form, actor=get_user(request))
-        send_later(request, tasks.send_scenario_file, row.pk)
+        send_later(request, sending.send_scenario_file, row.pk)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     return redirect("job-tab", code=code, tab="files")
 

@@ -13,8 +13,8 @@ from arena.management.commands.serve import INTERRUPTED
 from arena.models import Snapshot
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
+from arena.shell.sending import send_charts
 from arena.site.demo import JOB, list_slugs
-from arena.tasks import send_charts
 from augment.services.terminal import TerminalCommand, at_least
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."

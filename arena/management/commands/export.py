@@ -11,7 +11,7 @@ from arena.management.exporting import KINDS, ExportedFile, add_kinds
 from arena.results.exports.board_files import board_folder, write_folder
 from arena.results.exports.study_folder import write_study
 from arena.results.services.boards import board_named
-from arena.scenarios.exports import write_benchmark
+from arena.scenarios.exports.benchmarks import write_benchmark
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.scenarios.benchmarks import find_benchmark

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from arena.results.services.vote_files import import_votes
+from arena.studies.services.importing import import_votes
 from augment.services.terminal import TerminalCommand
 
 

@@ -5,7 +5,7 @@ from typing import Any
 from django.core.management.base import CommandParser
 
 from arena.models import Study
-from arena.site.queries import usual_checks
+from arena.studies.queries import usual_checks
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
 from augment.services.inputs import add_options

@@ -11,10 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arena.models import Snapshot
-from arena.rating.lines import whole_percent
-from arena.rating.snapshot_document import PairRecord, TypeRating
-from arena.results.exports.drawing import (
+from arena.exports.drawing import (
     INK,
     MARK,
     SIMULATED,
@@ -26,6 +23,9 @@ from arena.results.exports.drawing import (
     name_lines,
     write_figure,
 )
+from arena.models import Snapshot
+from arena.rating.lines import whole_percent
+from arena.rating.snapshot_document import PairRecord, TypeRating
 from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
 from arena.results.services.analysis import FEW_VOTES
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
 
-from arena.results.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
-from arena.results.exports.tables import show_name
+from arena.exports.cells import show_name
+from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from augment.errors import check_names
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running.progress import list_cells

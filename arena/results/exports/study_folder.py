@@ -21,7 +21,7 @@ from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
 from arena.results.exports.writers import bundle_files
 from arena.results.services import stored_rows
-from arena.site.services import UNFINISHED
+from arena.results.services.restored_rows import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.analyses import measure_job

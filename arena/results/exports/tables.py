@@ -9,6 +9,7 @@ from typing import Any
 
 from django.db.models import F
 
+from arena.exports.cells import show_name
 from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import snapshot_values
 from arena.rating.lines import Line, hide_ranks, notes_by_reason, says_no_order, votes_text
@@ -19,16 +20,10 @@ from arena.results.queries.votes import LeftOut
 from arena.studies.services.opening import preregistration_sha256
 from arena.studies.services.plan import HypothesisAnswer, answer_hypotheses
 
-SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
 EARLY_LOOK = "Early look: the study was still open."
 APART = -1
 """The part of those who are rated with nobody."""
-
-
-def show_name(who: Any) -> str:
-    """Return the name of a contestant or a line, with "(simulated)" where that is so."""
-    return f"{who.name}{SIMULATED if who.is_simulated else ''}"
 
 
 def is_closed_form(rating: Snapshot) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from arena.exports.cells import csv_parts
 from arena.exports.formats import Dtype, Sheet, formats, sheet_csv, sheet_parquet
 from arena.models import Snapshot, Study
+from arena.rating import vote_columns
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
 from arena.results.queries.votes import RATED, Filters, RatedVote, current_votes, last_vote_id
@@ -13,7 +14,7 @@ from arena.results.services.ratings import read_votes, votes_version
 
 _KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
-LIST_COLUMNS = (*vote_files.COLUMNS, "mark", "reason", "vote")
+LIST_COLUMNS = (*vote_columns.COLUMNS, "mark", "reason", "vote")
 """Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
 was skipped, and the code in its address."""
 
@@ -37,11 +38,11 @@ def list_unrated(study: Study) -> Sheet:
     current = [vote for filters in asked for vote in current_votes(study, filters, last)]
     decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
-    return _sheet(vote_files.vote_rows(decided, names), vote_files.VERSION)
+    return _sheet(vote_files.vote_rows(decided, names), vote_columns.VERSION)
 
 
 def _sheet(rows: Iterator[vote_files.Row], version: int) -> Sheet:
-    names = vote_files.vote_columns(version)
+    names = vote_columns.vote_columns(version)
     return Sheet(
         name="votes",
         columns={name: _KINDS.get(name, Dtype.TEXT) for name in names},

@@ -13,7 +13,7 @@ from django.http import Http404, HttpResponse
 from django.utils.text import slugify
 
 from arena.exports.cells import csv_text
-from arena.exports.files import zip_bytes
+from arena.exports.files import describe_files, zip_bytes
 from arena.exports.formats import (
     Export,
     Format,
@@ -37,7 +37,6 @@ from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import LeaderboardTable, Row, is_closed_form, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.services.vote_files import describe_files
 from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import HypothesisAnswer
 from augment.errors import UnknownName, check_names

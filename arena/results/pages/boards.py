@@ -18,12 +18,12 @@ from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
 from arena.results.exports.board_files import board_folder, table_rows, write_table
 from arena.results.pages.plots import plot
-from arena.results.queries.access import refuse_open_judge
+from arena.results.services.batches import BatchRequest, open_batch, possible_newcomers
 from arena.results.services.boards import LONGEST_NAME, make_board, publish_table, share_board
-from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, keep_secret, page_for
-from arena.site.acts import refusals_in, tell_errors
-from arena.site.forms import RequestForm, offer
-from arena.studies.services.batches import BatchRequest, open_batch, possible_newcomers
+from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, keep_secret, page_for
+from arena.shell.acts import refusals_in, tell_errors
+from arena.shell.forms import RequestForm, offer
+from arena.voting.queries.blinding import refuse_open_judge
 from augment.models import Benchmark
 from augment.services.inputs import read_request, to_inputs
 from augment.services.scenarios.benchmarks import list_remarks

@@ -11,7 +11,7 @@ from arena.models import Snapshot, Study
 from arena.results.pages.plots import plot
 from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.pages.tabs import describe
-from arena.site.access import STAFF, page_for
+from arena.shell.access import STAFF, page_for
 
 
 class OtherStudyForm(forms.Form):

@@ -10,17 +10,18 @@ from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, St
 from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
 
+from arena.exports.cells import show_name
 from arena.models import Matchup, Snapshot, Study
 from arena.people.queries import natural_order
-from arena.results.exports.tables import show_name
 from arena.results.exports.votes import vote_list_csv
 from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import vote_page
 from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
-from arena.results.queries.votes import AUTOMATIC, COUNTED, RatedVote, is_imported
-from arena.site.access import STAFF, page_for
-from arena.site.listing import page_asked
-from arena.site.pictures import resize_picture
+from arena.results.queries.votes import AUTOMATIC, COUNTED, RatedVote
+from arena.shell.access import STAFF, page_for
+from arena.shell.listing import page_asked
+from arena.shell.pictures import resize_picture
+from arena.voting.queries.blinding import is_imported
 from arena.voting.queries.showings import picture_of_side
 from augment.services.scenarios.scenes import type_choices
 

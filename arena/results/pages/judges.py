@@ -18,10 +18,9 @@ from arena.rating.agreement import AgreementLine, agreement_sentence, share_text
 from arena.results.exports.judges import judge_answers_csv
 from arena.results.pages.ratings import get_readable_study
 from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines
-from arena.results.queries.votes import is_imported
 from arena.results.services.judges import estimate_study_judge, judge_agreement, start_judge
-from arena.site.access import ADMIN, STAFF, act_for, get_user, page_for
-from arena.site.acts import (
+from arena.shell.access import ADMIN, STAFF, act_for, get_user, page_for
+from arena.shell.acts import (
     Confirmation,
     ask,
     is_sure,
@@ -30,7 +29,8 @@ from arena.site.acts import (
     wait_for_workers,
     wants_to_change,
 )
-from arena.site.forms import RequestForm, offer
+from arena.shell.forms import RequestForm, offer
+from arena.voting.queries.blinding import is_imported
 from augment.models import EndpointModel, JudgeRun
 from augment.services.inputs import read_request, to_inputs
 from augment.services.running.judge_runs import JudgeEstimate, JudgeRequest, cancel_judge

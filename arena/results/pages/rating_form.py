@@ -8,13 +8,13 @@ from django.contrib import messages
 from django.db import transaction
 from django.http import HttpRequest
 
-from arena import tasks
 from arena.models import Question, Snapshot, Study
 from arena.rating.rules import METHOD_TEXTS
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
-from arena.site.acts import send_later
-from arena.site.forms import RequestForm, offer
+from arena.shell import sending
+from arena.shell.acts import send_later
+from arena.shell.forms import RequestForm, offer
 from augment.services.inputs import to_inputs
 from augment.services.scenarios.scenes import type_choices
 
@@ -58,9 +58,9 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
         AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
     """
     if not is_big(study):
-        send_later(request, tasks.send_charts, rate_now(study=study, **choices).pk)
+        send_later(request, sending.send_charts, rate_now(study=study, **choices).pk)
         return
     with transaction.atomic():
         planned = plan_snapshot(study=study, **choices)
-        transaction.on_commit(partial(tasks.send_snapshot, planned.pk))
+        transaction.on_commit(partial(sending.send_snapshot, planned.pk))
     messages.success(request, "The rating is being computed.")

@@ -9,29 +9,23 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.text import slugify
 
-from arena import tasks
 from arena.errors import NoSnapshot
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
-from arena.people.queries import top_role
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHART_FORMATS, download_rating
 from arena.results.pages.rating_form import RatingForm, rate_or_send
 from arena.results.pages.tabs import FOR_EXPERTS, TABS, describe
-from arena.results.queries.access import (
-    ResultsAccess,
-    list_snapshots,
-    results_access,
-    snapshot_to_export,
-    votes_in,
-)
-from arena.results.queries.votes import is_imported
+from arena.results.queries.access import list_snapshots, snapshot_to_export
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
 from arena.results.services.sharing import share_rating, stop_sharing
-from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, get_user, page_for
-from arena.site.acts import refusals_told, tell_errors, wait_for_workers
+from arena.shell import sending
+from arena.shell.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, get_user, page_for
+from arena.shell.accounts import top_role
+from arena.shell.acts import refusals_told, tell_errors, wait_for_workers
 from arena.studies.pages.studies import export_place
+from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access, votes_in
 from augment.services.inputs import read_request
 
 SHOWN = 12
@@ -103,7 +97,7 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> N
     study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     snapshot.wait_again(progress=0)
-    tasks.send_snapshot(snapshot.pk)
+    sending.send_snapshot(snapshot.pk)
 
 
 @act_for(*STAFF, back="results")

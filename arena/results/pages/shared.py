@@ -11,8 +11,8 @@ from arena.models import Snapshot, Study
 from arena.results.exports.tables import for_experts, leaderboard_table
 from arena.results.exports.writers import FORMATS
 from arena.results.pages.tabs import describe, fill_table
-from arena.results.queries.access import refuse_open_judge
-from arena.site.access import keep_secret
+from arena.shell.access import keep_secret
+from arena.voting.queries.blinding import refuse_open_judge
 
 DATA = {form: FORMATS[form] for form in ("csv", "json")}
 

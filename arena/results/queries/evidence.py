@@ -16,10 +16,10 @@ from arena.results.queries.votes import (
     Filters,
     RatedVote,
     current_votes,
-    is_imported,
     list_ties_unshown,
     select_counted_votes,
 )
+from arena.voting.queries.blinding import is_imported
 from augment.models import Augmentation
 
 PER_PAGE = 10

@@ -8,7 +8,8 @@ from django.db.models import Count, F, Q, QuerySet, Sum
 from django.db.models.functions import Coalesce
 
 from arena.models import Matchup, Study
-from arena.results.queries.votes import COUNTED, Filters, current_votes, is_imported, last_vote_id
+from arena.results.queries.votes import COUNTED, Filters, current_votes, last_vote_id
+from arena.voting.queries.blinding import is_imported
 from augment.models import Contestant, JudgeRun, ModelCall, PairJudgement
 from augment.services.endpoints.known_models import vendor_family
 from augment.services.running.judge_runs import Exchange, ShownPair, combine_answers, exchange

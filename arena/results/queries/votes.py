@@ -16,6 +16,7 @@ from django.db.models.fields import CharField
 from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.rules import Entry, draw_ties, make_grid, scenario_at
+from arena.voting.queries.blinding import is_imported
 from augment.errors import check_names
 from augment.models import Contestant
 from augment.services.scenarios.scenes import ScenarioType
@@ -206,11 +207,6 @@ class VoteSet:
     checks: tuple[RatedVote, ...]
     references: frozenset[str]
     left_out: dict[str, int]
-
-
-def is_imported(study: Study) -> bool:
-    """Return whether the votes came from a file."""
-    return hasattr(study, "vote_file")
 
 
 def last_vote_id(study: Study) -> int | None:

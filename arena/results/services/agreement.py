@@ -7,8 +7,9 @@ from arena.jobs.queries import list_shown_ids
 from arena.models import Snapshot, Study
 from arena.rating import agreement
 from arena.results.queries.judges import judge_preferences
-from arena.results.queries.votes import COUNTED, Filters, RatedVote, current_votes, is_imported
+from arena.results.queries.votes import COUNTED, Filters, RatedVote, current_votes
 from arena.results.services.analysis import SCORES
+from arena.voting.queries.blinding import is_imported
 from augment.services.judging.metric_scores import metric_scores
 
 

@@ -30,7 +30,8 @@ from arena.rating.snapshot_document import (
     TypeRating,
     TypeStanding,
 )
-from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote, is_imported
+from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote
+from arena.voting.queries.blinding import is_imported
 from augment.services.judging.displacement import of_rows, summarise
 from augment.services.scenarios.scenes import in_type_order, type_label
 

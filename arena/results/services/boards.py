@@ -11,6 +11,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import StudyStillOpen
+from arena.exports.files import sha256_hex
 from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
 from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy, anchor_lines
@@ -29,7 +30,7 @@ from arena.results.queries.votes import (
 from arena.results.services.analysis import count_settled_ties, vote_arrays
 from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
-from arena.results.services.vote_files import sha256_hex, vote_rows, votes_csv
+from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.queries import author_pairs
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName

@@ -13,6 +13,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.errors import StudyStillOpen
+from arena.exports.files import sha256_hex
 from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
 from arena.models.ratings import snapshot_values
 from arena.rating.comparisons import Comparisons
@@ -27,17 +28,17 @@ from arena.rating.rules import (
 )
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Results
+from arena.rating.vote_columns import VERSION as VOTES_VERSION
 from arena.results.queries import votes as vote_queries
-from arena.results.queries.access import votes_in
 from arena.results.services import analysis
 from arena.results.services.agreement import rater_agreement
 from arena.results.services.analysis import VoteArrays, vote_arrays
 from arena.results.services.settled import remark_on_ties
 from arena.results.services.trust import board_remarks, trust
-from arena.results.services.vote_files import VERSION as VOTES_VERSION
-from arena.results.services.vote_files import sha256_hex, vote_rows, votes_csv
+from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.queries import author_pairs
 from arena.studies.services.opening import product_version
+from arena.voting.queries.blinding import is_imported, votes_in
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, check_names
 from augment.services.clock import Moment
@@ -150,7 +151,7 @@ RATINGS = PlannedRatings()
 
 def is_big(study: Study) -> bool:
     """Return whether rating takes longer than a person should wait for a page."""
-    if vote_queries.is_imported(study):
+    if is_imported(study):
         return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
     return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
 
@@ -320,7 +321,7 @@ def _read_word(words: type[Word], name: str, what: str) -> Word:
 def _default_unit(study: Study, method: Method) -> Unit:
     if method is Method.ELO:
         return Unit.VOTE
-    if not vote_queries.is_imported(study):
+    if not is_imported(study):
         return Unit.TWO_WAY
     votes = ImportedVote.objects.filter(file__study=study)
     judges, items = (not votes.filter(**{name: ""}).exists() for name in ("judge", "item"))
@@ -358,7 +359,7 @@ def _results(
     snapshot: Snapshot, votes: vote_queries.VoteSet, arrays: VoteArrays, board: Leaderboard
 ) -> Results:
     study = snapshot.study
-    from_file = vote_queries.is_imported(study)
+    from_file = is_imported(study)
     filters = vote_queries.Filters.of_document(snapshot.filters)
     planned = analysis.count_planned_pairs(study, filters)
     settled = dict(analysis.count_settled_ties(votes.counted))

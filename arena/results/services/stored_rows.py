@@ -18,7 +18,7 @@ from django.db import connection, models, transaction
 from django.db.migrations.loader import MigrationLoader
 from django.db.models import QuerySet
 
-from arena.site.services import REFUSALS
+from arena.results.services.restored_rows import REFUSALS
 from augment.models import Contestant
 from augment.services.endpoints.contestants import BUILTIN
 from augment.services.texts import make_storable

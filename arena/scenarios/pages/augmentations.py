@@ -8,10 +8,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.contestants.queries import show_options
 from arena.scenarios.queries import modification_lines, step_changes
-from arena.site.access import ADMIN, STAFF, act_for, get_user, page_for
-from arena.site.acts import send_later, tell_errors, wait_for_workers
-from arena.site.forms import RequestForm
-from arena.site.pictures import picture_response, resize_picture
+from arena.shell.access import ADMIN, STAFF, act_for, get_user, page_for
+from arena.shell.acts import send_later, tell_errors, wait_for_workers
+from arena.shell.forms import RequestForm
+from arena.shell.pictures import picture_response, resize_picture
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
 from augment.services.inputs import read_request, to_inputs

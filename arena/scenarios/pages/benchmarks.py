@@ -10,13 +10,12 @@ from django.db import transaction
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena import tasks
 from arena.exports.files import CONTENT_TYPE
+from arena.exports.written_files import ask_for
 from arena.models import BenchmarkFile
-from arena.people.queries import top_role
-from arena.results.services.written_files import ask_for
 from arena.scenarios.queries import count_tasks, list_benchmarks
-from arena.site.access import (
+from arena.shell import sending
+from arena.shell.access import (
     ADMIN,
     BENCHMARK_READERS,
     STAFF,
@@ -25,8 +24,9 @@ from arena.site.access import (
     get_user,
     page_for,
 )
-from arena.site.acts import refusals_in, send_later, wait_for_workers
-from arena.site.forms import RequestForm
+from arena.shell.accounts import top_role
+from arena.shell.acts import refusals_in, send_later, wait_for_workers
+from arena.shell.forms import RequestForm
 from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services.events import retire
@@ -119,7 +119,7 @@ def _newest_file(row: Benchmark) -> BenchmarkFile | None:
 
 def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:
     file = ask_for(BenchmarkFile(benchmark=row, asked_by=get_user(request)), row)
-    send_later(request, tasks.send_benchmark_file, file.pk)
+    send_later(request, sending.send_benchmark_file, file.pk)
 
 
 @page_for(*BENCHMARK_READERS)

@@ -11,9 +11,9 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.scenarios import services
 from arena.scenarios.pages.augmentations import find_scenario
-from arena.site.access import STAFF, act_for, form_for, get_user
-from arena.site.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
-from arena.site.forms import offer, read_code, read_json
+from arena.shell.access import STAFF, act_for, form_for, get_user
+from arena.shell.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
+from arena.shell.forms import offer, read_code, read_json
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS

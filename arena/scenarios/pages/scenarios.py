@@ -9,10 +9,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.scenarios import queries, services
-from arena.site import acts
-from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
-from arena.site.forms import read_code, read_json
-from arena.site.listing import read_listing, read_page
+from arena.shell import acts
+from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
+from arena.shell.forms import read_code, read_json
+from arena.shell.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin

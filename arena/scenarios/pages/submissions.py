@@ -9,13 +9,13 @@ from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.people.queries import top_role
 from arena.scenarios.queries import is_waiting, submissions_for
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, ENTRANT, STAFF, act_for, form_for, get_user, page_for
-from arena.site.acts import refusals_in, send_later, wait_for_workers
-from arena.site.forms import RequestForm, offer
-from arena.site.listing import page_asked, read_page
+from arena.shell.access import ADMIN, ENTRANT, STAFF, act_for, form_for, get_user, page_for
+from arena.shell.accounts import top_role
+from arena.shell.acts import refusals_in, send_later, wait_for_workers
+from arena.shell.forms import RequestForm, offer
+from arena.shell.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
 from augment.services.endpoints.contestants import make_free_slug
 from augment.services.inputs import read_request, to_inputs

@@ -12,10 +12,10 @@ from django.urls import reverse
 from django.utils.text import slugify
 
 from arena.exports.formats import download
-from arena.jobs.exports.sweeps import SWEEP_FORMATS
-from arena.site import acts
-from arena.site.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
-from arena.site.forms import RequestForm, offer
+from arena.scenarios.exports.sweeps import SWEEP_FORMATS
+from arena.shell import acts
+from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
+from arena.shell.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
 from augment.services.inputs import read_request, to_inputs
 from augment.services.judging import sweeps

@@ -10,10 +10,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.scenarios.services import was_too_large
-from arena.site.access import STAFF, act_for, get_user, page_for
-from arena.site.acts import looks_again, refusals_told, send_later, wait_for_workers
-from arena.site.forms import read_code
-from arena.site.listing import read_page
+from arena.shell.access import STAFF, act_for, get_user, page_for
+from arena.shell.acts import looks_again, refusals_told, send_later, wait_for_workers
+from arena.shell.forms import read_code
+from arena.shell.listing import read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads

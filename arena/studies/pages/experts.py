@@ -19,11 +19,11 @@ from arena.exports.formats import attach
 from arena.models import Enrolment, Study
 from arena.people import links, services
 from arena.people.pages import find_account, link_page, show_new_links, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, get_user, page_for
-from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
-from arena.site.listing import read_page
+from arena.shell.access import ADMIN, BACKEND, GONE, act_for, form_for, get_user, page_for
+from arena.shell.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
+from arena.shell.listing import read_page
 from arena.studies.forms import AuthorForm
-from arena.studies.queries import expert_lines, list_voters, state_of
+from arena.studies.queries import expert_lines, state_of
 from arena.studies.services.planning import Planning
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
@@ -34,6 +34,7 @@ from arena.studies.services.taking_part import (
     forget_identity,
     set_enrolment,
 )
+from arena.voting.queries.ballots import list_voters
 from augment.errors import Conflict
 
 SESSION_S = 30 * 24 * 3600

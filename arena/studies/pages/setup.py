@@ -15,25 +15,30 @@ from django.http import HttpRequest, HttpResponse, JsonResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
-from arena import tasks
 from arena.errors import NothingToPlan
 from arena.models import Study, StudyDraft
 from arena.people.queries import by_pseudonym, experts
-from arena.results.services.vote_files import ImportedVotes, import_votes
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, act_for, form_for, get_user
-from arena.site.acts import is_sure, refusals_in, refusals_told, tell_errors
-from arena.site.queries import usual_checks
+from arena.shell.access import ADMIN, act_for, form_for, get_user
+from arena.shell.acts import is_sure, refusals_in, refusals_told, tell_errors
 from arena.studies.forms import StudyForm
-from arena.studies.queries import FINISHED, find_missing, latest_contestants, list_offered
+from arena.studies.queries import (
+    FINISHED,
+    find_missing,
+    latest_contestants,
+    list_offered,
+    usual_checks,
+)
 from arena.studies.services import drafts
-from arena.studies.services.experts import has_practice
+from arena.studies.services.importing import ImportedVotes, import_votes
 from arena.studies.services.opening import open_study
 from arena.studies.services.outlook import compare_votes
 from arena.studies.services.plan import PRESETS
 from arena.voting.screen import vote_context
+from arena.voting.services.practice import has_practice
 from augment.models import GenerationJob
+from augment.tasks import send_checks
 
 USUAL = "paper"
 """The preset of a new form."""
@@ -93,7 +98,7 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
         return _keep(request, draft, form)
     if "draw" in posted:  # twice does no harm
         with refusals_told(request):
-            tasks.send_checks(get_user(request).pk)
+            send_checks(get_user(request).pk)
             messages.success(request, "Workers draw the missing attention checks.")
     if is_sure(request) and form.is_valid():
         with refusals_in(form):

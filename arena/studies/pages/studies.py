@@ -14,21 +14,12 @@ from django.urls import reverse
 from django.utils.text import slugify
 from django.views.decorators.http import require_POST
 
-from arena import tasks
 from arena.exports.formats import attach
 from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
-from arena.results.pages.rating_form import rate_or_send
-from arena.results.queries.access import ResultsAccess, results_access
-from arena.results.queries.votes import is_imported
-from arena.results.services.written_files import (
-    SHOWS_RESULTS,
-    ask_for_study_file,
-    newest_study_files,
-    why_not,
-)
-from arena.site.access import ADMIN, STAFF, act_for, allow_only, form_for, get_user, page_for
-from arena.site.acts import (
+from arena.shell import sending
+from arena.shell.access import ADMIN, STAFF, act_for, allow_only, form_for, get_user, page_for
+from arena.shell.acts import (
     WHY,
     Confirmation,
     ask,
@@ -40,12 +31,19 @@ from arena.site.acts import (
     wait_for_workers,
     wants_to_change,
 )
-from arena.site.listing import read_listing, read_page
+from arena.shell.listing import read_listing, read_page
 from arena.studies import queries
 from arena.studies.forms import AuthorForm, HandOverForm
-from arena.studies.services.opening import cancel_study, close_study, preregistration_sha256
+from arena.studies.services.files import (
+    SHOWS_RESULTS,
+    ask_for_study_file,
+    newest_study_files,
+    why_not,
+)
+from arena.studies.services.opening import cancel_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, opened_plan
 from arena.studies.services.taking_part import hand_over
+from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -133,7 +131,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
         return None
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
     if not is_sure(request):
-        question = _question(
+        question = study_question(
             study,
             f"Hand over what {giver} has not judged?",
             f"It is shared out among: {', '.join(takers)}.",
@@ -145,23 +143,6 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
     shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
     messages.success(request, f"Handed over: {shares}.")
     return None
-
-
-@form_for(ADMIN)
-def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Take no more votes, rate them with the defaults and show the table; asks first."""
-    study = get_object_or_404(Study, code=code)
-    if not is_sure(request):
-        if study.state != Study.State.OPEN:
-            return redirect("study", code=code)
-        return ask(request, _closing(study))
-    actor = get_user(request)
-    with refusals_told(request):
-        closed = close_study(study=study, actor=actor)
-        if study.state == Study.State.OPEN:  # not pressed twice
-            rate_or_send(request, closed, actor=actor)
-        return redirect("results", code=code)
-    return redirect("study", code=code)
 
 
 @form_for(ADMIN)
@@ -178,21 +159,9 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study", code=code)
 
 
-def _closing(study: Study) -> Confirmation:
-    (line,) = queries.count_progress([study])
-    return _question(
-        study,
-        f"Close the study “{study.name}”?",
-        f"Votes given: {line.voted}. Pairs skipped: {line.skipped}. Still planned: {line.left}.",
-        "No more votes are taken. This can’t be taken back.",
-        "Its results can be read then, also by its experts. To end it without any, cancel it.",
-        button="Close the study",
-    )
-
-
 def _cancelling(study: Study) -> Confirmation:
     (line,) = queries.count_progress([study])
-    return _question(
+    return study_question(
         study,
         f"Cancel the study “{study.name}”?",
         "No more votes are taken, and nobody ever sees results. This can’t be taken back.",
@@ -204,7 +173,10 @@ def _cancelling(study: Study) -> Confirmation:
     )
 
 
-def _question(study: Study, title: str, *facts: str, button: str, **more: Any) -> Confirmation:
+def study_question(
+    study: Study, title: str, *facts: str, button: str, **more: Any
+) -> Confirmation:
+    """Return a question about an act on a study, to be asked before it is done."""
     back = reverse("study", args=[study.code])
     crumbs = (("Studies", reverse("studies")), (study.name, back))
     return Confirmation(title=title, facts=facts, button=button, back=back, crumbs=crumbs, **more)
@@ -237,7 +209,7 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
     study = _study_for(request, code, kind)
     with refusals_told(request), transaction.atomic():
         row = ask_for_study_file(study=study, kind=kind, actor=get_user(request))
-        send_later(request, tasks.send_study_file, row.pk)
+        send_later(request, sending.send_study_file, row.pk)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     if is_imported(study):
         return redirect("results", code=code)

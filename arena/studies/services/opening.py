@@ -23,12 +23,12 @@ from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.pairing.rules import ATTENTION_CHECKS, MOST_CHECKS, Triple, check_share, draw_shown
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
-from arena.results.services.vote_files import VERSION as VOTES_VERSION
-from arena.studies.services.experts import require_practice_pictures
-from arena.studies.services.pictures import Cells, check_pictures, require_checks, scenario_windows
+from arena.rating.vote_columns import VERSION as VOTES_VERSION
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
+from arena.voting.services.pictures import Cells, check_pictures, require_checks, scenario_windows
+from arena.voting.services.practice import require_practice_pictures
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import read_options

@@ -15,7 +15,8 @@ from arena.models import Matchup, Study
 from arena.pairing.later import GridUnit, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, sample_place, scenario_at
-from arena.studies.services.pictures import (
+from arena.voting.queries.showings import LEGEND
+from arena.voting.services.pictures import (
     Cells,
     check_pictures,
     find_showable,
@@ -23,7 +24,6 @@ from arena.studies.services.pictures import (
     with_picture,
     without_lost_checks,
 )
-from arena.voting.queries.showings import LEGEND
 from arena.voting.services.shown_pictures import find_frames, frames_shown, shown_sides
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import legends_of_changes

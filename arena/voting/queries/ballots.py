@@ -7,13 +7,25 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Case, Count, Exists, OuterRef, Q, QuerySet, When
+from django.db.models import (
+    BooleanField,
+    Case,
+    Count,
+    Exists,
+    ExpressionWrapper,
+    F,
+    Max,
+    OuterRef,
+    Q,
+    QuerySet,
+    When,
+)
 from django.db.models.expressions import RawSQL
-from django.db.models.fields import BooleanField, IntegerField
+from django.db.models.fields import IntegerField
 from django.utils import timezone
 
 from arena.errors import NotYours, StudyNotOpen
-from arena.models import Matchup, Study, Vote
+from arena.models import EnrolledVoter, Matchup, Study, Vote
 from arena.people.queries import by_pseudonym
 
 
@@ -222,3 +234,33 @@ def tallies(study: Study) -> list[ExpertTally]:
             )
         )
     return lines
+
+
+Voters = QuerySet[Any]
+"""Of EnrolledVoter, with what is counted about each."""
+
+
+def list_voters(study: Study) -> Voters:
+    """Return everybody who ever took a place in a study; one query.
+
+    Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well),
+    `last_vote_at` and `is_done`.
+    """
+    mine = Q(expert__matchups__study=study)
+    skipped = mine & Q(
+        expert__matchups__votes__outcome="skip", expert__matchups__votes__superseded_by=None
+    )
+    answered = skipped | (mine & Q(expert__matchups__votes__question=study.questions[-1]))
+    is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
+    return (
+        EnrolledVoter.objects.filter(enrolment__study=study)
+        .select_related("expert__person", "enrolment")
+        .annotate(
+            planned=Count("expert__matchups", filter=mine, distinct=True),
+            answered=Count("expert__matchups", filter=answered, distinct=True),
+            skipped=Count("expert__matchups", filter=skipped, distinct=True),
+            last_vote_at=Max("expert__matchups__votes__at", filter=mine),
+        )
+        .annotate(is_done=ExpressionWrapper(is_done, output_field=BooleanField()))
+        .order_by("enrolled_at", "pk")
+    )

@@ -9,7 +9,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
-from arena.people.queries import top_role
+from arena.shell.accounts import top_role
 from augment.models import Augmentation, Simulation
 from augment.services.judging.simulations import blind_drive
 from augment.services.scenarios.pictures import camera_key, film_name

@@ -15,8 +15,8 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import sample_place, scenario_at
-from arena.studies.services.pictures import Cells, find_showable
 from arena.voting.queries.showings import LEGEND, VIEW_OF_OLD
+from arena.voting.services.pictures import Cells, find_showable
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import Options

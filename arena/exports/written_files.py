@@ -10,27 +10,20 @@ from functools import partial
 from pathlib import Path, PurePath
 from typing import TypeVar
 
-from django.contrib.auth.models import User
 from django.core.files import File
 from django.core.files.storage import default_storage
 from django.db import transaction
 
-from arena.models import BenchmarkFile, ScenarioFile, Snapshot, Study, StudyFile
+from arena.models import BenchmarkFile, ScenarioFile, Study, StudyFile
 from arena.models.files import WrittenFile
-from arena.results.queries.votes import is_imported
-from augment.errors import Conflict, check_names
 from augment.models import Benchmark, GenerationJob
 from augment.services.events import log_change
 from augment.services.work import Lease, Settlement, WorkKind
 
 Row = TypeVar("Row", bound=WrittenFile)
-Kind = StudyFile.Kind
 
 FOLDERS = (BenchmarkFile.FOLDER, ScenarioFile.FOLDER, StudyFile.FOLDER)
 """Where the contents lie, among the pictures; a backup leaves them out."""
-
-SHOWS_RESULTS = (Kind.STUDY, Kind.RATING)
-"""Kinds for those alone who may read the study's results."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,45 +110,3 @@ def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
 
 
 # --- Files of a study --------------------------------------------------------------------------
-
-
-def why_not(study: Study, kind: str) -> str:
-    """A sentence where there can be no such file now, empty where there can.
-
-    Whether somebody may read the study's results is asked elsewhere.
-
-    Raises:
-        UnknownName: There is no such kind.
-    """
-    check_names("file of a study", [kind], Kind.values)
-    is_cancelled = study.state == Study.State.CANCELLED
-    if kind == Kind.STUDY:
-        if study.state == Study.State.OPEN:
-            return "It is written once the study is closed: what still changes is no whole."
-        if is_cancelled:
-            return "A cancelled study is not written as a whole; its votes can be exported."
-    elif kind == Kind.RATING:
-        if is_cancelled:
-            return "The study was cancelled: it has no results."
-        if not study.snapshots.filter(state=Snapshot.State.READY).exists():
-            return "Rate the study first: the file has the tables and charts of a rating."
-    elif is_imported(study):
-        return "Votes from a file have no pictures."
-    return ""
-
-
-def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) -> StudyFile:
-    """Return a row for a worker to write; one that waits already is asked for once more.
-
-    Raises:
-        UnknownName: There is no such kind.
-        Conflict: There can be no such file now.
-    """
-    if reason := why_not(study, kind):
-        raise Conflict(reason)
-    return ask_for(StudyFile(study=study, kind=kind, asked_by=actor), study, file=kind)
-
-
-def newest_study_files(study: Study) -> dict[str, StudyFile]:
-    """The newest row of each kind."""
-    return {row.kind: row for row in study.files.order_by("pk")}

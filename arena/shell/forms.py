@@ -8,13 +8,21 @@ from typing import Any, cast
 
 from django import forms
 
-from arena.scenarios.queries import TypeGroup
 from augment.errors import Conflict
-from augment.models import Contestant
+from augment.models import Contestant, Scenario
 from augment.services.inputs import Input, InputKind, to_inputs
 from augment.services.running.budget import Caps
 
 LONGEST_LINES = 60_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TypeGroup:
+    """All scenarios of one type."""
+
+    type: str
+    label: str
+    scenarios: list[Scenario]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

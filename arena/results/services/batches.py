@@ -15,8 +15,8 @@ from arena.models import Board, Study
 from arena.rating.board_table import spread_over
 from arena.results.services.boards import require_poolable
 from arena.studies.services.opening import open_study
-from arena.studies.services.pictures import find_showable
 from arena.studies.services.plan import opened_plan
+from arena.voting.services.pictures import find_showable
 from augment.errors import Conflict, check_names
 from augment.models import Contestant
 from augment.services.events import log_change

@@ -4,10 +4,9 @@ from pathlib import Path
 
 from django.core.files.base import ContentFile
 
-from arena.exports.files import new_folder, zip_bytes
-from arena.jobs.exports.files import WARNING
+from arena.exports.files import WARNING, new_folder, zip_bytes
+from arena.exports.written_files import FileWork, MadeFile
 from arena.models import BenchmarkFile
-from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import BaseScene, Benchmark
 from augment.services.judging.scenario_export import Source, list_warnings, scene_source
 from augment.services.scenarios.benchmarks import benchmark_set, list_remarks, write_folder

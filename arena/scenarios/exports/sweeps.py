@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from arena.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
 from arena.exports.formats import Columns, Dtype, Sheet, drawings, make_sheet, table_formats
-from arena.results.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
 from augment.services.judging.thresholds import SweepResult, driver_name
 
 if TYPE_CHECKING:

@@ -1,29 +1,20 @@
-"""Experts' acts beside voting: practice before their first pair, and reports of problems.
-
-Neither changes a vote; no rating, progress or export of votes sees answers to practice pairs.
-"""
+"""Practice before an expert's first pair; no rating and no export of votes sees its answers."""
 
 import random
 from collections import Counter
-from dataclasses import dataclass
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db import IntegrityError, transaction
+from django.db import transaction
 from django.db.models import QuerySet
 
-from arena.errors import InvalidVote, NothingToPlan, NotYours, StudyNotOpen
-from arena.models import Matchup, PracticePair, Report, Study, Vote
-from arena.studies.services.pictures import latest_pairs
-from arena.voting.queries.ballots import own_matchup, require_open
-from arena.voting.services.casting import LONGEST_COMMENT
-from augment.errors import Conflict
+from arena.errors import InvalidVote, NothingToPlan
+from arena.models import PracticePair, Study, Vote
+from arena.voting.queries.ballots import require_open
+from arena.voting.services.pictures import latest_pairs
 from augment.models import Scenario
-from augment.services.texts import make_storable
 
 PAIRS = 5
-SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
-"""What a browser says of a side: the left picture is A."""
 
 Answer = PracticePair.Answer
 
@@ -131,67 +122,3 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
 
 
 # --- Reports -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Complaint:
-    """A report of an expert on a matchup.
-
-    Attributes:
-        key: Made by the browser, one per report.
-        matchup: One of the expert's own.
-        side: Which picture it is about, one of Report.Side.
-
-    Raises:
-        InvalidVote: Parts are unknown or too long.
-    """
-
-    key: UUID
-    matchup: UUID
-    reason: str
-    side: str = Report.Side.BOTH
-    comment: str = ""
-
-    def __post_init__(self) -> None:
-        faults = {}
-        for name, known in (("reason", Report.Reason.values), ("side", Report.Side.values)):
-            if getattr(self, name) not in known:
-                faults[name] = f"One of these is needed: {', '.join(known)}."
-        if len(self.comment) > LONGEST_COMMENT:
-            faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
-        if faults:
-            raise InvalidVote(faults)
-
-
-def report(*, expert: User, complaint: Complaint) -> Report:
-    """Keep what an expert reports; the same key again is the same report.
-
-    Raises:
-        NotYours: The matchup is somebody else's or does not exist.
-        StudyNotOpen: The study is over.
-        Conflict: The key belongs to another report.
-    """
-    matchup = own_matchup(expert=expert, code=complaint.matchup)
-    stored = Report.objects.filter(key=complaint.key).first()
-    if stored is None:
-        if matchup.study.state != Study.State.OPEN:
-            raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
-        stored = _insert(matchup, expert, complaint)
-    content = (matchup.pk, complaint.reason, complaint.side)
-    if (stored.matchup_id, stored.reason, stored.side) != content:
-        raise Conflict("This key belongs to another report; make a new key for every report.")
-    return stored
-
-
-def _insert(matchup: Matchup, expert: User, complaint: Complaint) -> Report:
-    values = {
-        "matchup": matchup,
-        "expert": expert,
-        "reason": complaint.reason,
-        "side": complaint.side,
-        "comment": make_storable(complaint.comment.strip()),
-    }
-    try:
-        return Report.objects.get_or_create(key=complaint.key, defaults=values)[0]
-    except IntegrityError:  # the pair was handed over at this moment
-        raise NotYours("This matchup is not yours.") from None

@@ -15,8 +15,8 @@ from django.urls import NoReverseMatch
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import StillUnderWay
-from arena.people.queries import top_role
-from arena.site.receipts import StoredAnswer, answer_once, digest_body
+from arena.shell.accounts import top_role
+from arena.shell.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import AugmentError
 
 P = ParamSpec("P")

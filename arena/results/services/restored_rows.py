@@ -12,10 +12,10 @@ from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
-from arena.studies.services.experts import Complaint
 from arena.studies.services.opening import check_questions, check_seed
 from arena.studies.services.planning import frozen_rules
 from arena.voting.services.casting import Decision
+from arena.voting.services.reports import Complaint
 from augment.errors import AugmentError
 from augment.models import FAILED, Augmentation, GenerationJob, Work
 from augment.services import row_rules

@@ -1,0 +1,1 @@
+"""What the pages of all subjects share: access, accounts, acts, forms, lists, messages."""

@@ -1,0 +1,81 @@
+"""Experts' reports of problems; none changes a vote."""
+
+from dataclasses import dataclass
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.db import IntegrityError
+
+from arena.errors import InvalidVote, NotYours, StudyNotOpen
+from arena.models import Matchup, Report, Study
+from arena.voting.queries.ballots import own_matchup
+from arena.voting.services.casting import LONGEST_COMMENT
+from augment.errors import Conflict
+from augment.services.texts import make_storable
+
+SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
+"""What a browser says of a side: the left picture is A."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Complaint:
+    """A report of an expert on a matchup.
+
+    Attributes:
+        key: Made by the browser, one per report.
+        matchup: One of the expert's own.
+        side: Which picture it is about, one of Report.Side.
+
+    Raises:
+        InvalidVote: Parts are unknown or too long.
+    """
+
+    key: UUID
+    matchup: UUID
+    reason: str
+    side: str = Report.Side.BOTH
+    comment: str = ""
+
+    def __post_init__(self) -> None:
+        faults = {}
+        for name, known in (("reason", Report.Reason.values), ("side", Report.Side.values)):
+            if getattr(self, name) not in known:
+                faults[name] = f"One of these is needed: {', '.join(known)}."
+        if len(self.comment) > LONGEST_COMMENT:
+            faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+        if faults:
+            raise InvalidVote(faults)
+
+
+def report(*, expert: User, complaint: Complaint) -> Report:
+    """Keep what an expert reports; the same key again is the same report.
+
+    Raises:
+        NotYours: The matchup is somebody else's or does not exist.
+        StudyNotOpen: The study is over.
+        Conflict: The key belongs to another report.
+    """
+    matchup = own_matchup(expert=expert, code=complaint.matchup)
+    stored = Report.objects.filter(key=complaint.key).first()
+    if stored is None:
+        if matchup.study.state != Study.State.OPEN:
+            raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
+        stored = _insert(matchup, expert, complaint)
+    content = (matchup.pk, complaint.reason, complaint.side)
+    if (stored.matchup_id, stored.reason, stored.side) != content:
+        raise Conflict("This key belongs to another report; make a new key for every report.")
+    return stored
+
+
+def _insert(matchup: Matchup, expert: User, complaint: Complaint) -> Report:
+    values = {
+        "matchup": matchup,
+        "expert": expert,
+        "reason": complaint.reason,
+        "side": complaint.side,
+        "comment": make_storable(complaint.comment.strip()),
+    }
+    try:
+        return Report.objects.get_or_create(key=complaint.key, defaults=values)[0]
+    except IntegrityError:  # the pair was handed over at this moment
+        raise NotYours("This matchup is not yours.") from None
