@@ -7,7 +7,7 @@ from arena.results.exports.writers import draw_charts
 from arena.results.services.ratings import RATINGS
 from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from arena.shell.sending import send_charts
-from augment.services.work import register
+from augment.services import register
 from augment.tasks import AFTERWARDS, DRAWN
 
 register(RATINGS, BENCHMARK_FILES, SCENARIO_FILES, STUDY_FILES)

@@ -26,16 +26,16 @@ from kombu.exceptions import OperationalError
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
 from augment.models import Augmentation, GenerationJob, Scenario
+from augment.services.benchmarks.submissions import SUBMISSIONS
 from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.driving.simulations import DRIVES
 from augment.services.endpoints.probing import PROBES
 from augment.services.judging.analyses import count_unmeasured, measure_job
-from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
 from augment.services.running.intent_readings import READINGS
 from augment.services.running.judge_runs import JUDGEMENTS
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios import pictures
-from augment.services.scenarios.submissions import SUBMISSIONS
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
 

@@ -52,7 +52,7 @@ def measure(folder: Path) -> list[list[str]]:
     django.setup()
     from arena.site import demo
     from augment.models import Endpoint, GenerationJob, Simulation
-    from augment.services.judging.simulations import Drives, Options, plan_job
+    from augment.services.driving.simulations import Drives, Options, plan_job
     from augment.services.running.jobs import JobRequest, launch
     from augment.services.running.runner import Augmentations
 

@@ -50,7 +50,7 @@ def plan(count: int) -> None:
     from augment.models import Simulation, Sweep, SweepValue
     from augment.scene.codec import modification_to_document
     from augment.scene.entities import Modification
-    from augment.services.judging.simulations import Options
+    from augment.services.driving.simulations import Options
     from tests.jobs.rows import add_scenario
     from tests.scenes import scene, vehicle
 
@@ -83,7 +83,7 @@ def work(seed: int) -> None:
     django.setup()
     from augment.models import Simulation
     from augment.services.clock import DATABASE_TIME
-    from augment.services.judging.simulations import DRIVES as KIND
+    from augment.services.driving.simulations import DRIVES as KIND
 
     rng = random.Random(seed)
     while Simulation.objects.filter(state__in=Simulation.UNDER_WAY).exists():

@@ -9,8 +9,8 @@ from typing import Any
 from augment.models import Augmentation, GenerationJob, Simulation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
-from augment.services.judging import simulations
-from augment.services.judging.simulations import Options
+from augment.services.driving import simulations
+from augment.services.driving.simulations import Options
 from augment.simulation.drive import find_expert, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road

@@ -15,8 +15,8 @@ from augment.models import Benchmark, Scenario, Submission
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Shape
-from augment.services.scenarios import submissions
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.benchmarks import submissions
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone

@@ -8,7 +8,7 @@ from rest_framework import serializers
 from rest_framework.exceptions import ParseError
 from rest_framework.parsers import JSONParser
 
-from augment.services.inputs import Input, InputKind, to_inputs
+from augment.services import Input, InputKind, to_inputs
 
 
 class SoundJSONParser(JSONParser):

@@ -14,8 +14,7 @@ from arena.errors import TokenOver, TooManyRequests
 from arena.models import ApiToken, token_digest
 from arena.shell.accounts import TOKEN_ROLES, effective_role, top_role
 from augment.errors import Conflict, UnknownName
-from augment.services.events import log_change
-from augment.services.texts import one_line
+from augment.services import log_change, one_line
 
 PREFIX = "arena_"
 """What every token begins with, so that whoever finds one knows what it is."""

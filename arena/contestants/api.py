@@ -23,9 +23,15 @@ from arena.api.views import (
 )
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
-from augment.services.endpoints.contestants import VARIANTS, ContestantRequest, add_contestant
-from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint
-from augment.services.endpoints.probing import add_model, plan_probe
+from augment.services.endpoints import (
+    VARIANTS,
+    ContestantRequest,
+    EndpointRequest,
+    add_contestant,
+    add_endpoint,
+    add_model,
+    plan_probe,
+)
 from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]

@@ -19,20 +19,22 @@ from arena.shell.forms import RequestForm, offer
 from arena.shell.listing import read_listing, read_page
 from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
-from augment.services.endpoints import known_endpoints
-from augment.services.endpoints.contestants import (
+from augment.services import read_request, read_values, retire, to_inputs
+from augment.services.endpoints import (
+    MODEL_FACTS,
     OPTION_INPUTS,
     ContestantRequest,
+    EndpointFacts,
+    EndpointRequest,
     add_contestant,
-    free_slug,
+    add_model,
+    known_endpoints,
+    plan_probe,
+    read_respondents,
 )
-from augment.services.endpoints.known_endpoints import MODEL_FACTS, EndpointFacts, EndpointRequest
-from augment.services.endpoints.probing import add_model, plan_probe
-from augment.services.endpoints.treatments import read_respondents
-from augment.services.events import retire
-from augment.services.inputs import read_request, read_values, to_inputs
+from augment.services.endpoints.contestants import free_slug
+from augment.services.running import workforce
 from augment.services.running.matrix import SEPARATOR
-from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
 
 CONTESTANTS_AT_ONCE = 50

@@ -3,9 +3,8 @@
 from typing import Any
 
 from augment.models import Contestant, EndpointModel, Probe
-from augment.services.endpoints.contestants import OPTION_INPUTS
+from augment.services.endpoints import OPTION_INPUTS, list_unsent_options, read_options
 from augment.services.endpoints.probing import ABILITIES
-from augment.services.endpoints.treatments import list_unsent_options, read_options
 
 
 def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any]]:

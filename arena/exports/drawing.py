@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
-from augment.services.judging.measures import compute_once, digest_code
+from augment.services.judging import compute_once, digest_code
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,8 +17,7 @@ from django.db import transaction
 from arena.models import BenchmarkFile, ScenarioFile, Study, StudyFile
 from arena.models.files import WrittenFile
 from augment.models import Benchmark, GenerationJob
-from augment.services.events import log_change
-from augment.services.work import Lease, Settlement, WorkKind
+from augment.services import Lease, Settlement, WorkKind, log_change
 
 Row = TypeVar("Row", bound=WrittenFile)
 

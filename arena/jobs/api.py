@@ -29,11 +29,18 @@ from arena.api.views import (
 from arena.exports.formats import download
 from arena.jobs.exports.tables import JOB_TABLES
 from augment.models import Augmentation, GenerationJob
+from augment.services.running import (
+    FollowUpRequest,
+    JobCounts,
+    JobRequest,
+    JobScope,
+    ask_follow_up,
+    count_each,
+    count_rows,
+    workforce,
+)
 from augment.services.running.estimates import estimate
-from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up
-from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.progress import JobCounts, count_each, count_rows
-from augment.services.running.workers import workforce
+from augment.services.running.jobs import launch
 from augment.tasks import enqueue_augmentation, enqueue_job
 
 

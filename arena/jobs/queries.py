@@ -20,8 +20,9 @@ from augment.models import (
     Scenario,
     Simulation,
 )
-from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
-from augment.services.judging.simulations import Options
+from augment.services.driving.simulations import Options
+from augment.services.endpoints import Spending, sum_spending
+from augment.services.endpoints.known_models import CONTESTANT
 
 State = Augmentation.State
 

@@ -14,10 +14,9 @@ from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, GenerationJob
-from augment.services.events import log_change
-from augment.services.judging.findings import FaultClass, guess_faults
+from augment.services import log_change, make_storable, one_line
+from augment.services.judging import FaultClass, guess_faults
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.texts import make_storable, one_line
 
 NOTE_LENGTH = 2000
 

@@ -50,9 +50,9 @@ from arena.results.services.restored_rows import (
 )
 from arena.serving.readiness import find_unapplied_migrations
 from augment.models import Endpoint, Simulation
-from augment.services.judging.simulations import list_allowed_planners
-from augment.services.scenarios.pictures import THUMBNAILS
-from augment.services.texts import is_stored_name
+from augment.services import is_stored_name
+from augment.services.driving import list_allowed_planners
+from augment.services.scenarios import THUMBNAILS
 
 FORMAT, VERSION = "scenario-arena-backup", 1
 MANIFEST, SECRET_KEY = "manifest.json", "secret_key"

@@ -19,10 +19,11 @@ from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
 from augment import models
-from augment.services.judging.simulations import Options, plan_scenario
-from augment.services.running.progress import count_rows
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
-from augment.services.scenarios.catalogue import load_catalogue
+from augment.services.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.driving import plan_scenario
+from augment.services.driving.simulations import Options
+from augment.services.running import count_rows
+from augment.services.scenarios import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer

@@ -23,7 +23,7 @@ from arena.people.queries import find_admins
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Endpoint, GenerationJob
-from augment.services.endpoints.known_endpoints import read_key
+from augment.services.endpoints import read_key
 
 ENOUGH_BYTES = 1 << 30
 

@@ -20,12 +20,12 @@ from arena.results.queries.access import snapshot_to_export
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, check_names
-from augment.services.judging import scenario_export, simulations
+from augment.services.driving import options_driven, simulations
+from augment.services.driving.simulations import SCORES
+from augment.services.judging import scenario_export
 from augment.services.judging.analyses import ANALYSES
 from augment.services.judging.displacement import By
-from augment.services.judging.driving_scores import options_driven
-from augment.services.judging.simulations import SCORES
-from augment.services.running.choosing import find_job
+from augment.services.running import find_job
 
 Chosen = dict[str, Any]
 """The arguments of the command line by name."""

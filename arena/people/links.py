@@ -19,7 +19,7 @@ from arena.people.queries import may_be_let_in
 from arena.people.services import end_links, end_sessions, make_welcome_token
 from arena.shell.accounts import top_role
 from augment.errors import Conflict, UnknownName
-from augment.services.events import log_change
+from augment.services import log_change
 
 # --- Invitations -------------------------------------------------------------------------------
 

@@ -18,8 +18,7 @@ from arena.models import Person
 from arena.people.queries import has_admin, is_forgotten
 from arena.shell.accounts import ROLES, top_role
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.services.events import log_change
-from augment.services.texts import one_line
+from augment.services import log_change, one_line
 
 LINK_LIVES_S = 24 * 3600
 """How long the first admin's link works."""

@@ -35,7 +35,7 @@ from arena.results.services.ratings import rate_now as rate
 from arena.shell import sending
 from arena.studies.api import get_study
 from arena.voting.queries.blinding import must_read_results
-from augment.services.inputs import read_request
+from augment.services import read_request
 
 _FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
     str: serializers.CharField,

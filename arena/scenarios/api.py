@@ -29,20 +29,25 @@ from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services.inputs import read_request
-from augment.services.judging.sweeps import LARGEST_FAMILY, SweepRequest, add_family, plan_sweep
-from augment.services.judging.thresholds import SweepResult, sweep_result
-from augment.services.scenarios import uploads
-from augment.services.scenarios.benchmarks import find_benchmark
-from augment.services.scenarios.scene_imports import note_sentences
-from augment.services.scenarios.scenes import (
+from augment.services import read_request
+from augment.services.benchmarks import find_benchmark, keep_submission
+from augment.services.driving import (
+    LARGEST_FAMILY,
+    SweepRequest,
+    SweepResult,
+    add_family,
+    plan_sweep,
+    sweep_result,
+)
+from augment.services.scenarios import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
     SLUG_LENGTH,
     NewScenario,
     add_scenario,
+    note_sentences,
+    uploads,
 )
-from augment.services.scenarios.submissions import keep_submission
 from augment.tasks import (
     enqueue_moment,
     enqueue_scenario,

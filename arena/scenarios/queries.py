@@ -13,9 +13,9 @@ from django.db.models import Case, Count, Q, QuerySet, When
 from arena.shell.accounts import top_role
 from arena.shell.forms import TypeGroup
 from augment.models import Augmentation, Benchmark, Contestant, Scenario, Submission
-from augment.services.scenarios.benchmarks import Split, Stratum, public_origins
-from augment.services.scenarios.scenes import type_choices
-from augment.services.texts import motion_in_words
+from augment.services import motion_in_words
+from augment.services.benchmarks import Split, Stratum, public_origins
+from augment.services.scenarios import type_choices
 
 OWN = "own"
 """The scenarios that are in no set of the catalogue."""

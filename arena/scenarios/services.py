@@ -8,10 +8,9 @@ from django.db import transaction
 from arena.models import LabelTask, Study
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
-from augment.services.events import log_change
-from augment.services.scenarios import editing, scenes
-from augment.services.scenarios.benchmarks import refuse_handed_out
-from augment.services.scenarios.pictures import redraw
+from augment.services import log_change
+from augment.services.benchmarks import refuse_handed_out
+from augment.services.scenarios import editing, redraw, scenes
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"

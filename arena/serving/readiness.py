@@ -9,7 +9,7 @@ from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 
 from augment.errors import QueueFault
-from augment.services.running.workers import workforce
+from augment.services.running import workforce
 from augment.tasks import check_broker
 
 BROKER_WITHIN_S = 1.0

@@ -14,7 +14,7 @@ from django.shortcuts import render
 from django.utils.text import capfirst, slugify
 
 from augment.errors import AugmentError, InvalidDocument, QueueFault
-from augment.services.running.workers import workforce
+from augment.services.running import workforce
 
 SURE = "sure"
 """What the page's own button sends; without it nothing is done."""

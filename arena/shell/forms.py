@@ -10,8 +10,8 @@ from django import forms
 
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.services.inputs import Input, InputKind, to_inputs
-from augment.services.running.budget import Caps
+from augment.services import Input, InputKind, to_inputs
+from augment.services.running import Caps
 
 LONGEST_LINES = 60_000
 

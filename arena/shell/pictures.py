@@ -4,7 +4,7 @@ from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest, JsonResponse
 from django.http.response import HttpResponseBase
 
-from augment.services.scenarios.pictures import WIDTHS_PX, film_document, shrink
+from augment.services.scenarios import WIDTHS_PX, film_document, shrink
 
 _KEPT = "private, max-age=31536000, immutable"
 

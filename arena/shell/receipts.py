@@ -19,7 +19,7 @@ from django.utils.datastructures import MultiValueDict
 
 from arena.errors import KeyReused, StillUnderWay
 from arena.models import Receipt
-from augment.services.clock import DATABASE_TIME
+from augment.services import DATABASE_TIME
 
 Answer = TypeVar("Answer")
 

@@ -5,7 +5,7 @@ They name the kind of a row alone: `arena.tasks`, above all subjects, says what 
 
 from functools import partial
 
-from augment.services.work import KINDS
+from augment.services import KINDS
 from augment.tasks import draw, enqueue, send
 
 

@@ -17,17 +17,18 @@ from arena.studies.services.plan import StudyPlan
 from arena.voting.services.simulation import simulate_votes
 from augment.errors import Conflict
 from augment.models import Endpoint, GenerationJob, Scenario
-from augment.services.endpoints.contestants import (
+from augment.services.endpoints import (
     REFERENCE,
     ContestantRequest,
+    EndpointRequest,
     add_contestant,
     ensure_builtin,
+    ensure_endpoint,
 )
-from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.running.choosing import resolve_contestants
-from augment.services.running.jobs import JobRequest, launch
-from augment.services.scenarios.catalogue import load_catalogue
-from augment.services.scenarios.choosing import ALL, resolve_scenarios
+from augment.services.running import JobRequest, resolve_contestants
+from augment.services.running.jobs import launch
+from augment.services.scenarios import load_catalogue, resolve_scenarios
+from augment.services.scenarios.choosing import ALL
 
 STAND_IN = "stand-in"
 SIMULATED = (

@@ -31,7 +31,7 @@ from arena.studies import queries as studies
 from arena.templatetags.results import label_of
 from arena.voting.queries.blinding import ResultsAccess, results_access
 from augment.models import Benchmark, Event, GenerationJob
-from augment.services.running.progress import count_each
+from augment.services.running import count_each
 from augment.tasks import enqueue_job
 
 LATEST_JOBS = 5

@@ -11,7 +11,7 @@ from prometheus_client.core import GaugeMetricFamily
 
 from arena.models import Matchup, Study, Vote
 from augment import models
-from augment.services.running.workers import workforce
+from augment.services.running import workforce
 
 NANO = 1e9
 """Money is counted in whole nano-dollars."""

@@ -13,7 +13,7 @@ from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import StudyEstimate, estimate_plan
 from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
 from augment.models import GenerationJob
-from augment.services.inputs import InputKind
+from augment.services import InputKind
 
 
 class StudyForm(ChoiceForm):

@@ -40,7 +40,7 @@ from augment.models import (
     GenerationJob,
     Scenario,
 )
-from augment.services.scenarios.benchmarks import Split
+from augment.services.benchmarks import Split
 
 # --- Studies -----------------------------------------------------------------------------------
 

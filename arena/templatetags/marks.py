@@ -15,8 +15,8 @@ from django.utils.safestring import SafeString
 
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.progress import JobCounts
-from augment.services.scenarios.pictures import film_name
+from augment.services.running import JobCounts
+from augment.services.scenarios import film_name
 
 register = template.Library()
 

@@ -11,8 +11,8 @@ from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent, with_minus
 from arena.results.exports.tables import method_text
 from arena.results.queries.votes import REASONS
-from augment.services.judging.driving_scores import clearance_text
-from augment.services.scenarios.scenes import type_label
+from augment.services.driving import clearance_text
+from augment.services.scenarios import type_label
 
 register = template.Library()
 

@@ -32,9 +32,9 @@ from augment.models import (
     Sweep,
     UploadMoment,
 )
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from tests.api.tokens import secret_of
 from tests.entering import entrant, read, sent
 from tests.study_rows import matchups_of, vote

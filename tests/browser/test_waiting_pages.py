@@ -13,7 +13,7 @@ from pytest_django.live_server_helper import LiveServer
 from arena.models import BenchmarkFile, Study
 from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from augment.models import BaseScene, SceneUpload
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.scenarios.pictures import draw_scene
 from tests.browser.booth import Booth
 from tests.jobs.rows import add_scenario

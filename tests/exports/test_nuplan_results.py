@@ -11,7 +11,7 @@ from django.core.management.base import CommandError
 
 from arena.jobs.exports.driving import FORMATS
 from augment.models import Augmentation, BaseScene, Event, GenerationJob, NuplanResult
-from augment.services.judging.driving_scores import scores_of_job
+from augment.services.driving.driving_scores import scores_of_job
 from tests.drives import driven
 from tests.formats.nuplan_experiment import ran, scored, write_experiment
 from tests.jobs import rows

@@ -21,7 +21,9 @@ HEAVY = {
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "openpyxl": ("arena.rating.votes_file",),
     "scenariogeneration": ("augment.formats",),
-    "matplotlib": tuple(f"arena.{room}exports" for room in ("", "jobs.", "results.", "scenarios.")),
+    "matplotlib": tuple(
+        f"arena.{room}exports" for room in ("", "jobs.", "results.", "scenarios.")
+    ),
     "scipy.interpolate": ("augment.scene",),
     "scipy.optimize": (
         *("augment.benchmark", "augment.metrics", "arena.pairing"),

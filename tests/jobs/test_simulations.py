@@ -15,8 +15,8 @@ from pytest_django import Settings
 
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Scenario, Simulation
-from augment.services.judging import driving_scores, simulations
-from augment.services.judging.simulations import DRIVES, Options
+from augment.services.driving import driving_scores, simulations
+from augment.services.driving.simulations import DRIVES, Options
 from augment.services.work import Settlement
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road

@@ -16,16 +16,16 @@ from augment.models import Scenario, Simulation, Sweep
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, Shape
-from augment.services.judging.driving_scores import options_driven
-from augment.services.judging.simulations import DRIVES, Options
-from augment.services.judging.sweeps import (
+from augment.services.driving.driving_scores import options_driven
+from augment.services.driving.simulations import DRIVES, Options
+from augment.services.driving.sweeps import (
     SweepRequest,
     add_family,
     list_options,
     plan_sweep,
     swept_numbers,
 )
-from augment.services.judging.thresholds import conclude, sweep_result
+from augment.services.driving.thresholds import conclude, sweep_result
 from augment.services.scenarios.editing import enter_intent
 from augment.services.scenarios.scenes import load_intent, load_reference
 from augment.simulation.drive import find_expert, run

@@ -11,7 +11,7 @@ from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.management.waiting import wait
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.simulations import DRIVES
+from augment.services.driving.simulations import DRIVES
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
 from augment.tasks import check_broker

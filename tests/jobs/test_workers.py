@@ -16,12 +16,12 @@ from arena.serving.probes import find_redis_server, redis_answers
 from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
+from augment.services.benchmarks.submissions import SUBMISSIONS
 from augment.services.clock import DATABASE_TIME
+from augment.services.driving.simulations import DRIVES
 from augment.services.endpoints.probing import PROBES
-from augment.services.judging.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.workers import Presence, do_round, workforce
-from augment.services.scenarios.submissions import SUBMISSIONS
 from tests.jobs.rows import launch, only_row
 from tests.processes import Process, wait_until
 

@@ -10,6 +10,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.models import Contestant, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.scene.planned_motion import MotionPreset
+from augment.services.driving.simulations import Drives, Options, plan_job
 from augment.services.endpoints.contestants import (
     REFERENCE,
     ContestantRequest,
@@ -18,7 +19,6 @@ from augment.services.endpoints.contestants import (
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.judging.scenario_export import export_job
-from augment.services.judging.simulations import Drives, Options, plan_job
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios.catalogue import load_catalogue

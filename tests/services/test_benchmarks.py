@@ -18,8 +18,7 @@ from augment.models import BaseScene, Benchmark, BenchmarkItem, Event, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Shape
-from augment.services.events import retire
-from augment.services.scenarios.benchmarks import (
+from augment.services.benchmarks.benchmarks import (
     BenchmarkRequest,
     benchmark_set,
     find_benchmark,
@@ -27,6 +26,7 @@ from augment.services.scenarios.benchmarks import (
     make_benchmark,
     plan_benchmark,
 )
+from augment.services.events import retire
 from augment.services.scenarios.scenes import NewScenario, ScenarioContent, add_variant
 from augment.services.scenarios.scenes import add_scenario as add_scenario_row
 from tests.intents import cones

@@ -20,7 +20,7 @@ from arena.management.backups import MANIFEST, read_manifest, take_backup, zip_m
 from arena.models import Vote
 from arena.results.services.stored_rows import as_line, stored_columns
 from augment.models import GenerationJob, Scenario, Simulation
-from augment.services.judging.simulations import DRIVES
+from augment.services.driving.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS
 from tests.services.backup_rows import NOW, PICTURE, a_full_house, contents, empty, quiet
 

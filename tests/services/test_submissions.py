@@ -16,12 +16,12 @@ from augment.benchmark.report import report_to_document
 from augment.benchmark.submission import check_submission
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.models import Contestant, Event, ModelCall, Submission
+from augment.services.benchmarks.benchmarks import benchmark_set
+from augment.services.benchmarks.submissions import decline_submission, withdraw_submission
 from augment.services.running.choosing import resolve_contestants
 from augment.services.running.entering import AcceptRequest, accept_submission
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.scenarios.benchmarks import benchmark_set
-from augment.services.scenarios.submissions import decline_submission, withdraw_submission
 from tests.entering import ANSWERS, CARD, a_benchmark, entrant, packed, read, sent
 from tests.jobs.rows import add_scenario
 

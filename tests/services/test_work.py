@@ -28,12 +28,12 @@ from augment.models import (
     UploadMoment,
     Work,
 )
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.driving import simulations
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import plan_probe
-from augment.services.judging import simulations
 from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.work import KINDS, Lease, Settlement, WorkKind
 from tests.jobs.rows import NOON, add_scenario, launch, only_row
 from tests.processes import wait_until

@@ -18,7 +18,7 @@ from arena.studies.services.opening import cancel_study
 from arena.studies.services.planning import frozen_rules
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from tests.board_rows import a_batch, a_board, day, newcomer, published, voted
 from tests.study_rows import picture
 

@@ -21,7 +21,7 @@ from augment.models import (
     Sweep,
     UploadMoment,
 )
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from tests.entering import entrant, read, sent
 from tests.web.cast import World
 

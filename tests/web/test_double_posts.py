@@ -24,9 +24,9 @@ from arena.site.api_urls import urlpatterns as OPERATIONS
 from arena.site.urls import urlpatterns as PAGES
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Benchmark, EndpointModel, GenerationJob, Scenario
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.running import jobs
 from augment.services.running.jobs import JobRequest
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from tests import entering, study_rows
 from tests.api.asking import error_of
 from tests.api.test_making import CAR, STREET

@@ -14,7 +14,7 @@ from arena.results.exports.writers import leaderboard_json
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Benchmark, Contestant, GenerationJob, Submission
-from augment.services.scenarios.submissions import SUBMISSIONS
+from augment.services.benchmarks.submissions import SUBMISSIONS
 from tests.api.tokens import program_of
 from tests.entering import ANSWERS, CARD, a_benchmark, entrant, packed, read, sent
 from tests.study_rows import a_study, vote

@@ -14,7 +14,7 @@ from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 from augment.baselines.rule_placer import place
 from augment.models import Scenario, Simulation, Sweep
 from augment.scene.codec import modification_to_document
-from augment.services.judging import sweeps
+from augment.services.driving import sweeps
 from tests.api.tokens import program_of
 from tests.jobs import rows
 from tests.jobs.test_sweeps import ACROSS, STRAIGHT, drive_tested, parked, settle_others

@@ -19,16 +19,9 @@ from arena.exports.formats import (
     table_formats,
 )
 from augment.models import GenerationJob
-from augment.services.judging.displacement import (
-    HORIZON_S,
-    PLACED_EXACTLY,
-    By,
-    Group,
-    groups,
-    list_objects,
-    of_job,
-)
-from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
+from augment.services.judging import PLACED_EXACTLY, list_objects
+from augment.services.judging.displacement import HORIZON_S, By, Group, groups, of_job
+from augment.services.scenarios import ScenarioType, in_type_order, type_choices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

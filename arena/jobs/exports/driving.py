@@ -7,8 +7,8 @@ from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, escape, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
-from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
+from augment.services.driving import CLOSE_M, DrivingLine, DrivingScores
+from augment.services.scenarios import ScenarioType, in_type_order, type_choices
 
 SCORE_LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
 DIFFERENCE = (

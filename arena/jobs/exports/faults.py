@@ -15,7 +15,7 @@ from arena.exports.latex import ValueColumns, latex_values
 from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.judging.findings import FaultClass
+from augment.services.judging import FaultClass
 
 _MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 _LABEL = (

@@ -16,8 +16,8 @@ from arena.exports.written_files import FileWork, MadeFile
 from arena.models import ScenarioFile
 from arena.studies.services.opening import product_version
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.scenario_export import Archive, export_job
-from augment.services.running.transcript_records import make_record, tries_by_augmentation
+from augment.services.judging import Archive, export_job
+from augment.services.running import make_record, tries_by_augmentation
 
 MANIFEST = "manifest.json"
 WRITTEN_WITH = ("numpy", "scenariogeneration", "shapely", "PyYAML")

@@ -8,14 +8,8 @@ from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, ta
 from arena.exports.latex import ValueColumns, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
 from augment.models import GenerationJob
-from augment.services.judging.realism import (
-    RANDOM_DRAWS,
-    SCORES,
-    RealismLine,
-    RealismTable,
-    Subject,
-    realism_of_job,
-)
+from augment.services.judging import RANDOM_DRAWS, RealismLine, RealismTable, realism_of_job
+from augment.services.judging.realism import SCORES, Subject
 
 
 def realism_notes(table: RealismTable) -> list[str]:

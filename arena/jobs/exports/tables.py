@@ -9,18 +9,17 @@ from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, 
 from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
-from augment.services.judging.analyses import (
-    ANALYSES,
-    SEED,
+from augment.services.driving import scores_of_job
+from augment.services.driving.simulations import SCORES
+from augment.services.judging import (
     augmentation_lines,
     read_answers,
+    realism_of_job,
     repeatability,
 )
+from augment.services.judging.analyses import ANALYSES, SEED
 from augment.services.judging.displacement import By
-from augment.services.judging.driving_scores import scores_of_job
-from augment.services.judging.realism import realism_of_job
-from augment.services.judging.simulations import SCORES
-from augment.services.running.progress import tool_calls
+from augment.services.running import tool_calls
 
 
 def _count(name: str) -> Callable[[Any], int | None]:

@@ -18,13 +18,10 @@ from arena.shell.acts import Confirmation, ask, is_sure, refusals_told, send_lat
 from arena.shell.forms import CapsForm
 from arena.shell.listing import choice_asked, page_asked, read_listing, read_page, search_asked
 from augment.models import Augmentation, GenerationJob
-from augment.services.inputs import read_request
-from augment.services.judging.analyses import repeatability
+from augment.services import read_request
+from augment.services.judging import repeatability
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.running import jobs, progress
-from augment.services.running.budget import Caps, count_unpriced
-from augment.services.running.progress import JobCounts
-from augment.services.running.workers import workforce
+from augment.services.running import Caps, JobCounts, count_unpriced, jobs, progress, workforce
 from augment.tasks import enqueue_job
 
 State = Augmentation.State

@@ -25,7 +25,7 @@ from arena.shell.acts import Confirmation, ask, is_sure, refusals_in, refusals_t
 from arena.shell.forms import offer
 from arena.voting.queries.showings import original_beside
 from augment.models import GenerationJob
-from augment.services.judging.findings import FaultClass
+from augment.services.judging import FaultClass
 
 
 class LabelForm(forms.Form):

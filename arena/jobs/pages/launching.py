@@ -18,13 +18,21 @@ from arena.shell.access import ADMIN, form_for, get_user
 from arena.shell.acts import refusals_in, send_later
 from arena.shell.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
-from augment.services.endpoints.contestants import OPTION_INPUTS
-from augment.services.inputs import read_request, read_values, to_inputs
-from augment.services.running.choosing import can_run, find_obstacle
-from augment.services.running.estimates import JobEstimate, estimate
-from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.matrix import add_cells, find_cells, make_matrix
-from augment.services.running.workers import workforce
+from augment.services import read_request, read_values, to_inputs
+from augment.services.endpoints import OPTION_INPUTS
+from augment.services.running import (
+    JobEstimate,
+    JobRequest,
+    JobScope,
+    add_cells,
+    can_run,
+    find_cells,
+    find_obstacle,
+    make_matrix,
+    workforce,
+)
+from augment.services.running.estimates import estimate
+from augment.services.running.jobs import launch
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120

@@ -31,11 +31,12 @@ from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.shell.acts import looks_again, refusals_told, send_later
 from arena.shell.listing import choice_asked, read_page
 from augment.models import GenerationJob, Simulation
-from augment.services.judging import driving_scores, simulations
-from augment.services.judging.analyses import ANALYSES, SEED, count_unmeasured, read_answers
+from augment.services.driving import NUPLAN, drive_file, driving_scores, simulations
+from augment.services.driving.simulations import SCORES, Options
+from augment.services.judging import count_unmeasured, read_answers
+from augment.services.judging.analyses import ANALYSES, SEED
 from augment.services.judging.displacement import By
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_measure, enqueue_simulations
 
 PDM_CLOSED = Options().planner

@@ -8,7 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from arena.people.services import create_person
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

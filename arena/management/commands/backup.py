@@ -6,7 +6,7 @@ from typing import Any
 from django.utils import timezone
 
 from arena.management.backups import take_backup
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

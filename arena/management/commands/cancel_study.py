@@ -6,7 +6,7 @@ from django.core.management.base import CommandError
 
 from arena.studies.queries import study_named
 from arena.studies.services.opening import cancel_study
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

@@ -15,7 +15,7 @@ from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, 
 from arena.serving.supervisor import Supervisor
 from arena.shell.sending import send_charts
 from arena.site.demo import JOB, list_slugs
-from augment.services.terminal import TerminalCommand, at_least
+from augment.services import TerminalCommand, at_least
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
 

@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from arena.management.doctor import Ailment, Level, examine
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

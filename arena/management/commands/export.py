@@ -14,8 +14,8 @@ from arena.results.services.boards import board_named
 from arena.scenarios.exports.benchmarks import write_benchmark
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
-from augment.services.scenarios.benchmarks import find_benchmark
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
+from augment.services.benchmarks import find_benchmark
 
 
 class Command(TerminalCommand):

@@ -4,7 +4,7 @@ from typing import Any
 
 from arena.studies.queries import study_named
 from arena.studies.services.taking_part import hand_over
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

@@ -6,8 +6,8 @@ from typing import Any
 from django.core.management.base import CommandParser
 
 from arena.management.backups import import_study
-from augment.services.judging.nuplan_results import import_results
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
+from augment.services.driving import import_results
 
 
 class Command(TerminalCommand):

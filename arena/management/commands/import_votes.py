@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from arena.studies.services.importing import import_votes
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

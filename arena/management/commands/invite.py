@@ -5,7 +5,7 @@ from typing import Any
 from arena.people.links import LINK_LIVES, make_link_path
 from arena.serving.stack import Web
 from arena.studies.queries import expert_lines, expert_named, study_named
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

@@ -8,9 +8,8 @@ from arena.rating.agreement import share_text
 from arena.results.queries.judges import judge_lines
 from arena.results.services.judges import judge_agreement, start_judge
 from arena.studies.queries import study_named
-from augment.services.inputs import add_options, read_request, to_inputs
-from augment.services.running.judge_runs import JUDGEMENTS, JudgeRequest
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand, add_options, read_request, to_inputs
+from augment.services.running import JUDGEMENTS, JudgeRequest
 
 
 class Command(TerminalCommand):

@@ -4,7 +4,7 @@ from typing import Any
 
 from arena.people.links import mark_author
 from arena.studies.queries import expert_named, study_named
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):

@@ -8,10 +8,9 @@ from arena.models import Study
 from arena.studies.queries import usual_checks
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
-from augment.services.inputs import add_options
-from augment.services.running.choosing import resolve_contestants
-from augment.services.scenarios.choosing import resolve_scenarios
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand, add_options
+from augment.services.running import resolve_contestants
+from augment.services.scenarios import resolve_scenarios
 
 
 class Command(TerminalCommand):

@@ -13,8 +13,8 @@ from django.db import connection
 
 from arena.exports.files import write_whole
 from arena.scenarios.services import redraw_pictures
-from augment.services.endpoints.contestants import ensure_builtin
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
+from augment.services.endpoints import ensure_builtin
 
 GERMAN = settings.BASE_DIR / "arena" / "locale" / "de" / "LC_MESSAGES" / "django.po"
 """The German texts of voters' pages."""

@@ -8,8 +8,7 @@ from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import log_early_look
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.queries import study_named
-from augment.services.inputs import read_request
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand, read_request
 
 
 class Command(TerminalCommand):

@@ -6,7 +6,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from arena.management import rate_csv
-from augment.services.terminal import TerminalCommand
+from augment.services import TerminalCommand
 
 _OPTIONS = tuple(signature(rate_csv.run).parameters)
 

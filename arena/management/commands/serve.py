@@ -9,7 +9,7 @@ from arena.management.demo import login_lines
 from arena.people.services import make_first_link_token
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
-from augment.services.terminal import TerminalCommand, at_least
+from augment.services import TerminalCommand, at_least
 
 INTERRUPTED = 130
 """The exit code of what Ctrl-C ended before it was done, as shells have it."""

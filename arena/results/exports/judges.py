@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from arena.exports.cells import csv_text
 from arena.results.queries.judges import answered_pairs, judge_name
 from augment.models import JudgeRun
-from augment.services.running.judge_runs import exchange
+from augment.services.running import exchange
 
 COLUMNS = (
     *("judge", "question", "scenario", "order", "picture_a", "picture_b"),

@@ -15,7 +15,7 @@ from arena.exports.cells import show_name
 from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from augment.errors import check_names
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.running.progress import list_cells
+from augment.services.running import list_cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

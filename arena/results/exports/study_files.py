@@ -16,7 +16,7 @@ from arena.results.queries.access import snapshot_to_export
 from arena.studies.services.files import why_not
 from arena.studies.services.planning import list_shown
 from augment.errors import Conflict
-from augment.services.judging.scenario_export import ExportOrigin, export_rows
+from augment.services.judging import ExportOrigin, export_rows
 
 
 class StudyFiles(FileWork[StudyFile]):

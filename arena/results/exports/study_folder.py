@@ -24,9 +24,9 @@ from arena.results.services import stored_rows
 from arena.results.services.restored_rows import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.judging.analyses import measure_job
-from augment.services.running.transcript_records import make_record, tries_by_augmentation
-from augment.services.scenarios.pictures import film_document, film_name
+from augment.services.judging import measure_job
+from augment.services.running import make_record, tries_by_augmentation
+from augment.services.scenarios import film_document, film_name
 
 File = tuple[str, bytes]
 

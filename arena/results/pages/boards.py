@@ -25,8 +25,8 @@ from arena.shell.acts import refusals_in, tell_errors
 from arena.shell.forms import RequestForm, offer
 from arena.voting.queries.blinding import refuse_open_judge
 from augment.models import Benchmark
-from augment.services.inputs import read_request, to_inputs
-from augment.services.scenarios.benchmarks import list_remarks
+from augment.services import read_request, to_inputs
+from augment.services.benchmarks import list_remarks
 
 DATA = {"csv": "text/csv; charset=utf-8", "json": "application/json"}
 LOOK = forms.CheckboxSelectMultiple

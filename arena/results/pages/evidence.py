@@ -23,7 +23,7 @@ from arena.shell.listing import page_asked
 from arena.shell.pictures import resize_picture
 from arena.voting.queries.blinding import is_imported
 from arena.voting.queries.showings import picture_of_side
-from augment.services.scenarios.scenes import type_choices
+from augment.services.scenarios import type_choices
 
 _ALL = ("", "all")
 

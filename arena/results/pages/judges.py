@@ -32,8 +32,8 @@ from arena.shell.acts import (
 from arena.shell.forms import RequestForm, offer
 from arena.voting.queries.blinding import is_imported
 from augment.models import EndpointModel, JudgeRun
-from augment.services.inputs import read_request, to_inputs
-from augment.services.running.judge_runs import JudgeEstimate, JudgeRequest, cancel_judge
+from augment.services import read_request, to_inputs
+from augment.services.running import JudgeEstimate, JudgeRequest, cancel_judge
 from augment.tasks import enqueue_judge
 
 MOVING = JudgeRun.State.RUNNING

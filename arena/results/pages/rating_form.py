@@ -15,8 +15,8 @@ from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_
 from arena.shell import sending
 from arena.shell.acts import send_later
 from arena.shell.forms import RequestForm, offer
-from augment.services.inputs import to_inputs
-from augment.services.scenarios.scenes import type_choices
+from augment.services import to_inputs
+from augment.services.scenarios import type_choices
 
 
 class AnyOf(forms.MultipleChoiceField):

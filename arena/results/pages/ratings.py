@@ -26,7 +26,7 @@ from arena.shell.accounts import top_role
 from arena.shell.acts import refusals_told, tell_errors, wait_for_workers
 from arena.studies.pages.studies import export_place
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access, votes_in
-from augment.services.inputs import read_request
+from augment.services import read_request
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""

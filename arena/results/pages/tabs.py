@@ -31,8 +31,8 @@ from arena.results.queries.votes import AUTOMATIC, Filters
 from arena.results.services.analysis import FEW_VOTES
 from arena.results.services.questions import compare_questions
 from augment.models import EndpointModel, Simulation
-from augment.services.judging.driving_scores import scores_of_augmentations
-from augment.services.judging.simulations import SCORES, Options
+from augment.services.driving import scores_of_augmentations
+from augment.services.driving.simulations import SCORES, Options
 
 Context = dict[str, Any]
 

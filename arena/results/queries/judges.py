@@ -11,8 +11,8 @@ from arena.models import Matchup, Study
 from arena.results.queries.votes import COUNTED, Filters, current_votes, last_vote_id
 from arena.voting.queries.blinding import is_imported
 from augment.models import Contestant, JudgeRun, ModelCall, PairJudgement
-from augment.services.endpoints.known_models import vendor_family
-from augment.services.running.judge_runs import Exchange, ShownPair, combine_answers, exchange
+from augment.services.endpoints import vendor_family
+from augment.services.running import Exchange, ShownPair, combine_answers, exchange
 
 State = PairJudgement.State
 

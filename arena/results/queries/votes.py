@@ -19,7 +19,7 @@ from arena.pairing.rules import Entry, draw_ties, make_grid, scenario_at
 from arena.voting.queries.blinding import is_imported
 from augment.errors import check_names
 from augment.models import Contestant
-from augment.services.scenarios.scenes import ScenarioType
+from augment.services.scenarios import ScenarioType
 
 Row = TypeVar("Row", bound=Model)
 

@@ -10,7 +10,7 @@ from arena.results.queries.judges import judge_preferences
 from arena.results.queries.votes import COUNTED, Filters, RatedVote, current_votes
 from arena.results.services.analysis import SCORES
 from arena.voting.queries.blinding import is_imported
-from augment.services.judging.metric_scores import metric_scores
+from augment.services.judging import metric_scores
 
 
 def rater_agreement(snapshot: Snapshot) -> tuple[agreement.AgreementLine, ...]:

@@ -33,7 +33,7 @@ from arena.rating.snapshot_document import (
 from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote
 from arena.voting.queries.blinding import is_imported
 from augment.services.judging.displacement import of_rows, summarise
-from augment.services.scenarios.scenes import in_type_order, type_label
+from augment.services.scenarios import in_type_order, type_label
 
 SCORES = {
     Vote.Outcome.LEFT.value: WIN,

@@ -19,8 +19,7 @@ from arena.studies.services.plan import opened_plan
 from arena.voting.services.pictures import find_showable
 from augment.errors import Conflict, check_names
 from augment.models import Contestant
-from augment.services.events import log_change
-from augment.services.inputs import InputKind, input_field
+from augment.services import InputKind, input_field, log_change
 
 MOST_OPPONENTS = 8
 """More spread a newcomer's votes over more pairs, and tell no more about it."""

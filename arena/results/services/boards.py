@@ -35,9 +35,8 @@ from arena.studies.queries import author_pairs
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, Scenario
-from augment.services.events import log_change
-from augment.services.scenarios.benchmarks import Split, list_remarks
-from augment.services.texts import one_line
+from augment.services import log_change, one_line
+from augment.services.benchmarks import Split, list_remarks
 
 LONGEST_NAME = 100
 

@@ -12,7 +12,7 @@ from arena.results.queries.votes import Filters, current_votes, last_vote_id
 from arena.results.services.agreement import judge_raters, pair_votes
 from augment.errors import check_names
 from augment.models import JudgeRun
-from augment.services.running.judge_runs import (
+from augment.services.running import (
     JudgeEstimate,
     JudgeRequest,
     ShownPair,

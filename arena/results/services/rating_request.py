@@ -10,8 +10,8 @@ from arena.rating.rules import FEWEST_DRAWS, METHOD_TEXTS, MOST_DRAWS, UNIT_TEXT
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, Choices
 from arena.studies.services.plan import HIGHEST_SEED
-from augment.services.inputs import InputKind, input_field
-from augment.services.scenarios.choosing import types_named
+from augment.services import InputKind, input_field
+from augment.services.scenarios import types_named
 
 INTERVALS = {
     Intervals.CLOSED_FORM.value: "in closed form",

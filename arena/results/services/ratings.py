@@ -41,9 +41,7 @@ from arena.studies.services.opening import product_version
 from arena.voting.queries.blinding import is_imported, votes_in
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, check_names
-from augment.services.clock import Moment
-from augment.services.events import log_change
-from augment.services.work import Lease, WorkKind
+from augment.services import Lease, Moment, WorkKind, log_change
 
 DEFAULT_ROUNDS = 10_000
 WHILE_WAITING = 20_000

@@ -18,8 +18,7 @@ from arena.voting.services.casting import Decision
 from arena.voting.services.reports import Complaint
 from augment.errors import AugmentError
 from augment.models import FAILED, Augmentation, GenerationJob, Work
-from augment.services import row_rules
-from augment.services.texts import check_picture_name, one_line
+from augment.services import check_picture_name, one_line, row_rules
 
 # --- Rules of rows that a backup or a study's folder brings -------------------------------------
 

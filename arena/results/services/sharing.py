@@ -5,7 +5,7 @@ from django.db import transaction
 
 from arena.errors import StudyStillOpen
 from arena.models import SharedRating, Snapshot, Study
-from augment.services.events import log_change
+from augment.services import log_change
 
 
 @transaction.atomic

@@ -20,8 +20,8 @@ from django.db.models import QuerySet
 
 from arena.results.services.restored_rows import REFUSALS
 from augment.models import Contestant
+from augment.services import make_storable
 from augment.services.endpoints.contestants import BUILTIN
-from augment.services.texts import make_storable
 
 LEFT_OUT = frozenset(
     {

@@ -8,8 +8,8 @@ from arena.exports.files import WARNING, new_folder, zip_bytes
 from arena.exports.written_files import FileWork, MadeFile
 from arena.models import BenchmarkFile
 from augment.models import BaseScene, Benchmark
-from augment.services.judging.scenario_export import Source, list_warnings, scene_source
-from augment.services.scenarios.benchmarks import benchmark_set, list_remarks, write_folder
+from augment.services.benchmarks import benchmark_set, list_remarks, write_folder
+from augment.services.judging import Source, list_warnings, scene_source
 
 
 def write_benchmark(row: Benchmark, out: Path) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from arena.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
 from arena.exports.formats import Columns, Dtype, Sheet, drawings, make_sheet, table_formats
-from augment.services.judging.thresholds import SweepResult, driver_name
+from augment.services.driving import SweepResult, driver_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,16 +14,22 @@ from arena.shell.forms import RequestForm
 from arena.shell.pictures import picture_response, resize_picture
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
-from augment.services.inputs import read_request, to_inputs
+from augment.services import read_request, to_inputs
+from augment.services.judging import check_augmentation
 from augment.services.judging.displacement import of_augmentation
-from augment.services.judging.findings import check_augmentation
+from augment.services.running import (
+    FollowUpRequest,
+    ask_follow_up,
+    full_transcript,
+    list_tries,
+    steps_to,
+    sum_totals,
+)
 from augment.services.running.calls import IMAGES
-from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, steps_to
-from augment.services.running.transcript_records import full_transcript, list_tries, sum_totals
-from augment.services.scenarios import pictures
-from augment.services.scenarios.prompts import (
+from augment.services.scenarios import (
     ShownPrompt,
     list_recipes,
+    pictures,
     preview_prompt,
     prompt_version,
 )

@@ -29,10 +29,13 @@ from arena.shell.acts import refusals_in, send_later, wait_for_workers
 from arena.shell.forms import RequestForm
 from augment.errors import Conflict
 from augment.models import Benchmark
-from augment.services.events import retire
-from augment.services.inputs import read_request, to_inputs
-from augment.services.scenarios import benchmarks
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark, plan_benchmark
+from augment.services import read_request, retire, to_inputs
+from augment.services.benchmarks import (
+    BenchmarkRequest,
+    benchmarks,
+    make_benchmark,
+    plan_benchmark,
+)
 
 
 class BenchmarkForm(RequestForm):

@@ -17,11 +17,16 @@ from arena.shell.forms import offer, read_code, read_json
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services.judging.findings import check_edit
+from augment.services.judging import check_edit
 from augment.services.running import by_hand
-from augment.services.scenarios import editing, scenes
-from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
-from augment.services.scenarios.scene_imports import note_sentences
+from augment.services.scenarios import (
+    SceneView,
+    editing,
+    is_drawn,
+    note_sentences,
+    scene_picture,
+    scenes,
+)
 from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
 LONGEST_CHANGE = 1_000_000

@@ -15,21 +15,22 @@ from arena.shell.forms import read_code, read_json
 from arena.shell.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
-from augment.services.endpoints.contestants import ensure_builtin
-from augment.services.events import retire
-from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios import bulk
-from augment.services.scenarios.catalogue import load_catalogue
-from augment.services.scenarios.editing import (
+from augment.services import retire
+from augment.services.endpoints import ensure_builtin
+from augment.services.running import plan_reading
+from augment.services.scenarios import (
     accept_reading,
+    bulk,
     enter_intent,
     intent_statements,
+    is_drawn,
     last_reading,
+    load_catalogue,
+    note_sentences,
+    reference_picture,
+    type_choices,
     waiting_reading,
 )
-from augment.services.scenarios.pictures import is_drawn, reference_picture
-from augment.services.scenarios.scene_imports import note_sentences
-from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_reading, enqueue_scenario
 
 SCENARIOS_AT_ONCE = 16

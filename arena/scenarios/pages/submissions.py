@@ -17,11 +17,11 @@ from arena.shell.acts import refusals_in, send_later, wait_for_workers
 from arena.shell.forms import RequestForm, offer
 from arena.shell.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
-from augment.services.endpoints.contestants import make_free_slug
-from augment.services.inputs import read_request, to_inputs
-from augment.services.running.entering import AcceptRequest, accept_submission
-from augment.services.scenarios import submissions
-from augment.services.scenarios.uploads import most_megabytes
+from augment.services import read_request, to_inputs
+from augment.services.benchmarks import submissions
+from augment.services.endpoints import make_free_slug
+from augment.services.running import AcceptRequest, accept_submission
+from augment.services.scenarios import most_megabytes
 from augment.tasks import enqueue_job, enqueue_submission
 
 AT_ONCE = 50

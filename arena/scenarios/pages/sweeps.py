@@ -17,10 +17,8 @@ from arena.shell import acts
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.forms import RequestForm, offer
 from augment.models import Scenario, Sweep
-from augment.services.inputs import read_request, to_inputs
-from augment.services.judging import sweeps
-from augment.services.judging.simulations import list_allowed_planners
-from augment.services.judging.thresholds import driver_name, sweep_result
+from augment.services import read_request, to_inputs
+from augment.services.driving import driver_name, list_allowed_planners, sweep_result, sweeps
 from augment.tasks import enqueue_scenario, enqueue_sweep
 
 KEPT = ("number", "low", "high", "count", "planner", "offsets")

@@ -16,9 +16,8 @@ from arena.shell.forms import read_code
 from arena.shell.listing import read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
-from augment.services.scenarios import uploads
-from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
-from augment.services.scenarios.scene_imports import free_slug, note_sentences
+from augment.services.scenarios import SceneView, is_drawn, note_sentences, scene_picture, uploads
+from augment.services.scenarios.scene_imports import free_slug
 from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 UPLOADS_SHOWN = 10

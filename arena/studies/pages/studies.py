@@ -44,7 +44,7 @@ from arena.studies.services.opening import cancel_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, opened_plan
 from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access
-from augment.services.inputs import InputKind
+from augment.services import InputKind
 
 STUDIES_AT_ONCE = 25
 

@@ -12,9 +12,7 @@ from arena.models import Study, StudyDraft
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, opened_plan
 from augment.errors import Conflict
-from augment.services.events import log_change
-from augment.services.inputs import InputKind
-from augment.services.texts import make_storable
+from augment.services import InputKind, log_change, make_storable
 
 Entered = dict[str, str | bool | list[str]]
 """Every field of the form: a text as it was typed, a switch, or names."""

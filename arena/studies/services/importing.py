@@ -14,8 +14,7 @@ from arena.models import ImportedVote, Study, VoteFile
 from arena.rating import votes_file
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
-from augment.services.events import log_change
-from augment.services.texts import one_line
+from augment.services import log_change, one_line
 
 LONGEST_CELL = 200
 

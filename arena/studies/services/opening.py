@@ -31,11 +31,10 @@ from arena.voting.services.pictures import Cells, check_pictures, require_checks
 from arena.voting.services.practice import require_practice_pictures
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.treatments import read_options
-from augment.services.events import log_change
-from augment.services.judging.displacement import alike_pairs
-from augment.services.running.choosing import find_job
-from augment.services.texts import check_prose, one_line
+from augment.services import check_prose, log_change, one_line
+from augment.services.endpoints import read_options
+from augment.services.judging import alike_pairs
+from augment.services.running import find_job
 
 PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""

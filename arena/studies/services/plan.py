@@ -10,7 +10,7 @@ from arena.errors import NothingToPlan
 from arena.models import Question, Snapshot, Study
 from arena.pairing.rules import MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.voting.services.shown_pictures import SampleRule
-from augment.services.inputs import InputKind, input_field, to_inputs
+from augment.services import InputKind, input_field, to_inputs
 
 MOST = 100
 LONGEST = 500

@@ -26,7 +26,7 @@ from arena.voting.services.pictures import (
 )
 from arena.voting.services.shown_pictures import find_frames, frames_shown, shown_sides
 from augment.models import Augmentation, Scenario
-from augment.services.scenarios.pictures import legends_of_changes
+from augment.services.scenarios import legends_of_changes
 
 _PLAIN = (
     *("votes_per_expert", "seed", "scenario_gap", "repeat_share", "repeat_distance"),

@@ -23,8 +23,7 @@ from arena.studies.services.drafts import rename_in_drafts
 from arena.studies.services.opening import find_named
 from arena.studies.services.planning import Planning, list_planned
 from augment.errors import Conflict
-from augment.services.events import log_change
-from augment.services.texts import is_readable_line, one_line
+from augment.services import is_readable_line, log_change, one_line
 
 LONGEST_CONSENT, LONGEST_ID = 5_000, 120
 _PLACEHOLDER = re.compile(r"\{\{|\}\}|\$\{")

@@ -11,8 +11,8 @@ from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
 from arena.shell.accounts import top_role
 from augment.models import Augmentation, Simulation
-from augment.services.judging.simulations import blind_drive
-from augment.services.scenarios.pictures import camera_key, film_name
+from augment.services.driving import blind_drive
+from augment.services.scenarios import camera_key, film_name
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},

@@ -21,7 +21,7 @@ from arena.models import AIDS, Matchup, Question, Study, Vote
 from arena.voting.queries.ballots import VotingProgress, hold_matchup, require_open, voting_state
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
-from augment.services.texts import make_storable
+from augment.services import make_storable
 
 LONGEST_COMMENT = 1000
 PACE_WINDOW = timedelta(seconds=5)

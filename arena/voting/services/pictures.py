@@ -10,7 +10,7 @@ from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, Entry, PlanRules
 from arena.pairing.rules import sample_place, scenario_at
 from augment.models import Augmentation, Contestant, Scenario
-from augment.services.scenarios.pictures import camera_key
+from augment.services.scenarios import camera_key
 
 Pair = tuple[Augmentation, Augmentation]
 """A right picture and a broken one of the same scenario."""

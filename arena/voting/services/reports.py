@@ -11,7 +11,7 @@ from arena.models import Matchup, Report, Study
 from arena.voting.queries.ballots import own_matchup
 from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
-from augment.services.texts import make_storable
+from augment.services import make_storable
 
 SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
 """What a browser says of a side: the left picture is A."""

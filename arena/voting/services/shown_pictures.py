@@ -19,13 +19,8 @@ from arena.voting.queries.showings import LEGEND, VIEW_OF_OLD
 from arena.voting.services.pictures import Cells, find_showable
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
-from augment.services.judging.simulations import Options
-from augment.services.scenarios.pictures import (
-    camera_key,
-    legend_of_scene,
-    load_camera,
-    picture_view,
-)
+from augment.services.driving.simulations import Options
+from augment.services.scenarios import camera_key, legend_of_scene, load_camera, picture_view
 
 MOST_NAMED = 8
 """So many missing pictures are named, the others counted."""

@@ -14,7 +14,7 @@ from arena.models import Study, Vote
 from arena.voting.services.casting import Decision, cast_vote
 from augment.errors import Conflict
 from augment.models import Augmentation
-from augment.services.events import log_change
+from augment.services import log_change
 from augment.services.judging.displacement import of_augmentation
 
 NOISE_M = 1.5

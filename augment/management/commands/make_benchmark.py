@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.inputs import read_request
-from augment.services.scenarios.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.terminal import TerminalCommand
 
 

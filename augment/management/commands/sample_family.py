@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from augment.services.judging.sweeps import add_family
+from augment.services.driving.sweeps import add_family
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.terminal import TerminalCommand
 

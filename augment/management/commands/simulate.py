@@ -7,9 +7,9 @@ from django.db import transaction
 from django.db.models import Q
 
 from augment.models import Scenario, Simulation
-from augment.services.judging import driving_scores, simulations
-from augment.services.judging.drive_files import drive_files, read_shard
-from augment.services.judging.simulations import SCORES, Options
+from augment.services.driving import driving_scores, simulations
+from augment.services.driving.drive_files import drive_files, read_shard
+from augment.services.driving.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_simulations

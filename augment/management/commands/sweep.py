@@ -5,10 +5,10 @@ from typing import Any
 
 from django.db import transaction
 
+from augment.services.driving import simulations
+from augment.services.driving.sweeps import SweepRequest, plan_sweep, write_values
+from augment.services.driving.thresholds import SweepResult, sweep_result
 from augment.services.inputs import read_request
-from augment.services.judging import simulations
-from augment.services.judging.sweeps import SweepRequest, plan_sweep, write_values
-from augment.services.judging.thresholds import SweepResult, sweep_result
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_sweep

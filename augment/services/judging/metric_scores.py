@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from augment.checks import Severity
 from augment.models import Augmentation, Contestant, Simulation
+from augment.services.driving.simulations import SCORES, Options
 from augment.services.judging.displacement import of_rows
 from augment.services.judging.findings import FINDINGS
-from augment.services.judging.simulations import SCORES, Options
 
 SAME_M = 0.15
 """Displacements that differ by no more are equal: objects so near each other look the same."""

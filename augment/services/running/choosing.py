@@ -9,10 +9,10 @@ from django.db.models import Q
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName, check_names
 from augment.models import Contestant, GenerationJob, Scenario
+from augment.services.benchmarks.submissions import refuse_unanswered
 from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.services.endpoints.treatments import other_prompts, read_options, read_respondents
 from augment.services.scenarios.choosing import ALL
-from augment.services.scenarios.submissions import refuse_unanswered
 from augment.variants.options import ToolProtocol
 from augment.variants.respondents import ModelRole
 

@@ -7,13 +7,13 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.models import Contestant, GenerationJob, Submission
+from augment.services.benchmarks.submissions import Decision, State, decide, lock_undecided
 from augment.services.endpoints.contestants import LONGEST_NAME
 from augment.services.endpoints.known_endpoints import SLUG_RULE
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.scenarios.scenes import check_slug
-from augment.services.scenarios.submissions import Decision, State, decide, lock_undecided
 from augment.services.texts import one_line
 from augment.variants.options import MOST_SAMPLES
 

@@ -26,6 +26,7 @@ from augment.prompts.fill import Messages, follow_up_messages
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.density import fit_boxes
 from augment.scene.entities import Scene
+from augment.services.benchmarks.submissions import find_entry
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.treatments import Treatment, read_respondents, read_treatment
@@ -39,7 +40,6 @@ from augment.services.scenarios.scenes import (
     load_scene,
     scenario_seed,
 )
-from augment.services.scenarios.submissions import find_entry
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline

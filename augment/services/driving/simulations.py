@@ -16,7 +16,7 @@ from augment.scene.codec import modification_from_document, recording_from_docum
 from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
-from augment.services.judging.thresholds import conclude, conclude_all
+from augment.services.driving.thresholds import conclude, conclude_all
 from augment.services.scenarios.scenes import known_type, load_reference, load_scene
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run

@@ -23,9 +23,9 @@ from augment.benchmark.submission import check_submission
 from augment.benchmark.values import EntryStatus, SubmissionReport, SubmittedEntry
 from augment.errors import Conflict
 from augment.models import Benchmark, Contestant, Submission
+from augment.services.benchmarks.benchmarks import benchmark_set
 from augment.services.clock import DATABASE_TIME
 from augment.services.events import log_change
-from augment.services.scenarios.benchmarks import benchmark_set
 from augment.services.scenarios.uploads import keep_file, open_file, plain_name
 from augment.services.texts import check_prose, make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind

@@ -10,7 +10,7 @@ from django.db.models import Q, QuerySet
 
 from augment.models import Contestant, GenerationJob, NuplanResult, Scenario, Simulation
 from augment.scene.entities import ScenarioType, in_type_order
-from augment.services.judging.simulations import SCORES, Options
+from augment.services.driving.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject
 _NO_COLLISION = "no_ego_at_fault_collisions"

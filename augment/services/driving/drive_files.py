@@ -14,7 +14,7 @@ from typing import Any
 from augment.errors import Conflict
 from augment.formats.documents import read_json
 from augment.scene import codec
-from augment.services.judging.simulations import NUPLAN, Options, drive_document, load_planner
+from augment.services.driving.simulations import NUPLAN, Options, drive_document, load_planner
 from augment.simulation.drive import find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive

@@ -16,10 +16,10 @@ from augment.models import Scenario, Simulation, Sweep, SweepValue
 from augment.scene import codec
 from augment.scene.entities import Modification, Scene
 from augment.scene.numbers import MOST_VALUES, list_numbers, set_number, sweep_values
+from augment.services.driving.simulations import Options, load_planner
+from augment.services.driving.thresholds import tell_difference
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
-from augment.services.judging.simulations import Options, load_planner
-from augment.services.judging.thresholds import tell_difference
 from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import (
     add_variant,
