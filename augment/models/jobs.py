@@ -143,10 +143,7 @@ class Augmentation(Work):
     @property
     def is_answer(self) -> bool:
         """True if a change came out: its own, or the one before a follow-up that was refused."""
-        return self.modification is not None and self.state in (
-            self.State.DONE,
-            self.State.REFUSED,
-        )
+        return bool(self.modification) and self.state in (self.State.DONE, self.State.REFUSED)
 
 
 class Attempt(models.Model):
