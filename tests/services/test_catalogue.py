@@ -2,6 +2,7 @@ import json
 import shutil
 from collections import Counter
 from collections.abc import Callable
+from datetime import date
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -10,9 +11,18 @@ from typing import Any
 import pytest
 from django.contrib.auth.models import User
 from django.core.management import call_command
+from django.utils import timezone
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
+from augment.models import (
+    Augmentation,
+    BaseScene,
+    Benchmark,
+    Contestant,
+    Event,
+    GenerationJob,
+    Scenario,
+)
 from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
@@ -56,7 +66,7 @@ def edit(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
 
 def augment(scenario: Scenario) -> None:
     job = GenerationJob.objects.create(name="first")
-    contestant = Contestant.objects.create(slug="ada", name="Ada", kind="human")
+    contestant, _ = Contestant.objects.get_or_create(slug="ada", name="Ada", kind="human")
     Augmentation.objects.create(job=job, scenario=scenario, contestant=contestant)
 
 
@@ -144,18 +154,57 @@ def test_the_moving_set_brings_those_scenes_of_the_others_that_it_is_on(folder: 
     assert again == report(scenes=(0, 0, 1), scenarios=(0, 0, 1))
 
 
-@pytest.mark.parametrize(
-    ("file", "field"), [("scenarios/parked-car", "instruction"), ("scenes/street", "provenance")]
-)
-def test_what_was_augmented_stays_as_stored_and_is_named(
-    folder: Path, file: str, field: str
-) -> None:
+def test_a_scene_that_was_augmented_stays_as_stored_and_is_named(folder: Path) -> None:
     load_catalogue(folder=folder)
     augment(Scenario.objects.get())
-    edit(folder / f"{file}.json", lambda it: it.update({field: "other"}))
+    edit(folder / "scenes/street.json", lambda it: it.update(provenance="other"))
     assert load_catalogue(folder=folder).kept == ("parked-car",)
-    assert Scenario.objects.get().instruction == PARKED.instruction
     assert BaseScene.objects.get().provenance != "other"
+
+
+def _move_to(at_m: float, entry: dict[str, Any]) -> None:
+    entry["reference"]["add"][0]["x_m"] = at_m
+
+
+def hand_out(scenario: Scenario) -> None:
+    benchmark = Benchmark.objects.create(slug="b", version=1, made_on=date(2026, 1, 1))
+    benchmark.items.create(scenario=scenario, position=1, split="test", stratum="easy")
+
+
+@pytest.mark.parametrize("use", [augment, hand_out])
+def test_what_is_in_use_stays_and_its_file_becomes_a_new_version(
+    folder: Path, use: Callable[[Scenario], None]
+) -> None:
+    then = folder / "scenarios/then.json"
+    shutil.copy(folder / "scenarios/parked-car.json", then)
+    edit(then, lambda it: it.update(slug="then", follows="parked-car"))
+    load_catalogue(folder=folder)
+    first = Scenario.objects.get(slug="parked-car")
+    before = Scenario.objects.values().get(pk=first.pk)
+    use(first)
+    for at_m, version in ((21.0, "-v2"), (22.0, "-v3")):
+        file = folder / "scenarios/parked-car.json"
+        edit(file, partial(_move_to, at_m))
+        loaded = load_catalogue(folder=folder)
+        assert loaded.scenarios == {CatalogueStep.RENEWED: 2}
+        assert load_catalogue(folder=folder).scenarios == {CatalogueStep.UNCHANGED: 2}
+        newest = Scenario.objects.get(slug=f"parked-car{version}")
+        assert (newest.origin, newest.catalogue_set) == (first.origin, "paper")
+        reference = load_reference(newest)
+        assert reference is not None
+        assert reference.added[0].x_m == at_m
+        assert Scenario.objects.get(slug=f"then{version}").follows == newest
+        assert resolve_scenarios(["catalogue"]) == [newest.slug, f"then{version}"]
+        augment(newest)
+    first.refresh_from_db()
+    assert first.retired_at is not None
+    after = Scenario.objects.values().get(pk=first.pk)
+    assert after | {"retired_at": None} == before
+    file = folder / "scenarios/parked-car.json"
+    Scenario.objects.filter(slug="parked-car-v3").update(retired_at=timezone.now())
+    edit(file, partial(_move_to, 23.0))
+    load_catalogue(folder=folder)
+    assert resolve_scenarios(["catalogue"]) == ["then-v4"]  # what a person retired stays so
 
 
 def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Path) -> None:

@@ -41,10 +41,10 @@ class Command(TerminalCommand):
         paraphrased = options["paraphrases"]
         report = load_catalogue(folder=folder, sets=sets, with_paraphrases=paraphrased)
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):
-            steps = ", ".join(f"{counts[step]} {step}" for step in list(CatalogueStep)[:3])
+            steps = ", ".join(f"{counts[step]} {step}" for step in list(CatalogueStep)[:4])
             self.stdout.write(f"{kind}: {steps}")
         if report.kept:
             self.stdout.write(
-                "kept as stored, because they or their scene were augmented, although the "
-                f"catalogue has a newer version: {', '.join(report.kept)}"
+                "kept as stored, because their scene was augmented, although the catalogue has a "
+                f"newer version: {', '.join(report.kept)}"
             )

@@ -7,12 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import Q
 
 from augment.errors import Conflict, InvalidDocument, InvalidModification, check_names
 from augment.formats.documents import read_json
@@ -20,7 +22,7 @@ from augment.models import Augmentation, BaseScene, Scenario
 from augment.scene import codec
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.services.events import log_change
+from augment.services.events import log_change, retire
 from augment.services.scenarios import scenes as scene_rows
 
 SOURCE = "authored"
@@ -102,11 +104,16 @@ def _read_files(
 
 
 class CatalogueStep(StrEnum):
-    """Result of loading a file; `KEPT` if the stored version differs and is in use."""
+    """Result of loading a file that differs from what is stored, or doesn't.
+
+    Of a scenario in use the file becomes a new version beside it (`RENEWED`); of a scene in use
+    the stored one stays, with its scenarios (`KEPT`).
+    """
 
     ADDED = "added"
     CHANGED = "changed"
     UNCHANGED = "unchanged"
+    RENEWED = "new versions"
     KEPT = "kept"
 
 
@@ -115,8 +122,8 @@ class CatalogueReport:
     """Numbers of scenes and scenarios that a loading added, changed and left.
 
     Attributes:
-        kept: Scenarios whose file has changed and that stay as they were stored, because
-            something was made from them or from their scene.
+        kept: Scenarios that stay as they were stored, because their scene has changed and
+            something was made from it.
     """
 
     scenes: Counter[CatalogueStep]
@@ -134,9 +141,10 @@ def load_catalogue(
 ) -> CatalogueReport:
     """Bring the rows in line with the files, all of them or none; twice changes nothing.
 
-    Rows whose file is gone stay. So does a scenario of which augmentations were made, and a scene
-    with all its scenarios once something was made on it: the stored version is what they were
-    made from. The report names them.
+    Rows whose file is gone stay. So does a scenario of which augmentations were made or that a
+    benchmark hands out: if its file has changed it is retired, and a new version with a slug of
+    its own (`SLUG-v2`) stands beside it. A scene stays with all its scenarios once something was
+    made on it, and the report names them.
 
     Args:
         folder: Holds `scenes` and `scenarios`, and those of the other sets in `hard` and
@@ -167,9 +175,9 @@ def load_catalogue(
                 steps[entry.slug] = CatalogueStep.KEPT
                 continue
             steps[entry.slug] = _store_scenario(entry, which, None, actor)
-            if not with_paraphrases or steps[entry.slug] is CatalogueStep.KEPT:
+            if not with_paraphrases:
                 continue
-            original = Scenario.objects.get(slug=entry.slug)
+            original = _find_newest(entry.slug)
             for number, wording in enumerate(entry.paraphrases, start=1):
                 slug, text = f"{entry.slug}-p{number}", wording.text
                 said = replace(entry, slug=slug, instruction=text, language=wording.language)
@@ -212,7 +220,8 @@ def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
 def _store_scenario(
     entry: codec.CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
 ) -> CatalogueStep:
-    row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
+    row, slug = _find_newest(entry.slug), entry.slug
+    follows = _find_newest(entry.follows) if entry.follows else None
     intent = None if entry.intent is None else codec.intent_to_document(entry.intent)
     said: dict[str, Any] = {
         "type": entry.type.value,
@@ -229,34 +238,61 @@ def _store_scenario(
     own["type_label"] = scene_rows.label_for(entry.type)
     if original is not None:
         own["origin"] = original.origin
-    if row is None:
-        origin = IntentOrigin.AUTHORED
-        new = scene_rows.NewScenario(
-            scene=entry.scene, slug=entry.slug, **said, intent_origin=origin, follows=entry.follows
-        )
-        row = scene_rows.add_scenario(new, actor=actor)
-        Scenario.objects.filter(pk=row.pk).update(**own)
-        return CatalogueStep.ADDED
+    if row is not None:
+        wanted = own | said | {"base_scene": BaseScene.objects.get(slug=entry.scene)}
+        wanted["follows"] = follows
+        wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
+        step = _update_scenario(row, wanted, actor)
+        if step is not CatalogueStep.RENEWED:
+            return step
+        taken = set(Scenario.objects.values_list("slug", flat=True))
+        slug = next(name for n in count(2) if (name := f"{entry.slug}-v{n}") not in taken)
+        own |= {"origin": row.origin, "retired_at": row.retired_at}
+        retire(row, actor=actor)
+    new = scene_rows.NewScenario(
+        scene=entry.scene,
+        slug=slug,
+        **said,
+        intent_origin=IntentOrigin.AUTHORED,
+        follows=follows.slug if follows else entry.follows,
+    )
+    added = scene_rows.add_scenario(new, actor=actor)
+    Scenario.objects.filter(pk=added.pk).update(**own)
+    return CatalogueStep.ADDED if row is None else CatalogueStep.RENEWED
+
+
+def _find_newest(slug: str) -> Scenario | None:
+    """Return the newest version of a scenario of the catalogue; the first has the bare slug."""
+    is_later = Q(slug__regex=rf"^{slug}-v[0-9]+$") & ~Q(catalogue_set="")
+    rows = Scenario.objects.filter(Q(slug=slug) | is_later).select_related("base_scene")
+    return rows.order_by("pk").last()
+
+
+def _update_scenario(row: Scenario, wanted: dict[str, Any], actor: User | None) -> CatalogueStep:
+    """Store what has changed, unless that takes a new version."""
     if not row.in_catalogue:
         raise Conflict(
             f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
             "the catalogue does not replace it."
         )
-    wanted = own | said
-    wanted["base_scene"] = BaseScene.objects.get(slug=entry.scene)
-    first = scene_rows.scenario_named(entry.follows) if entry.follows else None
-    if first is not None and first.pk >= row.pk:
-        raise Conflict(f"{row.slug!r} can't follow {first.slug!r}, which came after it.")
-    wanted["follows"] = first
-    wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
         return CatalogueStep.UNCHANGED
     # An intent where there was none changes nothing that anybody was shown or asked.
     seen = set(changed) - {"intent", "intent_origin"}
-    if (row.intent is not None or seen) and row.augmentations.exists():
-        return CatalogueStep.KEPT
+    if (row.intent is not None or seen) and _is_in_use(row, wanted["follows"]):
+        return CatalogueStep.RENEWED
     image = {"original_image": ""} if seen else {}
     Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
     log_change(row, "change", actor, after={"slug": row.slug, "changed": changed})
     return CatalogueStep.CHANGED
+
+
+def _is_in_use(row: Scenario, follows: Scenario | None) -> bool:
+    """Return whether a scenario can't change: it was asked or handed out, or would follow later.
+
+    What it follows comes before it, so it is written anew after a new version of that.
+    """
+    handed_out = row.benchmark_items.filter(benchmark__retired_at=None)
+    is_before = follows is not None and follows.pk > row.pk
+    return is_before or row.augmentations.exists() or handed_out.exists()
