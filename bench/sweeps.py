@@ -62,7 +62,7 @@ def plan(count: int) -> None:
     scenario = add_scenario("street", scene=replace(street, lanes=lanes), reference=document)
     how = asdict(Options(planner="idm"))
     for _ in range(count // VALUES):
-        sweep = Sweep.objects.create(scenario=scenario, number="add[0].x_m", **how)
+        sweep = Sweep.objects.create(scenario=scenario, number="add[0].x_m", planner="idm")
         rows = []
         for place in range(VALUES):
             document["add"][0]["x_m"] = place * end_m / VALUES

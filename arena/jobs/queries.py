@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 from uuid import UUID
 
@@ -99,7 +99,7 @@ def grid_part(job: GenerationJob, part: Part) -> dict[str, Any]:
 
 def find_unmodified_drive(row: Simulation) -> Simulation | None:
     """The same scene before the change, driven the same way; None until that is done."""
-    options = Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
+    options = Options(**{field.name: getattr(row, field.name) for field in fields(Options)})
     rows = options.of(Simulation.objects.filter(scenario_id=row.scenario_id))
     drives = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
     return drives.exclude(pk=row.pk).first()

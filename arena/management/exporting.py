@@ -1,7 +1,7 @@
 """Kinds of `manage.py export`: the arguments of each, and the file that it makes."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from uuid import UUID
@@ -136,9 +136,11 @@ def _write_driving(options: Chosen, say: Say) -> ExportedFile:
     how = simulations.Options(
         planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
     )
-    if how not in options_driven(job):
+    driven = [one for one in options_driven(job) if replace(one, version=how.version) == how]
+    if not driven:
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
-    return _write_table(f"driving-{options['score']}", options, options=how)
+    newest = max(driven, key=lambda one: one.version)
+    return _write_table(f"driving-{options['score']}", options, options=newest)
 
 
 def _write_samples(options: Chosen, say: Say) -> ExportedFile:

@@ -18,7 +18,7 @@ from augment.scene.intent import Spot
 from augment.scene.intent_parts import MotionWish, Side, StartWish
 from augment.scene.motion import STEP_S
 from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo, PlannedMotion
-from augment.scene.planned_mover import PlannedMover
+from augment.scene.planned_mover import PlannedMover, walk_as_motion
 from augment.scene.presets import find_bend_end
 
 _CARRIED_OUT_S = 15.0
@@ -36,25 +36,28 @@ def check_course(asked: Case) -> Iterator[Finding]:
     before = {agent.id: agent for agent in asked.route.scene.agents}
     for party in asked.parties:
         wish: MotionWish | None = getattr(party.request, "motion", None)
-        for agent in party.agents if wish is not None else ():
+        for agent in map(walk_as_motion, party.agents if wish is not None else ()):
             assert wish is not None
             if agent.id in before and party.request.spot == Spot():
                 off_m, wanted = apart_m(agent, before[agent.id]), asked.tolerances.distance_m
                 words = f"{{agents[0]}} is {off_m:.2f} m from where it was and is to stay."
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
-            if agent.motion is None:
+            motion = agent.motion
+            if motion is None and agent.speed_mps > 0.0:
+                motion = PlannedMotion()  # it holds its velocity along its lane
+            if motion is None:
                 words = f"{{agents[0]}} has no motion; asked for: {wish.preset.label.lower()}."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
             if wish.start is not None:
-                yield from _start(asked, agent, agent.motion, wish.start)
-            states = _carry_out(asked, agent, agent.motion)
+                yield from _start(asked, agent, motion, wish.start)
+            states = _carry_out(asked, agent, motion)
             if not len(states):
                 words = "{agents[0]} has left the map before its motion begins."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
             yield from check_path(asked, agent, wish, states)
-            yield from _numbers(asked, agent, wish, states)
+            yield from _numbers(asked, agent, motion, wish, states)
 
 
 # Private
@@ -141,10 +144,9 @@ def check_path(
 
 
 def _numbers(
-    asked: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+    asked: Case, agent: TrafficAgent, motion: PlannedMotion, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
-    assert agent.motion is not None
-    profile = [(0.0, agent.speed_mps), *agent.motion.speeds]
+    profile = [(0.0, agent.speed_mps), *motion.speeds]
     slows = wish.preset in (MotionPreset.HARD_BRAKING, MotionPreset.EMERGENCY_STOP)
     braking = [
         (a - b) / (end - begin) for (begin, a), (end, b) in pairwise(profile) if end > begin

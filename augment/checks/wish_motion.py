@@ -21,8 +21,8 @@ from augment.errors import CannotPlace
 from augment.scene import planned_motion, presets
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent_parts import MotionWish
-from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement, walking_pace_mps
-from augment.scene.planned_mover import PlannedMover, way_and_speed
+from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
+from augment.scene.planned_mover import PlannedMover, walk_as_motion, way_and_speed
 
 _FURTHER_S = 15.0
 """So long after its start a motion is followed to see where it leads."""
@@ -68,13 +68,7 @@ class MotionCase:
     @property
     def own(self) -> planned_motion.PlannedMotion:
         """The answer's motion, its walk as one, else one that changes nothing."""
-        agent = self.answer.agent
-        if agent.motion is None and agent.walk_to_m is not None:
-            path = planned_motion.PointPath(points_m=(agent.walk_to_m,))
-            return planned_motion.PlannedMotion(
-                path=path, speeds=((0.0, walking_pace_mps(agent)),)
-            )
-        return agent.motion or planned_motion.PlannedMotion()
+        return walk_as_motion(self.answer.agent).motion or planned_motion.PlannedMotion()
 
     @property
     def own_start_s(self) -> float:

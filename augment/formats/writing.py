@@ -18,8 +18,9 @@ from augment.scene import entities
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
-from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, find_motion
+from augment.scene.motion import Motion, MotionSource, Movement, find_motion
 from augment.scene.planned_motion import AtTime, PointPath
+from augment.scene.planned_mover import SETS_OUT_WITHIN_M
 from augment.scene.recording import Recording
 
 

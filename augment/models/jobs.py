@@ -368,6 +368,9 @@ class Simulation(Work):
     is_reactive = models.BooleanField(
         default=False, help_text="recorded vehicles answer to the ego instead of being replayed"
     )
+    version = models.PositiveSmallIntegerField(
+        default=1, help_text="of the rules by which others move; rows without are of the first"
+    )
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     nuplan_score = models.FloatField(null=True, blank=True, help_text="0 to 1")
     interplan_score = models.FloatField(null=True, blank=True, help_text="0 to 1")
@@ -381,17 +384,17 @@ class Simulation(Work):
         constraints = (
             models.UniqueConstraint(
                 name="one_drive_of_an_augmentation",
-                fields=("augmentation", "planner", "offsets", "is_reactive"),
+                fields=("augmentation", "planner", "offsets", "is_reactive", "version"),
                 condition=Q(augmentation__isnull=False),
             ),
             models.UniqueConstraint(
                 name="one_drive_of_a_scene",
-                fields=("scenario", "subject", "planner", "offsets", "is_reactive"),
+                fields=("scenario", "subject", "planner", "offsets", "is_reactive", "version"),
                 condition=Q(augmentation=None, swept=None),
             ),
             models.UniqueConstraint(
                 name="one_drive_of_a_swept_value",
-                fields=("swept", "planner", "offsets", "is_reactive"),
+                fields=("swept", "planner", "offsets", "is_reactive", "version"),
                 condition=Q(swept__isnull=False),
             ),
             models.CheckConstraint(

@@ -3,7 +3,6 @@
 Frame: ego frame of t0. T steps.
 """
 
-import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -25,10 +24,6 @@ HORIZON_S: Final = 6.0
 """So much of a motion is shown, in a still since it set out, and filmed and compared since t0."""
 LENGTH_S: Final = 15.0
 """So far a scenario without a recording goes on: as long as the paper drives."""
-WALK_S: Final = 15.0
-"""A walk without a pace of its own takes this long, as interPlan's do."""
-SETS_OUT_WITHIN_M: Final = 50.0
-"""People with a walk set out once the ego is this near to their start."""
 
 
 class MotionSource(StrEnum):
@@ -95,11 +90,11 @@ def find_motion(
 ) -> Motion:
     """Return the motion of the scene's agents after t0, with assumptions where it is unknown.
 
-    Who has a planned motion carries it out; who was recorded does what was recorded; who has a
-    walk goes it; who moves otherwise holds the
-    speed of t0 along its lane, or straight on where there is none; all others stand. The ego is
-    there at every step: where its recording has a gap it goes straight across, and after the last
-    step that was recorded it goes on like someone who was not.
+    Who has a planned motion or a walk carries it out; who was recorded does what was recorded;
+    who moves otherwise holds the speed of t0 along its lane, or straight on where there is none;
+    all others stand. Nobody reacts to the ego but by the start of a motion. The ego is there at
+    every step: where its recording has a gap it goes straight across, and after the last step
+    that was recorded it goes on like someone who was not.
 
     Args:
         scene: After its change.
@@ -117,9 +112,7 @@ def find_motion(
     others: dict[str, Movement] = {}
     for agent in scene.agents:
         track = tracks.get(agent.id)
-        if agent.walk_to_m is not None:
-            others[agent.id] = _walk(agent, times_s, ego)
-        elif recording is not None and track is not None and agent.id not in replaced:
+        if recording is not None and track is not None and agent.id not in replaced:
             others[agent.id] = _resample_track(agent, track.states, recording, times_s)
         else:
             others[agent.id] = _assume_movement(agent, times_s, graph)
@@ -144,8 +137,8 @@ def with_movers_alone(scene: Scene, besides: Collection[str] = ()) -> Scene:
 def _plan_movements(
     scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
 ) -> dict[str, Movement]:
-    """Return the agents with a planned motion, who watch everybody for their triggers."""
-    movers = [PlannedMover(agent, graph) for agent in scene.agents if agent.motion is not None]
+    """Return the agents with a motion or a walk, who watch everybody for their triggers."""
+    movers = [PlannedMover(one, graph) for one in scene.agents if one.motion or one.walk_to_m]
     if not movers:
         return {}
     rows: dict[str, list[FloatArray]] = {mover.agent.id: [] for mover in movers}
@@ -157,15 +150,17 @@ def _plan_movements(
         for mover in movers:
             mover.react(places)
             rows[mover.agent.id].append(mover.state())
-    return {
-        mover.agent.id: Movement(
-            agent=mover.agent,
-            source=MotionSource.PLANNED,
-            states=np.array(rows[mover.agent.id]),
-            started_s=mover.started_s,
-        )
-        for mover in movers
-    }
+    return {one.agent.id: _carried_out(one, np.array(rows[one.agent.id])) for one in movers}
+
+
+def _carried_out(mover: PlannedMover, states: FloatArray) -> Movement:
+    """A motion or a walk with its states; a walk that leads nowhere, or never begins, stands."""
+    agent, started_s, source = mover.agent, mover.started_s, MotionSource.PLANNED
+    if agent.motion is None:
+        walks = np.ptp(states[:, :2], axis=0).any()
+        source = MotionSource.WALK if walks else MotionSource.STANDING
+        started_s = started_s if walks else None
+    return Movement(agent=agent, source=source, states=states, started_s=started_s)
 
 
 def _ego_movement(
@@ -230,36 +225,6 @@ def _later(
         if len(seen):
             agent = track_agent(track, states[seen[0]])
             yield Movement(agent=agent, source=MotionSource.RECORDED, states=states)
-
-
-def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
-    """From start to end, from the moment on at which the ego is near; before and after, standing.
-
-    If the ego never comes near, nobody sets out.
-    """
-    assert agent.walk_to_m is not None
-    walk = np.array(agent.walk_to_m) - (agent.x_m, agent.y_m)
-    length_m = float(np.hypot(*walk))
-    states = np.tile(_state(agent), (len(times_s), 1))
-    states[:, 3] = 0.0
-    gap = np.hypot(ego.states[:, 0] - agent.x_m, ego.states[:, 1] - agent.y_m)
-    near = np.flatnonzero(gap <= SETS_OUT_WITHIN_M)
-    if length_m < 1e-6 or not len(near):
-        return Movement(agent=agent, source=MotionSource.STANDING, states=states)
-    pace_mps, since_s = walking_pace_mps(agent), times_s[near[0]]
-    walked = np.clip((times_s - since_s) * pace_mps / length_m, 0.0, 1.0)
-    states[:, :2] += walked[:, None] * walk
-    states[times_s >= since_s, 2] = math.atan2(walk[1], walk[0])
-    states[(times_s >= since_s) & (walked < 1.0), 3] = pace_mps
-    states[0, 2] = agent.heading_rad
-    return Movement(agent=agent, source=MotionSource.WALK, states=states, started_s=float(since_s))
-
-
-def walking_pace_mps(agent: TrafficAgent) -> float:
-    """The pace of an agent with a walk: its own speed, or the whole way in `WALK_S`."""
-    if agent.walk_to_m is None or agent.speed_mps > 0.0:
-        return agent.speed_mps
-    return math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
 
 
 def _assume_movement(

@@ -1,10 +1,12 @@
-"""Carries a planned motion out, step by step: in `find_motion` and in drives alike.
+"""Where one agent is, moment by moment: in `find_motion` and in drives alike.
 
+`HeldCourse` is what happens without a motion, `PlannedMover` carries a walk or a motion out.
 Frame: the scene's.
 """
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +16,21 @@ from augment.geometry.frames import difference, wrap
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, apply
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, LanePath, NearEgo, PointPath
+from augment.scene.planned_motion import (
+    EGO_ID,
+    AtPlace,
+    AtTime,
+    LanePath,
+    NearEgo,
+    PlannedMotion,
+    PointPath,
+)
 from augment.scene.schema import MOST_OBJECTS
 
+WALK_S = 15.0
+"""A walk without a pace of its own takes this long, as interPlan's do."""
+SETS_OUT_WITHIN_M = 50.0
+"""People with a walk set out once the ego is this near to their start."""
 SAMPLE_M = 0.5
 LEAST_M = 1e-6
 """Points nearer to each other than this are one."""
@@ -38,38 +52,52 @@ Places = Mapping[str, Point]
 
 
 class HeldCourse:
-    """On at the same offset along the lane and what follows it, or straight on without a lane."""
+    """On at the same offset along the lane and what follows it, or straight on without a lane.
+
+    The lane is the one that the agent names, else the one under it. Who heads against it goes
+    back along it; who heads across it, and people, go straight on.
+
+    Attributes:
+        lane_id: The lane, None for straight on.
+    """
 
     def __init__(self, agent: TrafficAgent, graph: LaneGraph) -> None:
         self._agent, self._graph = agent, graph
-        self._lane_id = None if agent.type is AgentType.PEDESTRIAN else agent.lane_id
-        if self._lane_id in graph.lanes:
-            assert self._lane_id is not None
-            line = graph.lane(self._lane_id).centerline
-            self._here = line.project(agent.x_m, agent.y_m)
-            self._askew = wrap(agent.heading_rad - line.heading_at(self._here.s_m))
-        else:
-            self._lane_id = None
+        self.lane_id = None
+        lane_id = agent.lane_id if agent.lane_id in graph.lanes else None
+        if agent.type is AgentType.PEDESTRIAN or not graph.lanes:
+            return
+        lane_id = lane_id or graph.under(agent.x_m, agent.y_m, agent.heading_rad)
+        if lane_id is None:
+            return
+        line = graph.lane(lane_id).centerline
+        self._here = line.project(agent.x_m, agent.y_m)
+        self._askew = wrap(agent.heading_rad - line.heading_at(self._here.s_m))
+        self._sign = math.copysign(1.0, math.cos(self._askew))
+        if abs(math.cos(self._askew)) > math.cos(_ALONG_BELOW_RAD):
+            self.lane_id = lane_id
 
     def pose_at(self, gone_m: float) -> tuple[float, float, float] | None:
         """Return x, y and heading after so many metres, None past the map."""
         agent = self._agent
         if gone_m <= 0.0:
             return agent.x_m, agent.y_m, agent.heading_rad
-        if self._lane_id is None:
+        if self.lane_id is None:
             east, north = math.cos(agent.heading_rad), math.sin(agent.heading_rad)
             return agent.x_m + gone_m * east, agent.y_m + gone_m * north, agent.heading_rad
-        place = self._graph.along(self._lane_id, self._here.s_m, gone_m, self._here.d_m)
+        place = self._graph.along(
+            self.lane_id, self._here.s_m, self._sign * gone_m, self._here.d_m
+        )
         if place is None:
             return None
         return place.pose.x_m, place.pose.y_m, wrap(place.pose.heading_rad + self._askew)
 
 
 class PlannedMover:
-    """One agent with a motion, from t0 on: at each step `advance`, then `react`.
+    """One agent with a walk or a motion, from t0 on: at each step `advance`, then `react`.
 
     Args:
-        agent: With a motion.
+        agent: With a walk or a motion.
         graph: Of its scene.
 
     Raises:
@@ -80,18 +108,19 @@ class PlannedMover:
     """
 
     def __init__(self, agent: TrafficAgent, graph: LaneGraph) -> None:
-        assert agent.motion is not None
-        if isinstance(agent.motion.path, LanePath):
-            check_lane_path(graph, agent.motion.path)
-        self.agent, self._motion, self._graph = agent, agent.motion, graph
-        self._held = HeldCourse(agent, graph)
+        acting = walk_as_motion(agent)
+        assert acting.motion is not None
+        if isinstance(acting.motion.path, LanePath):
+            check_lane_path(graph, acting.motion.path)
+        self.agent, self._motion, self._graph = agent, acting.motion, graph
+        self._own_mps, self._held = acting.speed_mps, HeldCourse(agent, graph)
         self._line: Polyline | None = None
         self.started_s: float | None = None
         self.advance(0.0)
 
     def state(self) -> FloatArray:
         """Return x, y, heading and speed (4,) now; NaN past the map."""
-        own_mps, speeds, path = self.agent.speed_mps, self._motion.speeds, self._motion.path
+        own_mps, speeds, path = self._own_mps, self._motion.speeds, self._motion.path
         if self.started_s is None:
             return _row(self._held.pose_at(own_mps * self._time_s), own_mps)
         since_s = self._time_s - self.started_s
@@ -133,11 +162,30 @@ class PlannedMover:
         if self.started_s is not None:
             return
         self.started_s, path = at_s, self._motion.path
-        here = self._held.pose_at(self.agent.speed_mps * at_s)
+        here = self._held.pose_at(self._own_mps * at_s)
         if here is not None and isinstance(path, PointPath):
             self._line = smooth_line([here[:2], *path.points_m])
         elif here is not None and isinstance(path, LanePath):
             self._line = lane_line(self._graph, path, here[:2])
+
+
+def walk_as_motion(agent: TrafficAgent) -> TrafficAgent:
+    """Return an agent with its walk as a motion, straight to its end, once the ego is near."""
+    if agent.walk_to_m is None or agent.motion is not None:
+        return agent
+    motion = PlannedMotion(
+        path=PointPath(points_m=(agent.walk_to_m,)),
+        speeds=((0.0, walking_pace_mps(agent)),),
+        start=NearEgo(within_m=SETS_OUT_WITHIN_M),
+    )
+    return replace(agent, speed_mps=0.0, walk_to_m=None, motion=motion)
+
+
+def walking_pace_mps(agent: TrafficAgent) -> float:
+    """The pace of an agent with a walk: its own speed, or the whole way in `WALK_S`."""
+    if agent.walk_to_m is None or agent.speed_mps > 0.0:
+        return agent.speed_mps
+    return math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
 
 
 def way_and_speed(

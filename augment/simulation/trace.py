@@ -13,9 +13,9 @@ from augment.scene.entities import AreaKind
 from augment.simulation.drive import Drive
 from augment.simulation.score import OFF_ROAD_M, Score, outside_m
 from augment.simulation.states import ACCELERATION, SPEED, STEP_S, FloatArray, Kind
-from augment.simulation.traffic import DriveSetting
+from augment.simulation.traffic import VERSION, DriveSetting
 
-FORMAT, VERSION = "scenario-arena/drive", 1
+FORMAT = "scenario-arena/drive"
 HARD_BRAKING_MPS2 = -3.0
 PLAN_EVERY = 5
 """So many steps lie between two plans that are kept."""

@@ -4,6 +4,7 @@ D drivers, K pairs of a driver and an object in its way. Whoever moves has `obje
 are there now, and `step(ego_box, everybody)`, which goes one step on.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,8 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.motion import LENGTH_S
 from augment.scene.planned_motion import EGO_ID
-from augment.scene.planned_mover import PlannedMover
+from augment.scene.planned_mover import HeldCourse, PlannedMover
 from augment.scene.recording import Recording, Track, track_agent
 from augment.simulation import shapes
 from augment.simulation.path import Path
@@ -30,13 +32,15 @@ from augment.simulation.states import (
     to_objects,
 )
 
+VERSION = 2
+"""Of drives, raised when others move otherwise; in 1 all followed their lane by the IDM."""
 TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
 """nuPlan's reactive traffic."""
 ACTIVE_WITHIN_M = 50.0
 """A walker appears once the ego has no further to go than this along its centreline."""
 WALK_STEPS, LAST_STEP = 150, 301
-"""A walk takes 15 s, however far it leads; in interPlan's own scenarios as much longer as it took
-to set out, but no longer than they last."""
+"""interPlan's walk takes 15 s and as much longer as it took to set out, but no longer than its
+scenarios last."""
 FALLBACK_MPS = 10.0
 """The wished speed where the map has no limit: nuPlan's."""
 SWEEP_S = 1.5
@@ -92,26 +96,21 @@ def lane_under(road: Road, agent: TrafficAgent) -> str | None:
 
 
 class Walkers:
-    """People with a walk, as interPlan has them.
+    """People with a walk in interPlan's scenarios.
 
-    They are not there until the ego has come within `ACTIVE_WITHIN_M` of their start along the
-    centreline; then they go from start to end in 15 s, however far that is, and report a speed of
-    0, so that a planner takes them for standing.
+    They are not there until the ego has come within `ACTIVE_WITHIN_M` of their start along its
+    lane, and straight on from its end; who is as far behind stays away. Then they go from start
+    to end in 15 s and as long again as it took until then, and report a speed of 0, so that a
+    planner takes them for standing.
 
     Args:
         agents: Each with a walk.
         road: With the ego's route.
         ego_box: The ego (5,) at t0.
-        by_rules: Whether, as in interPlan's own scenarios, a walk lasts longer the later it
-            begins, who is as far behind the ego stays away, and nearness is measured straight on
-            from the end of the ego's lane.
     """
 
-    def __init__(
-        self, agents: Sequence[TrafficAgent], road: Road, ego_box: FloatArray, by_rules: bool
-    ) -> None:
-        self._road, self._by_rules = road, by_rules
-        base = to_objects(agents)
+    def __init__(self, agents: Sequence[TrafficAgent], road: Road, ego_box: FloatArray) -> None:
+        self._road, base = road, to_objects(agents)
         ends = np.array([agent.walk_to_m for agent in agents], dtype=np.float64).reshape(-1, 2)
         self._walks = ends - base.boxes[:, :2]
         far = np.hypot(*self._walks.T) > 1e-6
@@ -124,10 +123,9 @@ class Walkers:
 
     def objects(self) -> Objects:
         """Return those who have set out."""
-        since, lasts = self._since, np.full(len(self._since), WALK_STEPS)
-        if self._by_rules:  # step 0 is for interPlan no step at all
-            since = np.where(since == 0, 1, since)
-            lasts = np.minimum(since + WALK_STEPS, LAST_STEP)
+        # Step 0 is for interPlan no step at all.
+        since = np.where(self._since == 0, 1, self._since)
+        lasts = np.minimum(since + WALK_STEPS, LAST_STEP)
         gone = np.clip((self._step - since) / lasts, 0.0, 1.0)
         boxes = self._base.boxes.copy()
         boxes[:, :2] += gone[:, None] * self._walks
@@ -139,16 +137,12 @@ class Walkers:
         self._wake(ego_box)
 
     def _wake(self, ego_box: FloatArray) -> None:
-        line, stations = self._road.centreline, self._stations
-        ego_m = line.station_of(ego_box)
-        near = stations - ego_m <= ACTIVE_WITHIN_M
-        if self._by_rules:
-            ends = self._road.route_ends_m
-            end_m = ends[min(int(np.searchsorted(ends, ego_m, side="right")), len(ends) - 1)]
-            onwards = self._base.boxes[:, :2] - line.poses(end_m)[:2]
-            away_m = np.where(stations > end_m - 0.1, end_m + np.hypot(*onwards.T), stations)
-            near = np.abs(away_m - ego_m) <= ACTIVE_WITHIN_M
-        near &= self._since < 0
+        ends, stations = self._road.route_ends_m, self._stations
+        ego_m = self._road.centreline.station_of(ego_box)
+        end_m = ends[min(int(np.searchsorted(ends, ego_m, side="right")), len(ends) - 1)]
+        onwards = self._base.boxes[:, :2] - self._road.centreline.poses(end_m)[:2]
+        away_m = np.where(stations > end_m - 0.1, end_m + np.hypot(*onwards.T), stations)
+        near = (np.abs(away_m - ego_m) <= ACTIVE_WITHIN_M) & (self._since < 0)
         self._since[near] = self._step
 
 
@@ -197,7 +191,7 @@ class StraightOn:
 
 
 class PlannedMovers:
-    """Agents with a motion, who react to nobody but for their triggers."""
+    """Agents with a motion or a walk, who react to nobody but for their triggers."""
 
     def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
         self._base, self._step = to_objects(agents), 0
@@ -249,11 +243,18 @@ class LaneDrivers:
 
     def objects(self) -> Objects:
         """Return those who are still on the map."""
-        boxes, share = self._base.boxes.copy(), (self.stations % 1.0)[:, None]
-        boxes[:, :3] = (1.0 - share) * self._at(self.stations)[:, :3]
-        boxes[:, :3] += share * self._at(self.stations + 1.0)[:, :3]
+        boxes, poses = self._base.boxes.copy(), self._poses()
+        boxes[:, :3] = poses
         now = replace(self._base, boxes=boxes, speeds_mps=self.speeds)
-        return now.chosen(self.stations < self._ends)
+        return now.chosen(~np.isnan(poses[:, 0]))
+
+    def _poses(self) -> FloatArray:
+        """Poses (D, 3) now; NaN past the map."""
+        share = (self.stations % 1.0)[:, None]
+        poses = (1.0 - share) * self._at(self.stations)[:, :3]
+        poses += share * self._at(self.stations + 1.0)[:, :3]
+        poses[self.stations >= self._ends] = np.nan
+        return poses
 
     def _at(self, stations: FloatArray) -> FloatArray:
         """The rows (D, 5) of the tables at the whole metres before stations (D,)."""
@@ -288,7 +289,7 @@ class LaneDrivers:
     def _near(self, everybody: Objects) -> tuple[IntArray, IntArray]:
         """Driver and object (K,) that come near and are not behind."""
         mine, boxes = self.objects(), everybody.boxes
-        rows = np.flatnonzero(self.stations < self._ends)
+        rows = np.flatnonzero(~np.isnan(self._poses()[:, 0]))
         look = np.minimum(_LOOK_M, 10.0 + mine.speeds_mps * (SWEEP_S + 4.0))
         offset = boxes[None, :, :2] - mine.boxes[:, None, :2]
         heading = mine.boxes[:, None, 2]
@@ -316,6 +317,40 @@ class LaneDrivers:
         return driver[hit], other[hit], first[hit]
 
 
+class HeldDrivers(LaneDrivers):
+    """D drivers who hold their velocity along their lanes; they brake for the ego alone.
+
+    Without the ego they are where `find_motion` has them.
+
+    Args:
+        agents: Moving.
+        courses: Their courses, each along a lane.
+    """
+
+    def __init__(self, agents: Sequence[TrafficAgent], courses: Sequence[HeldCourse]) -> None:
+        self._base, self._sweep_s, self._courses = to_objects(agents), 0.0, courses
+        self.speeds, self.stations = self._base.speeds_mps, np.zeros(len(agents))
+        # (D, M, 5) as of drivers by the IDM, but for limits and lights.
+        furthest_m = LENGTH_S * self.speeds.max(initial=0.0) + _LOOK_M
+        tables = np.full((len(agents), int(furthest_m), 5), np.inf)
+        tables[:, :, 3] = self.speeds[:, None]
+        for table, course in zip(tables, courses, strict=True):
+            for metre in range(len(table)):
+                pose = course.pose_at(float(metre))
+                table[metre, :3] = table[max(metre - 1, 0), :3] if pose is None else pose
+        self._tables, self._rows = tables, np.arange(len(agents))
+
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
+        """Go one step on, given all objects of this moment with the ego among them."""
+        is_ego = np.array([name == EGO_ID for name in everybody.ids], dtype=np.bool_)
+        super().step(ego_box, everybody.chosen(is_ego))
+
+    def _poses(self) -> FloatArray:
+        poses = map(HeldCourse.pose_at, self._courses, self.stations.tolist())
+        gone = (math.nan, math.nan, math.nan)
+        return np.array([pose or gone for pose in poses], dtype=np.float64).reshape(-1, 3)
+
+
 def _find_route(road: Road, agent: TrafficAgent) -> list[str]:
     """The ways that a driver follows from the one under it on."""
     name = lane_under(road, agent)
@@ -339,6 +374,15 @@ def _driver_table(
     stops = np.array([0.0, *ends])[:-1][[way in road.red for way in route]]
     next_stop = np.append(stops, np.inf)[np.searchsorted(stops, metres)]
     return np.column_stack([path.poses(metres), wishes, next_stop])
+
+
+def _hold_course(agents: Sequence[TrafficAgent], road: Road) -> list[StraightOn | LaneDrivers]:
+    """Let agents go on as `find_motion` has them: along their lane, straight on, or standing."""
+    held = [(one, HeldCourse(one, road.graph)) for one in agents if one.speed_mps > 0.0]
+    held = [(agent, course) for agent, course in held if course.lane_id is not None]
+    driving = [agent for agent, _ in held]
+    straight_on = StraightOn([agent for agent in agents if agent not in driving])
+    return [straight_on, HeldDrivers(driving, [course for _, course in held])]
 
 
 def _set_moving(
@@ -370,10 +414,11 @@ def _set_moving(
 class Traffic:
     """All objects of one drive.
 
-    Who has a walk walks; what stands stays; a recorded agent is replayed, unless the drive is
-    reactive and it is a vehicle that moves on a lane; who has a motion carries it out; who moves
-    on a lane otherwise follows it by the IDM; anybody else who moves goes straight on. Where the
-    recording ends before the drive, those who are replayed go on from there in the same ways.
+    A recorded agent is replayed, unless the drive is reactive and it is a vehicle that moves on a
+    lane, which it then follows by the IDM; where the recording ends before the drive, they go on
+    from there by the IDM or straight on. All others are where `find_motion` has them, but who
+    holds its velocity along a lane brakes for the ego. In interPlan's scenarios all who move on a
+    lane follow it by the IDM, and its walks differ.
     """
 
     def __init__(self, setting: DriveSetting, road: Road, body: EgoBody, ego: FloatArray) -> None:
@@ -381,13 +426,17 @@ class Traffic:
         replayed = _list_replayed(setting, road)
         names = {track.agent_id for track in replayed}
         own = [agent for agent in setting.after.agents if agent.id not in names]
-        plain = [agent for agent in own if agent.walk_to_m is None]
-        moving = [agent for agent in plain if agent.motion is None]
-        planned = [agent for agent in plain if agent.motion is not None]
-        walking = [agent for agent in own if agent.walk_to_m is not None]
+        is_interplans = setting.scene.options.interplan is not None
+        walking = [agent for agent in own if agent.walk_to_m is not None and is_interplans]
+        planned = [one for one in own if one.motion or (one.walk_to_m and not is_interplans)]
+        plain = [agent for agent in own if agent not in (*walking, *planned)]
+        recorded = setting.recording.tracks if setting.recording and setting.replay else ()
+        tracked = {track.agent_id for track in recorded} - setting.modification.replaced
+        answering = [one for one in plain if is_interplans or one.id in tracked]
         self._movers: list[StraightOn | LaneDrivers | Walkers | PlannedMovers | Replay] = [
-            *_set_moving(moving, road, ego_box),
-            Walkers(walking, road, ego_box, setting.scene.options.interplan is not None),
+            *_hold_course([one for one in plain if one not in answering], road),
+            *_set_moving(answering, road, ego_box),
+            Walkers(walking, road, ego_box),
             PlannedMovers(planned, road),
         ]
         self._replay = Replay(setting.recording, replayed) if setting.recording else None

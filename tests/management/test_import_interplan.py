@@ -209,7 +209,7 @@ class World(NamedTuple):
         boxes, road = body.boxes(poses), Road(self.scene, self.recording)
         people = [one for one in self.reference.added if one.type is AgentType.PEDESTRIAN]
         people = [one if one.walk_to_m else replace(one, walk_to_m=step_of(one)) for one in people]
-        walkers = Walkers(people, road, boxes[0], by_rules=True)
+        walkers = Walkers(people, road, boxes[0])
         seen: list[list[tuple[float, ...]]] = []
         for box in boxes:
             if seen:

@@ -1,12 +1,16 @@
 """Who moves how: walkers, lane drivers, recorded tracks, and what stands."""
 
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from augment.checks import Ground
 from augment.geometry.polyline import Polyline
+from augment.render.camera import camera_for
+from augment.render.film import make_film
 from augment.scene.entities import (
     InterplanRules,
     LaneConnector,
@@ -15,12 +19,13 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-from augment.scene.motion import find_motion
-from augment.scene.planned_motion import NearEgo, PlannedMotion, PointPath
+from augment.scene.planned_motion import PlannedMotion
 from augment.scene.recording import Recording
 from augment.simulation.road import Road
+from augment.simulation.shapes import move_ahead
 from augment.simulation.states import Objects, start_state
-from augment.simulation.traffic import DriveSetting, Traffic
+from augment.simulation.traffic import DriveSetting, LaneDrivers, Traffic
+from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import BODY, street, track
 
@@ -43,29 +48,14 @@ def with_agents(*agents: TrafficAgent, length_m: float = 400.0) -> DriveSetting:
     return DriveSetting(scene=street(length_m), modification=Modification(added=agents))
 
 
+def by_interplans_rules(given: DriveSetting) -> DriveSetting:
+    options = SceneOptions(interplan=InterplanRules())
+    return replace(given, scene=replace(given.scene, options=options))
+
+
 def place(objects: Objects, name: str) -> tuple[float, float]:
     x, y = objects.boxes[objects.ids.index(name), :2]
     return float(x), float(y)
-
-
-def test_a_walker_near_enough_takes_15_s_and_reports_no_speed() -> None:
-    made = after(with_agents(pedestrian("P", 30.0, -6.0, (30.0, 6.0))), 150)
-    assert place(made[0], "P") == (30.0, -6.0)
-    assert place(made[75], "P") == pytest.approx((30.0, 0.0))
-    assert place(made[150], "P") == pytest.approx((30.0, 6.0))
-    assert {float(row.speeds_mps[0]) for row in made} == {0.0}
-    assert made[3].boxes[0, 2] == pytest.approx(math.pi / 2.0)
-
-
-@pytest.mark.parametrize(("x_m", "since"), [(50.0, 0), (50.2, 1), (60.0, 10)])
-def test_a_walker_appears_when_the_ego_is_50_m_before_it(x_m: float, since: int) -> None:
-    made = after(
-        with_agents(pedestrian("P", x_m, -6.0, (x_m, 6.0))), since + 2, ego_speed_mps=10.0
-    )
-    seen = ["P" in row.ids for row in made]
-    # The ego that a step is made for is the one before it moved.
-    first = since if since == 0 else since + 1
-    assert seen.index(True) == first
 
 
 @pytest.mark.parametrize(
@@ -77,37 +67,60 @@ def test_by_interplans_rules_a_walk_lasts_longer_the_later_it_begins(
     given = with_agents(
         pedestrian("P", x_m, -6.0, (x_m, 6.0)), pedestrian("Q", -55.0, -6.0, (-55.0, 6.0))
     )
-    options = SceneOptions(interplan=InterplanRules())
-    setting = replace(given, scene=replace(given.scene, options=options))
-    made = after(setting, since + 60, ego_speed_mps=10.0)
+    made = after(by_interplans_rules(given), since + 60, ego_speed_mps=10.0)
+    first = since if since > 1 else 0
+    assert [row.ids.count("P") for row in made[: first + 1]] == [0] * first + [1]
+    assert {float(row.speeds_mps.sum()) for row in made} == {0.0}
+    assert made[first].boxes[0, 2] == pytest.approx(math.pi / 2.0)
     assert place(made[since], "P") == (x_m, -6.0)
     assert place(made[since + 60], "P") == pytest.approx((x_m, -6.0 + 12.0 * 60 / lasts))
     assert all("Q" not in row.ids for row in made), "it is more than 50 m behind the ego"
 
 
-def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego() -> None:
+@pytest.mark.parametrize("keeps_rule", [False, True])
+def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego(keeps_rule: bool) -> None:
     behind = replace(vehicle("V", -30.0, 0.3), speed_mps=6.0)
-    made = after(with_agents(behind), 150)
+    setting = with_agents(behind)
+    made = after(by_interplans_rules(setting) if keeps_rule else setting, 150)
     x, y = place(made[-1], "V")
-    assert y == pytest.approx(0.0, abs=1e-6)
+    assert y == pytest.approx(0.0 if keeps_rule else 0.3, abs=1e-6)
     assert -2.588 - 2.4 - 5.0 < x < -2.588 - 2.4
 
 
-def test_a_planned_motion_is_the_same_in_a_drive_as_without_one() -> None:
-    # Sets out where the ego is 30 m away, runs 8 m across at 2 m/s.
-    motion = PlannedMotion(
-        path=PointPath(points_m=((50.0, 4.0),)), speeds=((0.0, 2.0),), start=NearEgo(within_m=30.0)
-    )
-    runner = replace(pedestrian("P", 50.0, -4.0), motion=motion)
-    setting = with_agents(runner)
-    moves = find_motion(setting.after)
-    driven = after(setting, 80, ego_speed_mps=setting.scene.ego.speed_mps)
-    assert moves.others[0].started_s is not None
-    for step in range(0, 81, 10):
-        assert place(driven[step], "P") == pytest.approx(tuple(moves.others[0].states[step, :2]))
+@pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS, *MOVING_SLUGS])
+def test_everybody_is_at_one_place_in_checks_films_and_drives(
+    slug: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, reference = shown_scene(slug), entry(slug).reference
+    free = np.array(math.inf), np.array(0.0)
+    monkeypatch.setattr(LaneDrivers, "_leaders", lambda self, everybody: free)
+    setting = DriveSetting(scene=scene, modification=reference)
+    motion = Ground.of(scene).motion_after(reference)
+    camera = camera_for(scene, reference)
+    film = json.loads(make_film(scene, reference, camera))
+    tracks = [
+        (first, np.array(values).reshape(-1, 3)[:, :2].cumsum(axis=0) / 10.0)
+        for _, first, _, values in film["movers"]
+    ]
+    traffic = Traffic(setting, Road(scene), BODY, start_state(scene.ego, BODY))
+    for step in range(61):
+        objects, at_t = traffic.objects(), [one for one in motion.others if one.is_present[step]]
+        assert sorted(objects.ids) == sorted(one.agent.id for one in at_t)
+        drawn = [track[min(step - first, len(track) - 1)] for first, track in tracks]
+        for one in at_t:
+            x_m, y_m = one.states[step, :2].tolist()
+            assert math.dist(place(objects, one.agent.id), (x_m, y_m)) < 0.1
+            (pixel,) = camera.to_pixels(np.array([[x_m, y_m]]))
+            if camera.shows(np.array([[x_m, y_m]])):
+                off_px = np.hypot(*(np.array(drawn) - pixel).T).min()
+                assert off_px / camera.px_per_m < 0.1
+        states = np.zeros(6)
+        states[:4] = motion.ego.states[step]
+        states[:3] = move_ahead(states[None, :3], -BODY.centre_m)[0]
+        traffic.step(states, objects)
 
 
-def test_lane_drivers_stop_at_a_red_light() -> None:
+def test_interplans_drivers_stop_at_a_red_light_and_ours_hold_their_speed() -> None:
     plain = street(60.0)
     crossing = LaneConnector(
         id="Connector1",
@@ -121,13 +134,21 @@ def test_lane_drivers_stop_at_a_red_light() -> None:
     setting = DriveSetting(
         scene=replace(plain, connectors=(crossing,)), modification=Modification(added=(driver,))
     )
-    x, _ = place(after(setting, 140)[-1], "V")
+    x, _ = place(after(by_interplans_rules(setting), 140)[-1], "V")
     assert 50.0 < x < 60.0 - 2.4
+    assert place(after(setting, 140)[-1], "V") == pytest.approx((20.0 + 14.0 * 8.0, 0.0))
 
 
-def test_a_driver_that_starts_in_somebody_is_dropped() -> None:
-    inside = replace(vehicle("V", 3.0, 0.0), speed_mps=5.0)
-    assert after(with_agents(inside), 0)[0].ids == ()
+def test_a_velocity_is_held_through_who_stands_there() -> None:
+    driver = replace(vehicle("V", 20.0, 0.3), speed_mps=8.0)
+    made = after(with_agents(driver, vehicle("W", 60.0, 0.0)), 100)
+    assert place(made[100], "V") == pytest.approx((100.0, 0.3))
+
+
+def test_in_interplans_scenarios_a_driver_that_starts_in_somebody_is_dropped() -> None:
+    inside = with_agents(replace(vehicle("V", 3.0, 0.0), speed_mps=5.0))
+    assert after(by_interplans_rules(inside), 0)[0].ids == ()
+    assert after(inside, 0)[0].ids == ("V",)
 
 
 def recorded(reactive: bool = False, modification: Modification | None = None) -> DriveSetting:

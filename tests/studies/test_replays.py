@@ -50,6 +50,7 @@ def test_a_scenario_is_played_where_all_of_its_pictures_were_driven_in_one_way()
         "planner": "pdm-closed",
         "offsets": "paper",
         "is_reactive": False,
+        "version": 1,
         "scenarios": ["place-0", "place-3"],
     }
     for matchup in matchups_of(study, "eva"):

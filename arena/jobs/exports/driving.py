@@ -24,9 +24,9 @@ def driving_notes(table: DrivingScores) -> list[str]:
     how = table.options
     traffic = "reactive" if how.is_reactive else "replayed"
     notes = {
-        f"Mean of {SCORE_LABELS[table.score]}'s score over {table.longest_s} s drives of the "
-        f"planner {how.planner} (offsets: {how.offsets}; recorded traffic {traffic}); contestants "
-        "by how much they lower it.": True,
+        f"Mean of {SCORE_LABELS[table.score]}'s score over {table.longest_s} s drives of "
+        f"version {how.version} by the planner {how.planner} (offsets: {how.offsets}; recorded "
+        f"traffic {traffic}); contestants by how much they lower it.": True,
         DIFFERENCE: True,
         f"Recordings that end before the drive: {table.outlasting} of {table.total}; from "
         "there on who stands stays, and who moves goes on.": table.outlasting,
@@ -92,6 +92,7 @@ def driving_sheet(table: DrivingScores) -> Sheet:
         "planner": table.options.planner,
         "offsets": table.options.offsets,
         "reactive": table.options.is_reactive,
+        "version": table.options.version,
         "notes": driving_notes(table),
     }
     columns: Columns = {**COLUMNS, **types}

@@ -116,7 +116,8 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
     for way in known:
         planner = PLANNERS.get(way.planner, way.planner)
         offsets = OFFSETS[way.offsets] if way.planner == PDM_CLOSED else ""
-        words = (planner, offsets, "reactive" if way.is_reactive else "")
+        version = f"version {way.version}" if way.version != Options().version else ""
+        words = (planner, offsets, "reactive" if way.is_reactive else "", version)
         ways.append(" · ".join(filter(None, words)))
     return {
         **driving.driving_context(table),

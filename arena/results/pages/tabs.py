@@ -218,8 +218,9 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     if not Simulation.objects.exists():
         return {"drivings": []}
     ids = list_shown_ids(snapshot.study)
+    how = Options().newest_in(Simulation.objects.filter(augmentation__in=ids))
     found = [
-        scores_of_augmentations(ids, title=snapshot.study.name, options=Options(), score=score)
+        scores_of_augmentations(ids, title=snapshot.study.name, options=how, score=score)
         for score in SCORES
     ]
     return {"drivings": [driving_context(one) for one in found if one.lines]}

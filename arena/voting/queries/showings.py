@@ -135,6 +135,7 @@ def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | Non
         augmentation__in=(matchup.left_id, matchup.right_id),
         state=Simulation.State.DONE,
         **{name: played[name] for name in ("planner", "offsets", "is_reactive")},
+        version=played.get("version", 1),
     )
     drive_by_picture = {row.augmentation_id: row for row in drives.defer("document")}
     if len(drive_by_picture) < 2:

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Any
@@ -261,7 +261,7 @@ def draw_sample(seed: int, scenario: str, samples: int) -> int:
 
 
 Way = tuple[Any, ...]
-"""Planner, offsets, whether recorded traffic reacts."""
+"""The values of `Options`."""
 
 
 def replay_settings(cells: Cells) -> dict[str, Any]:
@@ -282,13 +282,14 @@ def replay_settings(cells: Cells) -> dict[str, Any]:
     drives = Simulation.objects.filter(
         augmentation__in={cell.pk for cell in cells.values()}, state=Simulation.State.DONE
     )
-    for *way, picture in drives.values_list("planner", "offsets", "is_reactive", "augmentation"):
+    names = [field.name for field in fields(Options)]
+    for *way, picture in drives.values_list(*names, "augmentation"):
         driven[tuple(way)].add(picture)
     whole = {
         way: sorted(slug for slug, shown in pictures.items() if shown <= known)
         for way, known in driven.items()
     }
-    usual: Way = (Options().planner, Options().offsets, Options().is_reactive)
+    usual: Way = astuple(Options())
     best = max(whole, key=lambda way: (len(whole[way]), way == usual, way), default=usual)
     if not whole.get(best):
         missing = sorted(names for names, cell in cells.items() if cell.pk not in driven[best])
@@ -297,6 +298,4 @@ def replay_settings(cells: Cells) -> dict[str, Any]:
             "No scenario can be played: each needs a drive of every picture that takes part. "
             f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first."
         )
-    return dict(zip(("planner", "offsets", "is_reactive"), best, strict=True)) | {
-        "scenarios": whole[best]
-    }
+    return dict(zip(names, best, strict=True)) | {"scenarios": whole[best]}

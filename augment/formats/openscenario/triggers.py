@@ -16,9 +16,9 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import SETS_OUT_WITHIN_M, find_motion, walking_pace_mps
-from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion, PointPath
-from augment.scene.planned_mover import PlannedMover
+from augment.scene.motion import find_motion
+from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion
+from augment.scene.planned_mover import PlannedMover, walk_as_motion
 
 _MARGIN_M = 1e-4
 """So that a comparison at the very step does not hang on the last digit."""
@@ -44,17 +44,9 @@ class WrittenDistance:
 
 def with_motion(agent: TrafficAgent) -> TrafficAgent | None:
     """Return the agent with its motion, None without; a walk starts once the ego is near."""
-    end_m = agent.walk_to_m
-    if end_m is None:
-        return agent if agent.motion is not None else None
-    if math.dist((agent.x_m, agent.y_m), end_m) < 1e-6:
-        return None
-    motion = PlannedMotion(
-        path=PointPath(points_m=(end_m,)),
-        speeds=((0.0, walking_pace_mps(agent)),),
-        start=NearEgo(within_m=SETS_OUT_WITHIN_M),
-    )
-    return replace(agent, speed_mps=0.0, walk_to_m=None, motion=motion)
+    goes_nowhere = agent.walk_to_m and math.dist((agent.x_m, agent.y_m), agent.walk_to_m) < 1e-6
+    moving = walk_as_motion(agent)
+    return None if goes_nowhere or moving.motion is None else moving
 
 
 def motion_in(agent: TrafficAgent) -> PlannedMotion:

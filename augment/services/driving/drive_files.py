@@ -18,6 +18,7 @@ from augment.services.driving.simulations import NUPLAN, Options, drive_document
 from augment.simulation.drive import find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
+from augment.simulation.trace import FORMAT
 from augment.simulation.traffic import DriveSetting
 
 _BEFORE = ".before.json"
@@ -88,8 +89,8 @@ def _drive(setting: DriveSetting, options: Options) -> dict[str, Any]:
     drove = run(setting, load_planner(options, also=(options.planner,)), road=road)
     score = score_drive(drove, find_expert(setting, road), modification=setting.modification)
     return {
-        "format": "scenario-arena/drive",
-        "version": 1,
+        "format": FORMAT,
+        "version": options.version,
         "planner": options.planner,
         "offsets": options.offsets,
         "is_reactive": options.is_reactive,

@@ -161,10 +161,10 @@ def clearance_text(least_distance_m: float | None) -> str:
 def options_driven(job: GenerationJob) -> list[Options]:
     """Return every way in which drives of a job were asked for, the latest first."""
     rows = Simulation.objects.filter(drives_of_job(job)).order_by("-pk")
-    asked = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive"))
+    asked = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive", "version"))
     return [
-        Options(planner=planner, offsets=offsets, is_reactive=reactive)
-        for planner, offsets, reactive in asked
+        Options(planner=planner, offsets=offsets, is_reactive=reactive, version=version)
+        for planner, offsets, reactive, version in asked
     ]
 
 

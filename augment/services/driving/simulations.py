@@ -3,14 +3,14 @@
 import json
 import zlib
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import QuerySet
+from django.db.models import Max, QuerySet
 
-from augment.errors import Conflict
+from augment.errors import CannotDrive, Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.density import fit_boxes
@@ -25,7 +25,7 @@ from augment.simulation.planning import Planner
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.trace import blind_trace, make_trace
-from augment.simulation.traffic import DriveSetting
+from augment.simulation.traffic import VERSION, DriveSetting
 
 State, Subject = Simulation.State, Simulation.Subject
 NUPLAN, INTERPLAN = ScoreKind.NUPLAN.value, ScoreKind.INTERPLAN.value
@@ -40,6 +40,14 @@ class Options:
     planner: str = PDM_CLOSED
     offsets: str = "paper"
     is_reactive: bool = False
+    version: int = VERSION
+
+    def newest_in(self, rows: QuerySet[Simulation]) -> "Options":
+        """Return these options in the newest version in which some of the rows were driven."""
+        how = asdict(self)
+        del how["version"]
+        newest = rows.filter(**how).aggregate(Max("version"))["version__max"]
+        return replace(self, version=newest or VERSION)
 
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Return the drives with these options."""
@@ -119,6 +127,8 @@ class Drives(WorkKind[Simulation]):
 
     def run(self, row: Simulation, held: Lease[Simulation]) -> Settlement:
         """Drive and score; a planner from outside may raise anything."""
+        if row.version != VERSION:
+            raise CannotDrive(f"Version {row.version} of drives is no more; simulate it anew.")
         setting = _load_setting(row)
         road = Road(setting.scene, setting.recording)
         planner = load_planner(row, also=self._also)

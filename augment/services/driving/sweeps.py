@@ -96,9 +96,9 @@ def plan_sweep(
     """
     load_planner(request.options, also=also)
     changes = map_changes(scenario, request)
-    sweep = Sweep(
-        scenario=scenario, number=request.number, asked_by=actor, **asdict(request.options)
-    )
+    how = asdict(request.options)
+    del how["version"]
+    sweep = Sweep(scenario=scenario, number=request.number, asked_by=actor, **how)
     rows = [
         SweepValue(sweep=sweep, value=value, modification=codec.modification_to_document(change))
         if isinstance(change, Modification)

@@ -66,7 +66,8 @@ def _checks(ids: Collection[int]) -> MetricScores:
 
 def _driving(ids: Collection[int]) -> list[MetricScores]:
     """The lower the ego scores, the better: a change is to make a scene harder to drive."""
-    drives = Options().of(Simulation.objects.filter(augmentation__in=ids))
+    all_drives = Simulation.objects.filter(augmentation__in=ids)
+    drives = Options().newest_in(all_drives).of(all_drives)
     done = drives.filter(state=Simulation.State.DONE)
     rows = list(done.values_list("augmentation__code", *SCORES.values()))
     names = {"nuplan": "Driving score (nuPlan)", "interplan": "Driving score (interPlan)"}
