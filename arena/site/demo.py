@@ -16,7 +16,7 @@ from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import StudyPlan
 from arena.voting.services.simulation import simulate_votes
 from augment.errors import Conflict
-from augment.models import Endpoint, GenerationJob, Scenario
+from augment.models import Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.endpoints import (
     REFERENCE,
     ContestantRequest,
@@ -35,6 +35,7 @@ SIMULATED = (
     ("sim-good-otm", "otm", "fake-good", "Simulated good OTM"),
     ("sim-careless-otm", "otm", "fake-careless", "Simulated careless OTM"),
     ("sim-careless-fc", "fc", "fake-careless", "Simulated careless FC"),
+    ("sim-careless-fc-plus", "fc-plus", "fake-careless", "Simulated careless FC-plus"),
     ("sim-careless-tqa", "tqa", "fake-careless", "Simulated careless tQA"),
 )
 RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
@@ -76,6 +77,8 @@ def add_contestants(actor: User | None = None) -> None:
     ensure_builtin()
     add_stand_in(actor)
     for slug, variant, model, name in SIMULATED:
+        if Contestant.objects.filter(slug=slug).exists():  # of an earlier version, maybe
+            continue
         request = ContestantRequest(
             slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name
         )

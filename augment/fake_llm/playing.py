@@ -21,7 +21,7 @@ from augment.fake_llm import careless, sight
 from augment.fake_llm.sight import Heard, KnownTasks, Task
 from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
-from augment.prompts.calls import TOOL
+from augment.prompts.calls import Tools
 from augment.prompts.vectors import DEFAULT_RADIUS_M, lane_curves, motion_parts, short_names
 from augment.scene.codec import intent_to_parts
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
@@ -94,7 +94,7 @@ class Character:
 
     def _modify(self, heard: Heard) -> Answer:
         if self.never_stops and (heard.may_call or heard.called):
-            return _call(heard, [{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
+            return _call(heard, [_arguments(heard.tool, "Lane1", 1.0, 0.0, AgentType.VEHICLE)])
         task = heard.task
         if task is None:
             return _write_answer(Modification(), UNKNOWN), ()
@@ -108,10 +108,12 @@ class Character:
         placed = self.bend(task, right, heard)
         if placed is None:
             return "I know where it belongs, but not how to write it down.", ()
-        wanted = _calls_for(task.scene, placed)
+        wanted = _calls_for(task.scene, placed, heard.tool)
         if heard.may_call and wanted and not heard.results:
             return _call(heard, wanted)
-        return _write_answer(_with_results(task.scene, placed, heard.results)), ()
+        results = dict(zip(dict.fromkeys(wanted), heard.results, strict=False))
+        poses = [results.get(arguments) for arguments in wanted]
+        return _write_answer(_with_results(task.scene, placed, poses, heard.tool)), ()
 
 
 def _rate(problems: list[Problem]) -> str:
@@ -267,22 +269,31 @@ def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
 # --- Calls of the function ---------------------------------------------------------------------
 
 
-def _call(heard: Heard, wanted: Sequence[dict[str, object]]) -> Answer:
-    calls = [(TOOL, json.dumps(arguments)) for arguments in wanted]
+def _call(heard: Heard, wanted: Sequence[str]) -> Answer:
+    """Call once for places that are the same: only so many identical calls are answered."""
+    calls = [(heard.tool.value, arguments) for arguments in dict.fromkeys(wanted)]
     if heard.is_native:
         return "", tuple(calls)
     lines = [f'{{"call": "{name}", "arguments": {arguments}}}' for name, arguments in calls]
     return "\n".join(["I look up the places that I need.\n", *lines]), ()
 
 
-def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, object]]:
+def _arguments(tool: Tools, lane: str, s_m: float, d_m: float, kind: AgentType) -> str:
+    """Return the arguments of a call for a place on a lane; the paper's takes no offset."""
+    if tool is Tools.RETRIEVE:
+        return json.dumps({"lane": lane, "agent": kind, "dist": s_m})
+    place = {"lane": lane, "start": "lane", "distance_m": s_m}
+    return json.dumps(place | {"lateral_m": d_m, "object": kind})
+
+
+def _calls_for(scene: Scene, modification: Modification, tool: Tools) -> list[str]:
     """Return the arguments of a call for each of the first added agents, in their order.
 
     None where one stands beside no part of a lane that the prompt shows.
     """
     graph = LaneGraph(scene)
     shown = lane_curves(scene, short_names(scene), DEFAULT_RADIUS_M)
-    wanted: list[dict[str, object]] = []
+    wanted = []
     for agent in modification.added[:_MOST_CALLS]:
         nearest = graph.nearest(agent.x_m, agent.y_m)
         if nearest is None or nearest[0] not in shown:
@@ -290,18 +301,18 @@ def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, objec
         at = shown[nearest[0]].project(agent.x_m, agent.y_m)
         if at.beyond_m > _BESIDE_M:
             return []
-        place = {"lane": nearest[0], "start": "lane", "distance_m": round(at.s_m, 3)}
-        lateral_m = round(max(-30.0, min(30.0, at.d_m)), 3)
-        wanted.append(place | {"lateral_m": lateral_m, "object": agent.type.value})
+        s_m, d_m = round(at.s_m, 3), round(max(-30.0, min(30.0, at.d_m)), 3)
+        wanted.append(_arguments(tool, nearest[0], s_m, d_m, agent.type))
     return wanted
 
 
 def _with_results(
-    scene: Scene, modification: Modification, results: Sequence[dict[str, float] | None]
+    scene: Scene, modification: Modification, results: Sequence[list[float] | None], tool: Tools
 ) -> Modification:
     """Put the added agents where the function says, turned against their lanes as before.
 
-    Walks go along; agents without a result stay where they are.
+    To what the paper's returns their offset is added. Walks go along; agents without a result
+    stay where they are.
     """
     graph = LaneGraph(scene)
     placed = list(modification.added)
@@ -309,11 +320,14 @@ def _with_results(
         nearest = graph.nearest(agent.x_m, agent.y_m)
         if nearest is None or result is None:
             continue
-        x_m, y_m = float(result["x_m"]), float(result["y_m"])
+        x_m, y_m, heading_rad = result
+        if tool is Tools.RETRIEVE:
+            # Left of a heading h is (-sin h, cos h).
+            x_m -= nearest[1].d_m * math.sin(heading_rad)
+            y_m += nearest[1].d_m * math.cos(heading_rad)
         lane_rad = graph.lane(nearest[0]).centerline.heading_at(nearest[1].s_m)
         turn_rad = difference(agent.heading_rad, lane_rad)
-        moved = careless.move_to(agent, x_m, y_m, wrap(float(result["heading_rad"]) + turn_rad))
-        placed[number] = moved
+        placed[number] = careless.move_to(agent, x_m, y_m, wrap(heading_rad + turn_rad))
     return replace(modification, added=tuple(placed))
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from augment.fake_llm.wire import ChatRequest
+from augment.prompts.calls import PARAMETERS, Tools
 from augment.prompts.fill import QUOTE, read_text
 from augment.prompts.vectors import LaneFormat, scene_text, short_names, with_short_ids
 from augment.scene.entities import AgentType, Scene, TrafficAgent
@@ -55,18 +56,21 @@ class Heard:
     Attributes:
         role: Whom it is asked to be.
         task: None where the list does not know the wish.
-        may_call: Whether it can have a function called now.
+        tool: The function that it was told of.
+        may_call: Whether it can have that called now.
         is_native: Whether natively.
-        results: Of the calls since the last wish or feedback, in order; None for one that failed.
+        results: Of the calls since the last wish or feedback, in order: x, y and heading, None for
+            a call that failed.
         called: Whether it has called anything since then.
         feedback: What reviews sent back since the last wish.
     """
 
     role: ModelRole
     task: Task | None
+    tool: Tools
     may_call: bool
     is_native: bool
-    results: tuple[dict[str, Any] | None, ...]
+    results: tuple[list[float] | None, ...]
     called: bool
     feedback: tuple[str, ...]
 
@@ -93,7 +97,7 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
     said = [(n, one.text) for n, one in enumerate(messages) if one.role == "user"]
     asked = max((n for n, text in said if _INSTRUCTION.search(text)), default=0)
     told = [n for n, text in said if n > asked and text.startswith(_FEEDBACK)]
-    results: list[dict[str, Any] | None] = []
+    results: list[list[float] | None] = []
     called = False
     for message in messages[max(told, default=asked) :]:
         is_written = message.text.startswith(_RESULT)
@@ -101,15 +105,18 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
         if message.role == "tool":
             results.append(_result(message.text))
         elif message.role == "user" and is_written:
-            lines = re.findall(r"^[0-9]+\. (\{.*\})$", message.text, re.MULTILINE)
+            lines = re.findall(r"^[0-9]+\. ([\[{].*[\]}])$", message.text, re.MULTILINE)
             results += map(_result, lines)
     last, native = messages[-1].text, request.tools is not None
-    offered = request.tool_choice != "none" if native else '{"call": "pose_on_lane"' in system
+    told_of = json.dumps(request.tools) if native else system
+    tool = next((name for name in PARAMETERS if f'"{name}"' in told_of), Tools.NONE)
+    offered = tool is not Tools.NONE and request.tool_choice != "none"
     over = read_text("calls_are_over.md") in last
     asked_again = last.startswith(read_text("re_ask.md").partition("\n")[0])
     return Heard(
         role=_OPENINGS.get(system.partition("\n")[0], ModelRole.MODIFIER),
         task=_task(request, known),
+        tool=tool,
         may_call=offered and not over and not asked_again,
         is_native=native,
         results=tuple(results),
@@ -170,9 +177,12 @@ def _task(request: ChatRequest, known: KnownTasks) -> Task | None:
     return Task(prompt=prompt, scene=scene, intent=intent)
 
 
-def _result(written: str) -> dict[str, Any] | None:
+def _result(written: str) -> list[float] | None:
+    """Return the pose that either function gave, None for anything else."""
     try:
         result = json.loads(written)
-    except ValueError:
+        if isinstance(result, dict):
+            result = [result[name] for name in ("x_m", "y_m", "heading_rad")]
+        return [float(value) for value in result]
+    except (ValueError, TypeError, KeyError):
         return None
-    return None if not isinstance(result, dict) or "error" in result else result

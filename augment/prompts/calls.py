@@ -13,23 +13,35 @@ goes back to the model.
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from augment.errors import ReplyUnreadable
 from augment.prompts import blocks
 
-TOOL = "pose_on_lane"
-PARAMETERS = (
-    *("lane", "start", "distance_m", "lateral_m", "object"),
-    *("speed_mps", "motion", "after_s"),
-)
-"""In the order in which the prompt names them."""
+
+class Tools(StrEnum):
+    """Functions that the modifier may call, by name: none, the paper's, or ours."""
+
+    NONE = "none"
+    RETRIEVE = "retrieve_suitable_pose"
+    POSE_ON_LANE = "pose_on_lane"
+
+
+PARAMETERS = {
+    Tools.RETRIEVE: ("lane", "agent", "dist"),
+    Tools.POSE_ON_LANE: (
+        *("lane", "start", "distance_m", "lateral_m", "object"),
+        *("speed_mps", "motion", "after_s"),
+    ),
+}
+"""Of each function, in the order in which the prompt names them."""
 MOST_LOOKED_AT = 64
 
-_FORM = '{"call": "pose_on_lane", "arguments": {...}}'
-NATIVE = f"calls are not made natively here; a call is one line of the form {_FORM}"
 _NAMES = ("call", "name", "function", "tool", "tool_name", "function_name")
 _ARGUMENTS = ("arguments", "parameters", "args", "kwargs", "input")
-_OPENING = re.compile(rf"""\{{\s*["'](?:{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s*:""")
+_OPENING = re.compile(
+    rf"""\{{\s*["'](?:{"|".join((*_NAMES, *_ARGUMENTS, *PARAMETERS))})["']\s*:"""
+)
 _EXACT = re.compile(r'\{\s*"call"\s*:')
 _ALONE_BEHIND = re.compile(r"[ \t`]*(?:\n|\Z)")
 
@@ -51,7 +63,12 @@ class WrittenCall:
     mended: bool = False
 
 
-def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...]:
+def call_form(tool: Tools) -> str:
+    """Return the form of a call, with its arguments left out."""
+    return f'{{"call": "{tool}", "arguments": {{...}}}}'
+
+
+def calls_in(answer: str, tool: Tools, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...]:
     """Return the calls of an answer in order; thoughts of models that think aloud hold none.
 
     An answer that speaks of the tool and holds neither a call nor a block of changes is a call
@@ -59,6 +76,7 @@ def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...
 
     Args:
         answer: The raw text of the model.
+        tool: The function that it was told of.
         is_cut_off: Whether it hit its length limit: the block of changes may be missing, so
             only the form that was asked for counts.
     """
@@ -66,9 +84,10 @@ def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...
         return ()
     text = blocks.without_thoughts(answer)
     is_final = is_cut_off or blocks.names_changes(text)
-    calls = tuple(_calls(text, exact_alone=is_final))
-    if not calls and not is_final and TOOL in text:
-        problem = f"{TOOL} is named and not called; a call is one line of the form {_FORM}"
+    calls = tuple(_calls(text, tool, exact_alone=is_final))
+    if not calls and not is_final and tool in text:
+        problem = f"{tool} is named and not called; a call is one line of the form "
+        problem += call_form(tool)
         return (WrittenCall(problem=problem),)
     return calls
 
@@ -88,7 +107,7 @@ def read_arguments(written: str) -> WrittenCall:
 # Private
 
 
-def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
+def _calls(text: str, tool: Tools, *, exact_alone: bool) -> Iterator[WrittenCall]:
     """Yield each call of the text that counts."""
     end = looked_at = 0
     for opening in _OPENING.finditer(text):
@@ -104,34 +123,34 @@ def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
             written, end = blocks.strict_json_at(text, start)
         except ReplyUnreadable as broken:
             fault = broken.problems[0].replace("the JSON block", "the line")
-            yield WrittenCall(problem=f"a call is one line of the form {_FORM}; {fault}")
+            yield WrittenCall(problem=f"a call is one line of the form {call_form(tool)}; {fault}")
             end = text.find("\n", start) if "\n" in text[start:] else len(text)
             continue
-        if isinstance(written, dict) and (call := _parse_call(written)) is not None:
+        if isinstance(written, dict) and (call := _parse_call(written, tool)) is not None:
             has_form = begins_line and written.keys() == {"call", "arguments"}
             is_mended = not (call.problem or (has_form and _ALONE_BEHIND.match(text, end)))
             yield replace(call, mended=is_mended)
 
 
-def _parse_call(written: dict[str, object]) -> WrittenCall | None:
+def _parse_call(written: dict[str, object], tool: Tools) -> WrittenCall | None:
     """Return the call that an object stands for, None for anything else."""
     inner = written.get("function")
     body: dict[str, object] = inner if isinstance(inner, dict) else written
-    if body.keys() == {TOOL}:
-        return _with_arguments(TOOL, body[TOOL])
+    if body.keys() == {tool}:
+        return _with_arguments(tool, body[tool])
     name_key = next((key for key in _NAMES if key in body), None)
     arguments_key = next((key for key in _ARGUMENTS if key in body), None)
     name = None if name_key is None else body[name_key]
     rest = {key: value for key, value in body.items() if key not in {name_key, arguments_key}}
     if not isinstance(name, str):
         is_call = name_key == "call" or arguments_key is not None
-        return WrittenCall(problem=f"a call has the form {_FORM}") if is_call else None
+        return WrittenCall(problem=f"a call has the form {call_form(tool)}") if is_call else None
     if arguments_key is not None and rest.keys() <= {"id", "type"}:
         return _with_arguments(name, body[arguments_key])
-    if arguments_key is None and name == TOOL and rest.keys() & set(PARAMETERS):
+    if arguments_key is None and name == tool and rest.keys() & set(PARAMETERS[tool]):
         return _with_arguments(name, rest)
-    if name == TOOL or name_key == "call":
-        return WrittenCall(problem=f"a call has the form {_FORM} and no other keys")
+    if name == tool or name_key == "call":
+        return WrittenCall(problem=f"a call has the form {call_form(tool)} and no other keys")
     return None
 
 

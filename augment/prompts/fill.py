@@ -21,7 +21,7 @@ from importlib.resources import files
 from augment.checks.parties import USUAL
 from augment.llm.messages import Message, Speaker, Tool
 from augment.prompts.blocks import names_changes
-from augment.prompts.calls import calls_in
+from augment.prompts.calls import PARAMETERS, Tools, calls_in
 from augment.prompts.extent import BESIDE_M, CROSSED_M, behind_m
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, changes_text, scene_text
 from augment.scene.codec import parts_schema
@@ -35,14 +35,6 @@ VECTORS_VERSION = 5
 """Raised with every change to what of a scene is written down, or how: no text shows that."""
 
 Messages = tuple[Message, ...]
-
-
-class Calling(StrEnum):
-    """Way of calling the pose tool: not at all, by a line of the answer, or natively."""
-
-    NONE = "none"
-    IN_PROMPT = "in_prompt"
-    NATIVE = "native"
 
 
 class JudgeQuestion(StrEnum):
@@ -59,12 +51,15 @@ class Form:
 
     Attributes:
         lanes: How lanes are written down.
+        tools: The function that it may have called.
+        is_native: Whether natively rather than by a line of the answer.
         radius_m: How far around the ego the scene is written down.
         calls, identical: How many calls are answered, and of these the very same.
     """
 
     lanes: LaneFormat = LaneFormat.POLYLINE
-    calling: Calling = Calling.NONE
+    tools: Tools = Tools.NONE
+    is_native: bool = False
     radius_m: float = DEFAULT_RADIUS_M
     calls: int = 8
     identical: int = 3
@@ -126,7 +121,8 @@ def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) ->
 
     Only an answer that holds a block is told to keep its placement.
     """
-    told = [*problems, read_text("re_ask_calls.md")] if calls_in(answer) else problems
+    called = any(calls_in(answer, tool) for tool in PARAMETERS)
+    told = [*problems, read_text("re_ask_calls.md")] if called else problems
     keep = read_text("re_ask_keep.md") if names_changes(answer) else ""
     asked = fill_text("re_ask.md", problems=_join_entries(told), keep=keep)
     return (*messages, model_message(answer), make_user_message(asked))
@@ -160,9 +156,11 @@ def result_text(results: Sequence[str], *, is_over: bool) -> str:
 
 
 @cache
-def pose_tool() -> Tool:
-    """Return the pose tool as endpoints with native calls are told of it."""
-    return Tool(**json.loads(read_text("pose_on_lane.json"))["function"])
+def list_native_tools(form: Form) -> tuple[Tool, ...]:
+    """Return the function as endpoints with native calls are told of it, none to others."""
+    if not form.is_native:
+        return ()
+    return (Tool(**json.loads(read_text(f"{form.tools}.json"))["function"]),)
 
 
 def review_messages(
@@ -259,11 +257,13 @@ def _opening(system: str, task: str, images: tuple[bytes, ...] = ()) -> Messages
 @cache
 def _modifier(form: Form) -> str:
     tools, manner, work = "", "walked", "walked"
-    if form.calling is not Calling.NONE:
-        manner, work = "called", "native" if form.calling is Calling.NATIVE else "called"
+    if form.tools is not Tools.NONE:
+        way = "native" if form.is_native else "in_prompt"
+        manner, work = "called", f"{form.tools}_{way}"
         tools = fill_text(
-            f"calls_{form.calling}.md",
-            function=read_text("pose_on_lane.md"),
+            f"calls_{way}.md",
+            function=read_text(f"{form.tools}.md"),
+            example=read_text(f"{form.tools}_call.md"),
             calls=str(form.calls),
             identical=str(form.identical),
         )

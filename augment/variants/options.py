@@ -10,7 +10,8 @@ from enum import StrEnum
 from typing import Any
 
 from augment.errors import InvalidDocument
-from augment.variants.recipes import Recipe, Tools
+from augment.prompts.calls import Tools
+from augment.variants.recipes import Recipe
 from augment.variants.respondents import Sampling
 from augment.variants.reviews import Limits
 

@@ -23,14 +23,14 @@ from augment.llm.client import ChatClient, Patience
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
 from augment.prompts.blocks import names_changes
-from augment.prompts.calls import NATIVE, TOOL, WrittenCall, calls_in, read_arguments
-from augment.prompts.fill import Calling, Form, Messages
+from augment.prompts.calls import Tools, WrittenCall, call_form, calls_in, read_arguments
+from augment.prompts.fill import Form, Messages
 from augment.prompts.reply import ReadReply, read_intent, read_reply
 from augment.prompts.vectors import changes_text
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.variants.pose_tool import PoseTool
-from augment.variants.recipes import Keep, Recipe, Tools
+from augment.variants.recipes import Keep, Recipe
 from augment.variants.respondents import (
     ModelRole,
     NoteKind,
@@ -39,6 +39,7 @@ from augment.variants.respondents import (
     Sampling,
     Transcript,
 )
+from augment.variants.retrieval import RetrievalTool
 from augment.variants.reviews import Limits, ReviewedAnswer, Verdict
 
 LEFT_ALONE = "The modifier left the scene as it is and did not say why."
@@ -46,6 +47,10 @@ READER_TOKENS = 4096
 """The length limit of an intent reader's answer."""
 
 _LONGEST_NOTED = 500
+_TOOLS: dict[Tools, type[RetrievalTool] | type[PoseTool]] = {
+    Tools.RETRIEVE: RetrievalTool,
+    Tools.POSE_ON_LANE: PoseTool,
+}
 
 
 class OutcomeStatus(StrEnum):
@@ -152,12 +157,10 @@ def ask_for_intent(
 
 def modifier_form(recipe: Recipe, *, native_tools: bool = False) -> Form:
     """Return the form in which a recipe's modifier gets its task."""
-    calling = Calling.NONE
-    if recipe.tools is Tools.POSE:
-        calling = Calling.NATIVE if native_tools else Calling.IN_PROMPT
     return Form(
         lanes=recipe.lane_format,
-        calling=calling,
+        tools=recipe.tools,
+        is_native=native_tools and recipe.tools is not Tools.NONE,
         radius_m=recipe.limits.radius_m,
         calls=recipe.limits.calls,
         identical=recipe.limits.identical_calls,
@@ -227,7 +230,7 @@ class _Work:
         while True:
             number, fault = len(rounds) + 1, ""
             try:
-                read, messages = self._draft(messages, form.calling)
+                read, messages = self._draft(messages, form)
             except (ReplyUnreadable, ModelRefused) as unusable:
                 if not rounds:
                     raise
@@ -247,29 +250,30 @@ class _Work:
             )
         return self._kept(rounds, fault)
 
-    def _draft(self, messages: Messages, calling: Calling) -> tuple[ReadReply, Messages]:
+    def _draft(self, messages: Messages, form: Form) -> tuple[ReadReply, Messages]:
         """Return one answer, read, and the conversation up to and including it."""
         reply = None
-        if calling is not Calling.NONE:
-            messages, reply = self._ask_with_tool(messages, native=calling is Calling.NATIVE)
+        if form.tools is not Tools.NONE:
+            messages, reply = self._ask_with_tool(messages, form)
         read, asked, answer = self.respondents.read(
             ModelRole.MODIFIER,
             messages,
             partial(read_reply, scene=self.task.scene, radius_m=self.recipe.limits.radius_m),
             again=fill.re_ask_messages,
-            tools=(fill.pose_tool(),) if calling is Calling.NATIVE else (),
+            tools=fill.list_native_tools(form),
             reply=reply,
         )
         return read, (*asked, fill.model_message(answer.text))
 
-    def _ask_with_tool(self, messages: Messages, *, native: bool) -> tuple[Messages, Reply]:
+    def _ask_with_tool(self, messages: Messages, form: Form) -> tuple[Messages, Reply]:
         """Return the conversation with all calls and their results, and the reply without calls.
 
         A model that goes on calling when its calls are used up gets no more results: what it
         said is its answer then.
         """
         desk = _ToolDesk(
-            tool=PoseTool(self.task.scene, self.recipe.limits.radius_m),
+            name=form.tools,
+            tool=_TOOLS[form.tools](self.task.scene, form.radius_m),
             limits=self.recipe.limits,
             transcript=self.respondents.transcript,
         )
@@ -278,10 +282,10 @@ class _Work:
             reply = self.respondents.ask(
                 ModelRole.MODIFIER,
                 messages,
-                tools=(fill.pose_tool(),) if native else (),
+                tools=fill.list_native_tools(form),
                 tool_choice=ToolChoice.NONE if is_over else ToolChoice.AUTO,
             )
-            turns = () if is_over else desk.turns(reply, native=native)
+            turns = () if is_over else desk.turns(reply, native=form.is_native)
             if not turns:
                 return messages, reply
             messages += turns
@@ -346,7 +350,8 @@ class _ToolDesk:
         is_over: Whether a call was one too many: none is answered after it.
     """
 
-    tool: PoseTool
+    name: Tools
+    tool: PoseTool | RetrievalTool
     limits: Limits
     transcript: Transcript
     is_over: bool = False
@@ -358,9 +363,11 @@ class _ToolDesk:
         if native and reply.tool_calls:
             return self._native_turns(reply)
         results: list[str] = []
-        calls = calls_in(reply.text, is_cut_off=reply.is_cut_off)
+        calls = calls_in(reply.text, self.name, is_cut_off=reply.is_cut_off)
         if not (calls or names_changes(reply.text)):
-            calls = tuple(WrittenCall(name=c.name, problem=NATIVE) for c in reply.tool_calls)
+            problem = "calls are not made natively here; a call is one line of the form "
+            problem += call_form(self.name)
+            calls = tuple(WrittenCall(name=c.name, problem=problem) for c in reply.tool_calls)
         for call in calls:
             results.append(self._answer(call))
             if self.is_over:
@@ -398,7 +405,7 @@ class _ToolDesk:
         )
         return json.dumps(result, separators=(",", ":"))
 
-    def _result(self, call: WrittenCall) -> dict[str, object]:
+    def _result(self, call: WrittenCall) -> object:
         asked, most = (call.name, call.arguments, call.problem), self.limits
         problem = call.problem
         if self.is_over:
@@ -409,8 +416,8 @@ class _ToolDesk:
         elif self.earlier.count(asked) >= most.identical_calls:
             self.is_over = True
             problem = f"this was answered {most.identical_calls} times. Answer with what you have."
-        elif not problem and call.name != TOOL:
-            problem = f"there is no function {call.name[:40]!r}; there is {TOOL}"
+        elif not problem and call.name != self.name:
+            problem = f"there is no function {call.name[:40]!r}; there is {self.name}"
         if not self.is_over:
             self.earlier.append(asked)
         return {"error": problem} if problem else self.tool.answer(call.arguments)

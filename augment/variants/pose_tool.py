@@ -1,4 +1,4 @@
-"""The function that the FC variant offers to a language model: a pose on a lane.
+"""The function that the FC-plus variant offers to a language model: a pose on a lane.
 
 In: a `Scene`, and the arguments of a call. Out: a `PoseOnLane`, which the model gets as JSON, or
 a `ToolError` whose sentence tells the model what was wrong.
@@ -26,7 +26,7 @@ from augment.checks import Ground
 from augment.errors import InvalidModification, ToolError
 from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts import vectors
-from augment.prompts.calls import TOOL
+from augment.prompts.calls import Tools
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
 from augment.scene.density import usual_size_m
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
@@ -35,6 +35,7 @@ from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
 from augment.scene.schema import list_problems
 
+TOOL = Tools.POSE_ON_LANE
 LANE_START = "lane"
 FURTHEST_M, WIDEST_M = 1000.0, 30.0
 MOST_PLACES = 16
@@ -162,7 +163,7 @@ class PoseTool:
             ToolError: Nobody knows the lane or the agent, the agent is not beside the lane, or
                 the lanes end before the distance does.
         """
-        curve, begins_m = self._line(lane)
+        curve, begins_m = self.find_line(lane)
         start_m, start_lateral_m = self._start(curve, begins_m, start)
 
         def pose_at(along_m: float) -> Pose:
@@ -305,8 +306,12 @@ class PoseTool:
             "ego_distance_m": _round(ego_m),
         }
 
-    def _line(self, lane: object) -> tuple[LaneCurve, float]:
-        """Return the line that a call follows, and its start on it."""
+    def find_line(self, lane: object) -> tuple[LaneCurve, float]:
+        """Return the line that a call follows, and its start on it.
+
+        Raises:
+            ToolError: Nobody knows it.
+        """
         if isinstance(lane, str) and lane in self.curves:
             return self.curves[lane], 0.0
         control = None

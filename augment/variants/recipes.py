@@ -1,27 +1,24 @@
 """Variants as values: the paper's table of prompting strategies, and what it leaves room for.
 
 Adding a variant is adding one value here. OTM, FC, tQA and vQA are the paper's. Their
-combinations were not run there, and the geometric review is our own: it is named so and never
-counted among the four.
+combinations were not run there; FC-plus, whose function tells more, and the geometric review are
+our own: they are named so and never counted among the four.
 """
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from augment.errors import UnknownName
+from augment.prompts.calls import Tools
 from augment.prompts.vectors import LaneFormat
 from augment.variants.respondents import ModelRole
 from augment.variants.reviews import GEOMETRIC_REVIEW, TEXT_REVIEW, VISUAL_REVIEW, Limits, Review
 
-SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
+SPELLING = {
+    **{"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA"},
+    **{"fc-plus": "FC-plus", "geo": "geo"},
+}
 """The variants as the paper spells and orders them, then ours."""
-
-
-class Tools(StrEnum):
-    """Functions that the modifier may call."""
-
-    NONE = "none"
-    POSE = "pose"
 
 
 class Keep(StrEnum):
@@ -52,7 +49,7 @@ class Recipe:
 
     def __post_init__(self) -> None:
         if self.lane_format is LaneFormat.BEZIER and self.tools is Tools.NONE:
-            raise ValueError(f"{self.slug}: Bezier lanes come with the pose tool")
+            raise ValueError(f"{self.slug}: Bezier lanes come with a function")
 
     @property
     def roles(self) -> tuple[ModelRole, ...]:
@@ -67,7 +64,12 @@ class Recipe:
 
 
 OTM = Recipe(slug="otm", title="One-time modifier")
-FC = Recipe(slug="fc", title="Function calling", lane_format=LaneFormat.BEZIER, tools=Tools.POSE)
+FC = Recipe(
+    slug="fc", title="Function calling", lane_format=LaneFormat.BEZIER, tools=Tools.RETRIEVE
+)
+FC_PLUS = replace(
+    FC, slug="fc-plus", title="Function calling, our function", tools=Tools.POSE_ON_LANE
+)
 TQA = Recipe(slug="tqa", title="Text QA", review=TEXT_REVIEW, keep=Keep.BEST)
 VQA = Recipe(slug="vqa", title="Visual QA", review=VISUAL_REVIEW)
 GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIEW, keep=Keep.BEST)
@@ -75,15 +77,18 @@ GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIE
 PAPER: tuple[Recipe, ...] = (OTM, FC, TQA, VQA)
 _WITH_CALLS = tuple(
     replace(
-        FC,
-        slug=f"fc+{reviewed.slug}",
-        title=f"Function calling + {reviewed.title[0].lower()}{reviewed.title[1:]}",
+        calling,
+        slug=f"{calling.slug}+{reviewed.slug}",
+        title=f"{calling.title} + {reviewed.title[0].lower()}{reviewed.title[1:]}",
         review=reviewed.review,
         keep=reviewed.keep,
     )
+    for calling in (FC, FC_PLUS)
     for reviewed in (TQA, VQA, GEO)
 )
-RECIPES: dict[str, Recipe] = {recipe.slug: recipe for recipe in (*PAPER, GEO, *_WITH_CALLS)}
+RECIPES: dict[str, Recipe] = {
+    recipe.slug: recipe for recipe in (*PAPER, FC_PLUS, GEO, *_WITH_CALLS)
+}
 
 
 def find_recipe(name: str) -> Recipe:

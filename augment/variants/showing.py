@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 from augment.llm.messages import Message
 from augment.prompts import fill
+from augment.prompts.calls import Tools
 from augment.scene.entities import Modification, Scene
 from augment.variants.pipeline import modifier_form
-from augment.variants.recipes import Recipe, Tools
+from augment.variants.recipes import Recipe
 from augment.variants.respondents import ModelRole
 from augment.variants.reviews import pictures
 
@@ -84,10 +85,9 @@ def build_prompt(
     """
     if role is ModelRole.MODIFIER:
         form = modifier_form(recipe, native_tools=native_tools)
-        native = form.calling is fill.Calling.NATIVE
         return ShownPrompt(
             messages=fill.modifier_messages(scene, instruction, form),
-            tools=(json.dumps(fill.pose_tool().to_document()),) if native else (),
+            tools=tuple(json.dumps(tool.to_document()) for tool in fill.list_native_tools(form)),
         )
     if role is ModelRole.VIEWER:
         images = pictures(scene, modification, width_px=recipe.limits.picture_px)

@@ -53,7 +53,9 @@ def asked(server: FakeServer, name: str, variant: str, *, native: bool = False) 
     [
         *((name, "otm", False) for name in WISHES),
         *((name, "fc", False) for name in WISHES),
+        *((name, "fc-plus", False) for name in WISHES),
         ("cut_in", "fc", True),
+        ("cut_in", "fc-plus", True),
     ],
 )
 def test_a_good_stand_in_answers_what_is_asked_of_a_motion(

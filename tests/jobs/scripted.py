@@ -18,6 +18,7 @@ MEAN_3 = rating(3, 3, 3, "Too far left.")
 SCRIPTS = {
     "otm": [CAR],
     "fc": [CAR],
+    "fc-plus": [CAR],
     "tqa": [CAR, MEAN_3],
     "vqa": [CAR, questions(), "1. yes\n2. yes\n3. yes", verdict()],
 }

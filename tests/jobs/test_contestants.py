@@ -351,7 +351,7 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
         contestants.add_contestant(
             ContestantRequest(
                 slug="two",
-                variant="fc+vqa",
+                variant="fc-plus+vqa",
                 endpoint="a",
                 model="fake-qa-low",
                 roles={

@@ -1,11 +1,15 @@
 import json
+from functools import partial
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.prompts.calls import MOST_LOOKED_AT, WrittenCall, calls_in, read_arguments
+from augment.prompts import calls
+from augment.prompts.calls import MOST_LOOKED_AT, Tools, WrittenCall, read_arguments
 from tests.variants.playing import GOOD
+
+calls_in = partial(calls.calls_in, tool=Tools.POSE_ON_LANE)
 
 ONE = '{"call": "pose_on_lane", "arguments": {"lane": "Lane1"}}'
 READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})

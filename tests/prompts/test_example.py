@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.calls import calls_in
+from augment.prompts.calls import PARAMETERS, Tools, calls_in
 from augment.prompts.fill import read_text
 from augment.prompts.reply import answer_notes, read_reply
 from augment.prompts.vectors import LaneFormat, scene_text
 from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 from augment.variants.pose_tool import PoseTool
+from augment.variants.retrieval import RetrievalTool
 from tests.scenes import EGO, scene
 
 TEXTS = Path(__file__).parents[2] / "augment" / "prompts" / "text"
@@ -66,15 +67,24 @@ def test_the_lists_of_the_example_are_those_of_its_scene(lanes: LaneFormat) -> N
     assert read_text(f"example_{lanes}.md") == scene_text(example(), lanes=lanes)
 
 
-def test_the_results_of_the_example_are_those_of_the_tool() -> None:
-    work, tool = read_text("work_called.md"), PoseTool(example())
-    calls = calls_in(work.partition("Insights:")[0])
-    results = [json.loads(line) for line in re.findall(r"^1\. (\{.*\})$", work, re.MULTILINE)]
-    assert len(calls) == 1
+@pytest.mark.parametrize(
+    ("name", "tool", "count"),
+    [(Tools.RETRIEVE, RetrievalTool(example()), 2), (Tools.POSE_ON_LANE, PoseTool(example()), 1)],
+)
+def test_the_results_of_the_example_are_those_of_the_tool(
+    name: Tools, tool: PoseTool | RetrievalTool, count: int
+) -> None:
+    work = read_text(f"work_{name}_in_prompt.md")
+    calls = calls_in(work.partition("Insights:")[0], name)
+    results = [json.loads(line) for line in re.findall(r"^\d\. ([\[{].*)$", work, re.MULTILINE)]
+    assert len(calls) == count
     assert [tool.answer(call.arguments) for call in calls] == results
 
 
-@pytest.mark.parametrize("work", ["walked", "called", "native"])
+@pytest.mark.parametrize(
+    "work",
+    ["walked", *(f"{name}_{way}" for name in PARAMETERS for way in ("in_prompt", "native"))],
+)
 def test_the_answer_of_the_example_is_read_and_right(work: str) -> None:
     text = read_text(f"work_{work}.md")
     answer = text[text.index("Insights:") :]

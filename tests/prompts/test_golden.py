@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from augment.prompts.calls import Tools
 from augment.prompts.fill import (
     make_user_message,
     regenerate_messages,
     result_text,
     viewer_messages,
 )
+from augment.prompts.vectors import LaneFormat
 from augment.scene.entities import Modification
 from augment.scene.planned_motion import LanePath, NearEgo, PlannedMotion
 from augment.variants.pipeline import modifier_form
@@ -41,6 +43,8 @@ CASES = [
     ("otm", ModelRole.MODIFIER, False),
     ("fc", ModelRole.MODIFIER, False),
     ("fc", ModelRole.MODIFIER, True),
+    ("fc-plus", ModelRole.MODIFIER, False),
+    ("fc-plus", ModelRole.MODIFIER, True),
     ("tqa", ModelRole.REVIEWER, False),
     ("vqa", ModelRole.ENGINEER, False),
     ("vqa", ModelRole.VIEWER, False),
@@ -84,7 +88,7 @@ def between() -> str:
 def test_every_recipe_shows_one_of_these_prompts() -> None:
     for one in RECIPES.values():
         form = modifier_form(one)
-        assert (form.lanes, form.calling) in {("polyline", "none"), ("bezier", "in_prompt")}
+        assert (form.lanes is LaneFormat.BEZIER) is (form.tools is not Tools.NONE)
         if one.review is VQA.review:
             (_, task) = viewer_messages(["a?", "b?", "c?"], [b"one", b"two"])
             assert task.images == (b"one", b"two")

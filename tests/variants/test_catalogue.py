@@ -13,8 +13,9 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
 from augment.metrics.displacement import displacement
+from augment.prompts.calls import Tools
 from augment.variants.pipeline import EditTask, Outcome, OutcomeStatus, run
-from augment.variants.recipes import RECIPES, Tools, find_recipe
+from augment.variants.recipes import RECIPES, find_recipe
 from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
 from tests.checks.worlds import findings
@@ -31,6 +32,10 @@ CALLS_OF_GOOD = {
     "fc+tqa": "mmr",
     "fc+vqa": "mmeve",
     "fc+geo": "mm",
+    "fc-plus": "mm",
+    "fc-plus+tqa": "mmr",
+    "fc-plus+vqa": "mmeve",
+    "fc-plus+geo": "mm",
 }
 CALLS_OF_LOW = {"tqa": "mrmr", "vqa": "mevemeve", "fc+tqa": "mmrmmr", "fc+vqa": "mmevemmeve"}
 KINDS = ("crash", "jaywalker", "nudge", "overtake", "roadworks")
@@ -144,7 +149,7 @@ def _is_complete(
     assert len({call.prompt_version for call in transcript.calls}) == 1
     kinds = [note.kind.value for note in transcript.notes]
     way = RECIPES[variant]
-    assert ("tool_call" in kinds) is (looks_up and way.tools is Tools.POSE)
+    assert ("tool_call" in kinds) is (looks_up and way.tools is not Tools.NONE)
     rest = [kind for kind in kinds if kind != "tool_call"]
     rounds = kinds.count("round")
     assert rest == ([] if way.review is None else ["round", "review"] * rounds + ["kept"])

@@ -51,7 +51,7 @@ def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
     return {role: roles.count(role) for role in dict.fromkeys(roles)}
 
 
-@pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "vqa", "geo", "fc+tqa"])
+@pytest.mark.parametrize("variant", ["otm", "fc", "tqa", "vqa", "fc-plus", "geo", "fc+tqa"])
 @pytest.mark.parametrize("character", [GOOD, STUBBORN, LOOPING], ids=["good", "stubborn", "loop"])
 def test_no_run_asks_less_or_more_often_than_said(variant: str, character: Character) -> None:
     said = call_ranges(RECIPES[variant])

@@ -1,7 +1,8 @@
 import pytest
 
+from augment.prompts.calls import Tools
 from augment.prompts.vectors import LaneFormat
-from augment.variants.recipes import FC, TQA, Keep, Recipe, Tools, find_recipe
+from augment.variants.recipes import FC, FC_PLUS, TQA, Keep, Recipe, find_recipe, spell_variant
 
 
 @pytest.mark.parametrize("name", ["otm", "OTM", " Otm "])
@@ -14,12 +15,17 @@ def test_a_recipe_is_found_in_any_case(name: str) -> None:
     )
 
 
-def test_a_combination_has_the_parts_of_both() -> None:
-    both = find_recipe("FC+tQA")
-    assert (both.lane_format, both.tools) == (FC.lane_format, FC.tools)
+@pytest.mark.parametrize(
+    ("name", "calling", "tools"),
+    [("FC+tQA", FC, Tools.RETRIEVE), ("FC-plus+tQA", FC_PLUS, Tools.POSE_ON_LANE)],
+)
+def test_a_combination_has_the_parts_of_both(name: str, calling: Recipe, tools: Tools) -> None:
+    both = find_recipe(name)
+    assert (both.lane_format, both.tools) == (calling.lane_format, tools)
     assert (both.review, both.keep) == (TQA.review, Keep.BEST)
+    assert (calling.tools, spell_variant(both.slug)) == (tools, name)
 
 
 def test_bezier_lanes_without_a_tool_are_refused() -> None:
-    with pytest.raises(ValueError, match="come with the pose tool"):
+    with pytest.raises(ValueError, match="come with a function"):
         Recipe(slug="bare", title="Bare", lane_format=LaneFormat.BEZIER)

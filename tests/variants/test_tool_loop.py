@@ -1,4 +1,4 @@
-"""The FC variant: calls in the answer and native ones, their limits, and what goes wrong."""
+"""The FC variants: calls in the answer and native ones, their limits, and what goes wrong."""
 
 import json
 
@@ -20,7 +20,7 @@ def results(message: Message) -> list[dict[str, object]]:
 
 def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     first = f"I look it up.\n{call()}\n{call(distance_m=30.0, lateral_m=-1.0)}"
-    play = Play("fc", [first, car(21.4)])
+    play = Play("fc-plus", [first, car(21.4)])
     assert (play.roles, play.x_m) == ("mm", 21.4)
     said, told = play.client.requests[1].messages[2:]
     assert (said.speaker, said.text) == (Speaker.ASSISTANT, first)
@@ -45,7 +45,7 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     ],
 )
 def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> None:
-    play = Play("fc", [line, car(21.4)])
+    play = Play("fc-plus", [line, car(21.4)])
     (result,) = results(play.client.requests[1].messages[-1])
     assert said in str(result["error"])
     assert play.outcome.status is OutcomeStatus.DONE
@@ -56,7 +56,7 @@ def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> No
 def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
     form: str, native: bool
 ) -> None:
-    play = Play("fc", [f"I look it up.\n\n{form}\n", car(21.4)], native=native)
+    play = Play("fc-plus", [f"I look it up.\n\n{form}\n", car(21.4)], native=native)
     assert (play.roles, play.x_m) == ("mm", 21.4)
     told = play.client.requests[1].messages[-1]
     assert told.speaker is Speaker.USER
@@ -78,7 +78,7 @@ def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
 def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
     answer: str, said: str
 ) -> None:
-    play = Play("fc", [answer, car(21.4)])
+    play = Play("fc-plus", [answer, car(21.4)])
     told = play.client.requests[1].messages[-1].text
     assert said in told
     assert "placement" not in told
@@ -90,7 +90,7 @@ def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
 
 def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
     calls = [call(distance_m=float(n)) for n in range(1, 11)]
-    play = Play("fc", [*calls[:9], car(21.4)])
+    play = Play("fc-plus", [*calls[:9], car(21.4)])
     assert play.roles == "m" * 10
     last = play.client.requests[9].messages[-1].text
     assert "no call is left: 8 are allowed" in last
@@ -98,7 +98,7 @@ def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:
 
 
 def test_a_model_in_a_loop_is_stopped_and_unreadable() -> None:
-    play = Play("fc", [call()] * 6)
+    play = Play("fc-plus", [call()] * 6)
     assert play.outcome.status is OutcomeStatus.UNREADABLE
     assert play.roles == "m" * 6
     assert "answered 3 times" in play.client.requests[4].messages[-1].text
@@ -106,7 +106,7 @@ def test_a_model_in_a_loop_is_stopped_and_unreadable() -> None:
 
 
 def test_a_native_call_where_calls_are_written_is_told_so_and_counts() -> None:
-    play = Play("fc", [native(POSE, POSE), call(), car(21.4)])
+    play = Play("fc-plus", [native(POSE, POSE), call(), car(21.4)])
     assert play.outcome.status is OutcomeStatus.DONE
     told = play.client.requests[1].messages[-1].text
     assert told.startswith("Function result")
@@ -116,7 +116,7 @@ def test_a_native_call_where_calls_are_written_is_told_so_and_counts() -> None:
 
 def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> None:
     signed = '{"extra_content": {"google": {"thought_signature": "abc"}}}'
-    play = Play("fc", [native(POSE, POSE, extra=signed), car(21.4)], native=True)
+    play = Play("fc-plus", [native(POSE, POSE, extra=signed), car(21.4)], native=True)
     first, second = play.client.requests
     assert [tool.name for tool in first.tools] == ["pose_on_lane"]
     assert '{"call"' not in first.messages[0].text
@@ -132,3 +132,51 @@ def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> No
     ]
     assert json.loads(told[0].text)["y_m"] == 0.5
     assert (second.tool_choice, play.x_m) == (ToolChoice.AUTO, 21.4)
+
+
+THERE = {"lane": "Lane1", "agent": "VEHICLE", "dist": 21.4}
+
+
+@pytest.mark.parametrize("native_calls", [False, True])
+def test_the_papers_function_returns_one_pose_and_nothing_else(native_calls: bool) -> None:
+    points = {"lane": [[-35.0, 0.0], [80.0, 0.0]]}
+    asked = [THERE, THERE | points, THERE | {"agent": "TRAFFIC_CONE"}]
+    written = "\n".join(
+        json.dumps({"call": "retrieve_suitable_pose", "arguments": one}) for one in asked
+    )
+    called = native(*map(json.dumps, asked), name="retrieve_suitable_pose")
+    play = Play("fc", [called if native_calls else written, car(21.4)], native=native_calls)
+    first, second = play.client.requests
+    assert [tool.name for tool in first.tools] == ["retrieve_suitable_pose"] * native_calls
+    assert "pose_on_lane" not in first.messages[0].text
+    told = second.messages[3:]
+    poses = [json.loads(one.text) for one in told] if native_calls else results(told[0])
+    assert poses == [[-13.6, 0.0, 0.0]] * 3
+    assert play.outcome.status is OutcomeStatus.DONE
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"lane": "Lane9"}, "there is no lane 'Lane9'"),
+        ({"lane": [[0.0, 0.0], [1.0, 1.0]]}, "there is no lane"),
+        ({"agent": "TANK"}, "agent: String should match"),
+        ({"dist": 115.1}, "this lane ends after 115.00"),
+        ({"dist": -0.1}, "greater than or equal to 0"),
+        ({"dist": [1.0, 2.0]}, "dist: Input should be a valid number"),
+        ({"lateral_m": 0.5}, "lateral_m: Extra inputs are not permitted"),
+    ],
+)
+def test_what_the_papers_function_can_t_answer_goes_back_as_text(
+    changes: dict[str, object], said: str
+) -> None:
+    call = {"call": "retrieve_suitable_pose", "arguments": THERE | changes}
+    play = Play("fc", [json.dumps(call), car(21.4)])
+    (result,) = results(play.client.requests[1].messages[-1])
+    assert said in str(result["error"])
+
+
+def test_our_function_is_none_of_the_papers_variant() -> None:
+    play = Play("fc", [call(), car(21.4)])
+    (result,) = results(play.client.requests[1].messages[-1])
+    assert "no function 'pose_on_lane'; there is retrieve_suitable_pose" in str(result["error"])

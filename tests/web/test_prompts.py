@@ -31,7 +31,11 @@ def researcher() -> Client:
 
 
 @pytest.mark.parametrize(
-    ("variant", "options"), [("otm", {}), ("fc", {}), ("fc", {"protocol": "native"}), ("tqa", {})]
+    ("variant", "options"),
+    [
+        *(("otm", {}), ("tqa", {}), ("fc", {}), ("fc", {"protocol": "native"})),
+        *(("fc-plus", {}), ("fc-plus", {"protocol": "native"})),
+    ],
 )
 def test_the_page_shows_what_the_wire_then_carries(
     researcher: Client, server: Scripted, variant: str, options: dict[str, object]

@@ -5,13 +5,14 @@ from django.db import connection
 from augment.errors import Conflict, check_names
 from augment.fake_llm.sight import same_text
 from augment.models import Scenario
+from augment.prompts.calls import Tools
 from augment.prompts.fill import prompt_version as prompt_version
 from augment.scene.codec import intent_from_document
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.services.scenarios.scenes import load_reference, load_scene
 from augment.variants.options import ContestantOptions, recipe_with
-from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe
+from augment.variants.recipes import RECIPES, Recipe, find_recipe
 from augment.variants.respondents import ModelRole
 from augment.variants.showing import ShownPrompt as ShownPrompt
 from augment.variants.showing import build_prompt

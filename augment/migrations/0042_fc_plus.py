@@ -1,0 +1,15 @@
+from django.apps.registry import Apps
+from django.db import migrations
+from django.db.backends.base.schema import BaseDatabaseSchemaEditor
+
+
+def rename_variants(apps: Apps, editor: BaseDatabaseSchemaEditor | None) -> None:
+    """What was called fc had our function; fc is the paper's now, and ours is fc-plus."""
+    contestants = apps.get_model("augment", "Contestant").objects
+    for earlier in ("fc", "fc+tqa", "fc+vqa", "fc+geo"):
+        contestants.filter(variant=earlier).update(variant=earlier.replace("fc", "fc-plus"))
+
+
+class Migration(migrations.Migration):
+    dependencies = [("augment", "0041_cached_tokens")]
+    operations = [migrations.RunPython(rename_variants, migrations.RunPython.noop)]
