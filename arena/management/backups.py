@@ -2,7 +2,7 @@
 
 The rows are written as values, not as a dump of one database, so that a backup of SQLite can be
 restored on PostgreSQL and the other way round. A backup is restored by the release that made it
-(the same migrations), and by no other. The file is a zip:
+(the same migrations), or by one whose further migrations change no table. The file is a zip:
 
 manifest.json          format, when, which migrations, every member with its SHA-256
 rows/LABEL.jsonl       one row a line
@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
 from functools import partial
+from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import IO
 
@@ -60,6 +61,8 @@ ROWS, MEDIA = "rows/", "media/"
 UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError)
 """What a member says that is broken, locked with a password, or packed in a way of others."""
 CHUNK = 1 << 20
+VALUES_ALONE = frozenset({"augment.0042_fc_plus"})
+"""Migrations that change no table: rows from before are read, and then changed as they do."""
 SMALL = 1 << 24
 """A manifest is far below this; a longer one is none of ours."""
 EXPERTS = "expert"
@@ -338,8 +341,9 @@ def _restore(
 ) -> None:
     """Take in pictures and rows, or neither."""
     ours, theirs = set(stored_rows.list_migrations()), set(manifest.migrations)
-    if ours != theirs:
-        lacking = ", ".join(sorted(ours - theirs)) or "nothing"
+    later = ours - theirs
+    if theirs - ours or later - VALUES_ALONE:
+        lacking = ", ".join(sorted(later)) or "nothing"
         beyond = ", ".join(sorted(theirs - ours)) or "nothing"
         raise ArenaError(
             f"This is of another release: it lacks {lacking}, and has {beyond} beyond this one. "
@@ -360,6 +364,8 @@ def _restore(
         with transaction.atomic():
             stored_rows.list_prepared_rows().delete()
             write()
+            for app, name in sorted(migration.split(".") for migration in later):
+                import_module(f"{app}.migrations.{name}").change_values(apps, None)
     except BaseException:
         for name in written:
             default_storage.delete(name)

@@ -3,7 +3,7 @@ from django.db import migrations
 from django.db.backends.base.schema import BaseDatabaseSchemaEditor
 
 
-def rename_variants(apps: Apps, editor: BaseDatabaseSchemaEditor | None) -> None:
+def change_values(apps: Apps, editor: BaseDatabaseSchemaEditor | None) -> None:
     """What was called fc had our function; fc is the paper's now, and ours is fc-plus."""
     contestants = apps.get_model("augment", "Contestant").objects
     for earlier in ("fc", "fc+tqa", "fc+vqa", "fc+geo"):
@@ -12,4 +12,4 @@ def rename_variants(apps: Apps, editor: BaseDatabaseSchemaEditor | None) -> None
 
 class Migration(migrations.Migration):
     dependencies = [("augment", "0041_cached_tokens")]
-    operations = [migrations.RunPython(rename_variants, migrations.RunPython.noop)]
+    operations = [migrations.RunPython(change_values, migrations.RunPython.noop)]

@@ -1,5 +1,6 @@
 """Contestants and the endpoints of their models."""
 
+import re
 import uuid
 
 from django.core.exceptions import ValidationError
@@ -261,6 +262,16 @@ class Contestant(models.Model):
         """Variant, model and endpoint in words; empty where it asks no model."""
         variant = spell_variant(self.variant)
         return f"{variant} with {self.model} at {self.endpoint}" if self.endpoint else ""
+
+    @property
+    def name_note(self) -> str:
+        """Sentence on a name from before `fc` was the paper's function; mostly empty."""
+        words = f"{self.slug} {self.name}".lower()
+        if not (self.variant.startswith("fc-plus") and re.search(r"\bfc\b(?!-plus)", words)):
+            return ""
+        now = spell_variant(self.variant)
+        before = now.replace("-plus", "")
+        return f"{self.name} asks by {now}, called {before} before that was the paper’s function."
 
     @property
     def is_simulated(self) -> bool:

@@ -21,7 +21,8 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.models import Person, Study
+from arena.models import Person, Snapshot, Study
+from arena.results.exports.tables import leaderboard_table
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.stored_rows import as_line, find_filled_tables, stored_columns
 from arena.studies.services.opening import close_study
@@ -219,6 +220,30 @@ def test_nobody_of_a_folder_rules_and_no_key_is_sent_to_it(study: Study, tmp_pat
         assert (user.is_staff, user.is_superuser) == (False, False)
         assert not user.has_usable_password()
     assert Endpoint.objects.get().key_variable == ""
+
+
+@pytest.mark.parametrize(
+    ("lacking", "variant"), [(["augment.0042_fc_plus"], "fc-plus+tqa"), ([], "fc+tqa")]
+)
+def test_a_folder_of_before_the_papers_function_means_ours_by_fc(
+    study: Study, tmp_path: Path, lacking: list[str], variant: str
+) -> None:
+    endpoint = Endpoint.objects.create(label="away", base_url="https://away.example/v1")
+    pk = study.contestants.all()[0].pk
+    asks = {"variant": "fc+tqa", "endpoint": endpoint, "model": "m", "name": "Llama FC+tQA"}
+    Contestant.objects.filter(pk=pk).update(kind=Contestant.Kind.LLM, **asks)
+    folder = tmp_path / "out"
+    export(study, folder)
+    empty()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["migrations"] = [one for one in manifest["migrations"] if one not in lacking]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    call_command("import", "study", str(folder))
+    assert Contestant.objects.get(pk=pk).variant == variant
+    notes = leaderboard_table(Snapshot.objects.get()).warnings
+    assert ("Llama FC+tQA asks by FC-plus+tQA, called FC+tQA before" in str(notes)) is bool(
+        lacking
+    )
 
 
 def test_a_folder_with_tables_that_no_study_has_is_refused(study: Study, tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_the_papers_function_returns_one_pose_and_nothing_else(native_calls: boo
         ({"dist": 115.1}, "this lane ends after 115.00"),
         ({"dist": -0.1}, "greater than or equal to 0"),
         ({"dist": [1.0, 2.0]}, "dist: Input should be a valid number"),
-        ({"lateral_m": 0.5}, "lateral_m: Extra inputs are not permitted"),
+        ({"lateral_m": 0.5}, "lateral_m: is not a field of this format"),
     ],
 )
 def test_what_the_papers_function_can_t_answer_goes_back_as_text(

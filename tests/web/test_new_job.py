@@ -48,11 +48,11 @@ def test_impossible_cells_are_disabled_and_say_why_in_the_text(
     boxes = dict(re.findall(r'name="cells" value="([^"]+)"( disabled)?', shown))
     assert {key for key, off in boxes.items() if off} == {
         f"{variant}|here|{model}"
-        for variant in ("vqa", "fc+vqa")
+        for variant in ("vqa", "fc+vqa", "fc-plus+vqa")
         for model in ("blind", "unknown")
     }
-    assert shown.count("needs vision, and it sees text alone") == 2
-    assert shown.count("nobody knows whether it sees pictures: probe it") == 2
+    assert shown.count("needs vision, and it sees text alone") == 3
+    assert shown.count("nobody knows whether it sees pictures: probe it") == 3
     assert "is not one of the available choices" in send(admin, cells=["vqa|here|blind"])
     assert not GenerationJob.objects.exists()
 

@@ -97,6 +97,7 @@ class LeaderboardTable:
         left_out: Votes that do not count, by reason.
         preregistration: The SHA-256 of the file that was frozen at the opening, empty without.
         hypotheses: What was expected, and what the rating says of it.
+        name_notes: What contestants' names say of variants that are called otherwise now.
     """
 
     snapshot: Snapshot
@@ -105,6 +106,7 @@ class LeaderboardTable:
     reasons: tuple[str, ...] = ()
     preregistration: str = ""
     hypotheses: tuple[HypothesisAnswer, ...] = ()
+    name_notes: tuple[str, ...] = ()
 
     @property
     def votes_text(self) -> str:
@@ -127,7 +129,7 @@ class LeaderboardTable:
     @property
     def notes(self) -> list[str]:
         """Further remarks of the method on these votes."""
-        return list(filter(None, self.snapshot.results.board.warnings))
+        return list(filter(None, (*self.snapshot.results.board.warnings, *self.name_notes)))
 
     @property
     def frozen_text(self) -> str:
@@ -166,6 +168,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         reasons=tuple(filter(None, reasons)),
         preregistration=preregistration_sha256(snapshot.study),
         hypotheses=answer_hypotheses(snapshot),
+        name_notes=tuple(row.contestant.name_note for row in standings if row.contestant),
     )
 
 
