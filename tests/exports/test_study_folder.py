@@ -223,7 +223,7 @@ def test_nobody_of_a_folder_rules_and_no_key_is_sent_to_it(study: Study, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("lacking", "variant"), [(["augment.0042_fc_plus"], "fc-plus+tqa"), ([], "fc+tqa")]
+    ("lacking", "variant"), [(["augment.0043_fc_plus"], "fc-plus+tqa"), ([], "fc+tqa")]
 )
 def test_a_folder_of_before_the_papers_function_means_ours_by_fc(
     study: Study, tmp_path: Path, lacking: list[str], variant: str

@@ -11,5 +11,5 @@ def change_values(apps: Apps, editor: BaseDatabaseSchemaEditor | None) -> None:
 
 
 class Migration(migrations.Migration):
-    dependencies = [("augment", "0041_cached_tokens")]
+    dependencies = [("augment", "0042_drives_have_a_version")]
     operations = [migrations.RunPython(change_values, migrations.RunPython.noop)]
