@@ -13,7 +13,7 @@ from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
-from augment.scene.intent import ConesRequest, LaneChoice, Post, Shape, WalkRequest
+from augment.scene.intent import ConesRequest, LaneChoice, Lateral, Post, Shape, WalkRequest
 from augment.scene.lane_graph import LanePosition
 
 WALK_S = 15.0
@@ -61,15 +61,21 @@ def _walker(
 ) -> TrafficAgent:
     start = request.start or ground.kerb  # the rule placer refuses an open one
     place = ground.along(distance_m)
-    from_m = ground.lane(place).width_m / 4.0
-    if not request.on_road:
-        from_m = ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M
+    from_m = _left_m(request.spot.lateral, ground)
+    if from_m is None:
+        from_m = SIGNS[start] * ground.lane(place).width_m / 4.0
+        if not request.on_road:
+            from_m = SIGNS[start] * (ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M)
     arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose
-    to_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
-    begin = np.array(place.pose.beside(SIGNS[start] * (from_m + behind_m)))
-    end = np.array(arrives.beside(-SIGNS[start] * to_m))
-    length_m = math.dist(begin, end)
-    walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
+    to_m = _left_m(request.end, ground)
+    if to_m is None:
+        edge_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
+        to_m = -SIGNS[start] * edge_m
+    begin = np.array(place.pose.beside(from_m + SIGNS[start] * behind_m))
+    end = np.array(arrives.beside(to_m))
+    length_m = walked_m = math.dist(begin, end)
+    if request.end is None:
+        walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
     end = begin + (end - begin) * (walked_m / length_m)
     (x_m, y_m), (to_x_m, to_y_m) = begin.tolist(), end.tolist()
     return build_agent(
@@ -79,6 +85,13 @@ def _walker(
         speed_mps=round(request.speed_mps or walked_m / WALK_S, 2),
         walk_to_m=(to_x_m, to_y_m),
     )
+
+
+def _left_m(lateral: Lateral | None, ground: PlacingGround) -> float | None:
+    """Return how far left of the lane's centre an offset leads, None where none is said."""
+    if lateral is None or lateral.offset is None:
+        return None
+    return ground.side_sign(lateral) * lateral.offset.low_m
 
 
 def place_cones(

@@ -123,7 +123,8 @@ def _offset_m(
     half_box_m = _size_m(request.body)[1] / 2.0
     if lateral.offset is not None:
         size_m = lateral.offset.drawn(rng)
-        if size_m > half_lane_m + half_box_m:
+        is_beside = lateral.nearness is Nearness.OUTSIDE
+        if size_m > half_lane_m + half_box_m and not is_beside:
             raise CannotPlace(f"An offset of {size_m:.1f} m leaves the lane.")
     else:
         size_m = {

@@ -5,6 +5,7 @@ Frame: ego frame of the scene. d is to the left of a lane's own direction, in me
 
 import math
 from collections.abc import Callable
+from copy import copy
 from functools import partial
 
 import shapely
@@ -74,6 +75,13 @@ class PlacingGround:
             for kind in (entities.AreaKind.DRIVABLE, entities.AreaKind.WALKWAY)
         )
 
+    def over(self, via: str | None) -> "PlacingGround":
+        """Return the same along the way to a lane."""
+        there, lanes = copy(self), self.lanes.over(via)
+        assert lanes is not None, "what a scene does not have is refused before"
+        there.lanes, there.route = lanes, lanes.route
+        return there
+
     def along(self, distance_m: float) -> LanePosition:
         """Return the place that far along the ego's lane (negative: back).
 
@@ -95,15 +103,14 @@ class PlacingGround:
         Raises:
             CannotPlace: The map has no such lane there.
         """
-        place = self.along(distance_m)
+        own = self.along(distance_m)
         if lane in (None, LaneChoice.OWN):
-            return place
-        band = self.lanes.band(lane, distance_m)
-        if band is None:
+            return own
+        place = self.lanes.place(lane, distance_m)
+        if place is None:
             words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
             raise CannotPlace(f"The map has no {words} beside the ego's lane there.")
-        line = self.graph.lane(band.lane_id).centerline
-        return self.graph.place(band.lane_id, line.project(place.pose.x_m, place.pose.y_m).s_m)
+        return place
 
     def neighbour(self, place: LanePosition, side: Side) -> str | None:
         """Return the lane of the same direction on that side of the place's lane."""

@@ -179,15 +179,16 @@ class _Fitting:
         wish: MotionWish | None = getattr(request, "motion", None)
         if of is not None and wish is not None:
             return (_round(give_motion(wish, self._place, of, rng)),)
+        along = self._place.over(request.spot.via)
         match request:
             case intents.VehicleRequest():
-                agents = place_vehicles(request, self._place, distance_m, rng)
+                agents = place_vehicles(request, along, distance_m, rng)
             case intents.WalkRequest():
-                agents = place_walkers(request, self._place, distance_m, rng)
+                agents = place_walkers(request, along, distance_m, rng)
             case intents.ConesRequest():
-                agents = place_cones(request, self._place, distance_m, rng)
+                agents = place_cones(request, along, distance_m, rng)
             case intents.CrashRequest():
-                agents = place_crash(request, self._place, distance_m, rng, arrangement)
+                agents = place_crash(request, along, distance_m, rng, arrangement)
             case intents.DoorRequest():
                 raise AssertionError("a door is of somebody")
         return tuple(map(_round, agents))

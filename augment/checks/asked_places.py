@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 from statistics import median
 
 from augment.checks.asked_crash import in_order
+from augment.checks.bodies import end_of_walk
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
 from augment.checks.parties import CRASH_M, Bounds, Case, Party, apart_m, hold, meets_route
@@ -83,6 +84,8 @@ def check_across(asked: Case) -> Iterator[Finding]:
     """Vehicles by their offset, crashes and cones by the lane that they are in."""
     for party in asked.parties:
         request, lane = party.request, party.request.spot.lane
+        if isinstance(request, wish.WalkRequest) and not request.is_file:
+            yield from _check_walk_ends(asked, party, request)
         if isinstance(request, wish.WalkRequest) or not party.placed or lane is None:
             continue
         first = min(party.placed, key=lambda agent: (abs(asked.ahead_m(agent)), agent.id))
@@ -104,6 +107,23 @@ def check_across(asked: Case) -> Iterator[Finding]:
             others = [agent for agent in party.everyone if agent is not first]
             left_m = asked.left_m(first) - band.left_m
             yield _across([first, *others], left_m, _bounds(asked, None, band, 0.0))
+
+
+def _check_walk_ends(asked: Case, party: Party, request: wish.WalkRequest) -> Iterator[Finding]:
+    """The numbers across the way at which walks begin and end, where they are said."""
+    for agent in party.agents:
+        here, end = (agent.x_m, agent.y_m), end_of_walk(agent)
+        for lateral, point, part in (
+            (request.spot.lateral, here, "beginning"),
+            (request.end, end, "end"),
+        ):
+            if lateral is not None and lateral.offset is not None and point is not None:
+                place = asked.route.locate(*point)
+                band = asked.lanes.band(wish.LaneChoice.OWN, place.ahead_m)
+                if band is not None:
+                    wanted = _bounds(asked, lateral, band, 0.0)
+                    subject = f"the {part} of the walk of {{agents[0]}}"
+                    yield _across([agent], place.left_m, wanted, subject=subject)
 
 
 def _across(

@@ -16,7 +16,7 @@ _ON_ROAD_M = 1.0
 """Who begins so near the middle of the ego's lane comes from no side of it."""
 _ALONG_SHARE = 0.2
 """Who looks less than this across the road (some 12 degrees) looks along it."""
-_NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN})
+_NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN, Body.TRAFFIC_CONE, Body.PEDESTRIAN})
 _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}
 
 
@@ -95,8 +95,9 @@ def check_heading(asked: Case) -> Iterator[Finding]:
             if band is None:
                 continue
             turn_rad = agent.heading_rad - band.tangent_rad
-            turns_rad = (turn_rad, turn_rad + math.pi) if facing is Facing.ACROSS else (turn_rad,)
-            turns_deg = [unwrap_deg(turn_rad, wanted_deg) for turn_rad in turns_rad]
+            turns_deg = [unwrap_deg(turn_rad, wanted_deg)]
+            if facing is Facing.ACROSS or request.body in _NO_FRONT:
+                turns_deg.append(unwrap_deg(turn_rad + math.pi, wanted_deg))
             yield hold(
                 FindingKind.ASKED_HEADING,
                 [agent],

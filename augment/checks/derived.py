@@ -4,24 +4,28 @@ Both count as instructions do, along the lanes of the ego's way and across them.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from statistics import median
-
-import numpy as np
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from augment.checks.bodies import end_of_walk
 from augment.checks.derived_motions import find_wish
 from augment.checks.ground import Ground, is_stopped
-from augment.checks.lanes_across import Band, LanesAcross, find_picked
+from augment.checks.lanes_across import (
+    LanePlace,
+    LanesAcross,
+    find_picked,
+    find_place,
+    find_place_along,
+)
+from augment.checks.places import SHORT_M
 from augment.checks.registry import check_against_intent
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AgentType,
+    LaneConnector,
     Modification,
-    Point,
     ScenarioType,
     Scene,
     TrafficAgent,
@@ -36,7 +40,8 @@ _STRAIGHT_DEG = 5.0
 _BESIDE_M = 0.1
 _ASIDE_M = 0.5
 _ON_ROAD_M = 1.0
-_ROW_M, _TAPER_M = 1.0, 1.0
+_ACROSS_SHARE = 0.25
+"""Who goes less than this across a lane goes along it."""
 _LEADS = {
     ScenarioType.CONSTRUCTION_ZONE: "Put up a construction zone",
     ScenarioType.ACCIDENT_SITE: "Show the site of an accident",
@@ -44,21 +49,16 @@ _LEADS = {
     ScenarioType.NUDGE: "Have the ego nudge around what stands at the side of its lane",
     ScenarioType.OVERTAKE: "Have the ego overtake what stands in its lane",
 }
-_BODIES = {
-    AgentType.VEHICLE: wish.Body.VEHICLE,
-    AgentType.BUS: wish.Body.BUS,
-    AgentType.BICYCLE: wish.Body.BICYCLE,
-    AgentType.BARRIER: wish.Body.BARRIER,
-    AgentType.CONSTRUCTION_SIGN: wish.Body.CONSTRUCTION_SIGN,
-}
-_MOVERS = (*_BODIES, AgentType.PEDESTRIAN)
+_MOVERS = tuple(one for one in AgentType if one.name in wish.Body.__members__)
 _Wishes = Mapping[str, tuple[wish.MotionWish, TrafficAgent]]
 _FRONTLESS = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
+_HEADLESS = (AgentType.TRAFFIC_CONE, AgentType.PEDESTRIAN)
+"""Of which no sentence says where they look."""
 _LANES = {
-    wish.LaneChoice.OWN: "in the ego's lane",
-    wish.LaneChoice.LEFT: "in the next lane to the left",
-    wish.LaneChoice.RIGHT: "in the next lane to the right",
-    wish.LaneChoice.ONCOMING: "in the oncoming lane",
+    wish.LaneChoice.OWN: "{}",
+    wish.LaneChoice.LEFT: "the next lane to the left of {}",
+    wish.LaneChoice.RIGHT: "the next lane to the right of {}",
+    wish.LaneChoice.ONCOMING: "the oncoming lane beside {}",
 }
 
 
@@ -95,12 +95,20 @@ def describe_change(
     if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
     unnamed = [one.id for one in change.changed if one.motion and one.id not in wishes]
+    strolls = [
+        agent.id
+        for agent in change.added
+        if agent.walk_to_m is not None and _find_walk(agent, lanes) is None
+    ]
     full = wish.Intent(
         requests=requests,
         moves=moves,
         removals=removals,
         route=lanes.route.turn,
-        beyond=tuple(f"the motion of {name}" for name in unnamed),
+        beyond=(
+            *(f"the motion of {name}" for name in unnamed),
+            *(f"the walk of {name}" for name in strolls),
+        ),
     )
     looser = replace(
         full,
@@ -132,38 +140,21 @@ def classify_change(change: Modification, scene: Scene) -> ScenarioType | Motion
     return ScenarioType.NUDGE if is_aside else ScenarioType.OVERTAKE
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Place:
-    """A place by the lanes: ahead of the ego along them, and left of the centre of its lane.
-
-    Attributes:
-        lane: None beside every lane that runs along; `left_m` counts from the ego's lane then.
-    """
-
-    ahead_m: float
-    lane: wish.LaneChoice | None
-    band: Band | None
-    left_m: float
-    tangent_rad: float
+def _find_place(agent: TrafficAgent, lanes: LanesAcross) -> LanePlace:
+    return find_place(lanes, (agent.x_m, agent.y_m), agent.heading_rad)
 
 
-def _place_at(point: Point, lanes: LanesAcross) -> _Place:
-    here = lanes.route.locate(*point)
-    for choice in wish.LaneChoice:
-        band = lanes.band(choice, here.ahead_m)
-        if band is not None and abs(here.left_m - band.left_m) <= band.width_m / 2.0:
-            left_m, tangent_rad = here.left_m - band.left_m, band.tangent_rad
-            break
-    else:
-        choice, left_m, tangent_rad = None, here.left_m, here.tangent_rad
-        band = lanes.band(wish.LaneChoice.OWN, here.ahead_m)
-    return _Place(
-        ahead_m=here.ahead_m, lane=choice, band=band, left_m=left_m, tangent_rad=tangent_rad
-    )
-
-
-def _find_place(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
-    return _place_at((agent.x_m, agent.y_m), lanes)
+def _find_walk(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, LanePlace] | None:
+    """Return both ends of a walk by the lane that it crosses, None for who crosses none."""
+    here, end = (agent.x_m, agent.y_m), end_of_walk(agent)
+    if agent.type is not AgentType.PEDESTRIAN or end is None or math.dist(here, end) <= SHORT_M:
+        return None
+    middle = ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)
+    via = find_place(lanes, middle).via
+    first, last = (find_place_along(lanes, via, point) for point in (here, end))
+    crosses = first.left_m * last.left_m < 0.0 or abs(first.left_m) < _ON_ROAD_M
+    crosses &= abs(first.left_m - last.left_m) > _ACROSS_SHARE * math.dist(here, end)
+    return (first, last) if crosses or agent.motion is not None else None
 
 
 # The intent
@@ -177,22 +168,15 @@ def _wishes(change: Modification, scene: Scene) -> _Wishes:
 
 def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
     added = sorted(change.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
-    cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
-    people = [agent for agent in added if agent.type is AgentType.PEDESTRIAN]
-    if cones:
-        yield _cones(
-            cones, any(one.walk_to_m is None and one.id not in wishes for one in people), lanes
-        )
     doors = [wishes[one.id] for one in added if one.id in wishes and one.type not in _MOVERS]
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
-        if agent.type in _BODIES:
-            request = _vehicle(agent, lanes, _find_motion(agent, wishes))
+        motion, walk = _find_motion(agent, wishes), _find_walk(agent, lanes)
+        if walk is not None:
+            yield _walk(agent, *walk, motion)
+        elif agent.type in _MOVERS:
+            request = _vehicle(agent, lanes, motion)
             yield replace(request, name=agent.id) if agent.id in anchors else request
-    for agent in people:
-        motion = _find_motion(agent, wishes)
-        if agent.walk_to_m is not None or motion is not None:
-            yield replace(_walk(agent, lanes), motion=motion)
     for motion, car in doors:
         spot = wish.Spot(anchor=car.id)
         if car.id not in anchors:
@@ -251,11 +235,21 @@ def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
     return None
 
 
-def _spot(place: _Place) -> wish.Spot:
+def _lateral(place: LanePlace) -> wish.Lateral:
+    return wish.Lateral(
+        target=_boundary(place.left_m),
+        nearness=wish.Nearness.OUTSIDE if place.off_m > 0.0 else None,
+        offset=_length(abs(place.left_m)),
+    )
+
+
+def _spot(place: LanePlace) -> wish.Spot:
     return wish.Spot(
         distance=_length(abs(place.ahead_m)),
         relation=wish.Relation.AHEAD if place.ahead_m >= 0.0 else wish.Relation.BEHIND,
-        lane=place.lane or wish.LaneChoice.OWN,
+        via=place.via,
+        lane=place.lane,
+        lateral=_lateral(place) if abs(place.left_m) >= _BESIDE_M else None,
     )
 
 
@@ -270,22 +264,15 @@ def _boundary(left_m: float) -> wish.LateralTarget:
 def _vehicle(
     agent: TrafficAgent, lanes: LanesAcross, motion: wish.MotionWish | None = None
 ) -> wish.VehicleRequest:
-    place, body = _find_place(agent, lanes), _BODIES.get(agent.type, wish.Body.VEHICLE)
+    place = _find_place(agent, lanes)
+    body = wish.Body.__members__.get(agent.type.name, wish.Body.VEHICLE)
     if motion is not None and motion.preset is MotionPreset.RED_LIGHT:
         from_left = lanes.route.locate_agent(agent).left_m > 0.0
         comes = replace(motion, side=wish.Side.LEFT if from_left else wish.Side.RIGHT)
         return wish.VehicleRequest(body=body, speed_mps=agent.speed_mps, count=1, motion=comes)
-    facing, turn_deg = (None, 0.0) if agent.type in _FRONTLESS else _facing(agent, place)
-    lateral = None
-    if abs(place.left_m) >= _BESIDE_M:
-        outside = place.lane is None
-        lateral = wish.Lateral(
-            target=_boundary(place.left_m),
-            nearness=wish.Nearness.OUTSIDE if outside else None,
-            offset=None if outside else _length(abs(place.left_m)),
-        )
+    facing, turn_deg = (None, 0.0) if agent.type in _HEADLESS else _facing(agent, place)
     return wish.VehicleRequest(
-        spot=replace(_spot(place), lateral=lateral),
+        spot=_spot(place),
         body=body,
         facing=facing,
         turn_deg=turn_deg,
@@ -295,57 +282,28 @@ def _vehicle(
     )
 
 
-def _facing(agent: TrafficAgent, place: _Place) -> tuple[wish.Facing, float]:
+def _facing(agent: TrafficAgent, place: LanePlace) -> tuple[wish.Facing, float]:
     """Return the facing against the lane, and the remaining angle in degrees."""
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
-    is_against = abs(turn_deg) > 90.0
-    off_deg = round((turn_deg - 180.0 * is_against + 180.0) % 360.0 - 180.0)
+    is_turned = abs(turn_deg) > 90.0
+    off_deg = round((turn_deg - 180.0 * is_turned + 180.0) % 360.0 - 180.0)
+    is_against = is_turned and agent.type not in _FRONTLESS
     facing = wish.Facing.AGAINST_LANE if is_against else wish.Facing.WITH_LANE
     return facing, float(off_deg) if abs(off_deg) >= _STRAIGHT_DEG else 0.0
 
 
-def _walk(agent: TrafficAgent, lanes: LanesAcross) -> wish.WalkRequest:
-    start = lanes.route.locate(agent.x_m, agent.y_m)
-    end = lanes.route.locate(*(end_of_walk(agent) or (0.0, 0.0)))
+def _walk(
+    agent: TrafficAgent, start: LanePlace, end: LanePlace, motion: wish.MotionWish | None
+) -> wish.WalkRequest:
     return wish.WalkRequest(
-        spot=replace(_spot(_find_place(agent, lanes)), lane=None),
+        spot=replace(_spot(start), lane=None),
         start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
         count=1,
         speed_mps=agent.speed_mps or None,
         drift_m=round(end.ahead_m - start.ahead_m, 1),
         on_road=abs(start.left_m) < _ON_ROAD_M,
-    )
-
-
-def _cones(
-    cones: Sequence[TrafficAgent], has_worker: bool, lanes: LanesAcross
-) -> wish.ConesRequest:
-    """Cones in a line along the way, in a row across it, or in a taper."""
-    points = np.array([(cone.x_m, cone.y_m) for cone in cones])
-    located = [lanes.route.locate_agent(cone) for cone in cones]
-    aside_m = located[0].left_m - located[-1].left_m
-    shape = wish.Shape.TAPER if abs(aside_m) >= _TAPER_M else wish.Shape.LINE
-    if located[-1].ahead_m - located[0].ahead_m < _ROW_M:
-        shape = wish.Shape.ROW
-    first = _find_place(cones[0], lanes)
-    lateral, spacing = None, None
-    if shape is wish.Shape.LINE:
-        centre_m = 0.0 if first.band is None else first.band.width_m / 4.0
-        is_central = abs(first.left_m) < centre_m
-        target = wish.LateralTarget.LANE_CENTRE if is_central else _boundary(first.left_m)
-        lateral = wish.Lateral(target=target)
-    if len(cones) > 1:
-        apart_m = np.hypot(*(points[:, None] - points).T)
-        np.fill_diagonal(apart_m, np.inf)
-        spacing = _length(median(apart_m.min(axis=0).tolist()))
-    start = wish.Side.LEFT if aside_m > 0.0 else wish.Side.RIGHT
-    return wish.ConesRequest(
-        spot=replace(_spot(first), lateral=lateral),
-        shape=shape,
-        count=len(cones),
-        spacing=spacing,
-        start=start if shape is wish.Shape.TAPER else None,
-        has_worker=has_worker,
+        end=_lateral(end),
+        motion=motion,
     )
 
 
@@ -354,9 +312,7 @@ def _looser(request: wish.Request) -> wish.Request:
     spot = _looser_spot(request.spot)
     match request:
         case wish.WalkRequest():
-            return replace(request, drift_m=None, on_road=False)
-        case wish.ConesRequest():
-            return replace(request, spot=spot, spacing=None, start=None)
+            return replace(request, spot=spot, drift_m=None, on_road=False, end=None)
         case _:
             return replace(request, spot=spot)
 
@@ -379,7 +335,7 @@ def _sentence(
     """The sentences from which a reader could put the same objects to the same places."""
     added = sorted(change.added, key=lambda one: (one.x_m, one.y_m))
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
-    spots = ", ".join(_where((one.x_m, one.y_m), lanes) for one in cones)
+    spots = ", ".join(_where(one, lanes) for one in cones)
     parts = [f"{len(cones)} traffic cones: {spots}"] if len(cones) > 1 else []
     if len(cones) == 1:
         parts = [f"a traffic cone {spots}"]
@@ -387,7 +343,7 @@ def _sentence(
     parts += [_thing(other, kind, lanes) + _then(other, wishes) for other in others]
     before = {agent.id: agent for agent in scene.agents}
     for agent in change.moved:
-        where = f"move {_who(agent.id, picks)} to {_where((agent.x_m, agent.y_m), lanes)}"
+        where = f"move {_who(agent.id, picks)} to {_where(agent, lanes)}"
         if agent.id in wishes and _stays(agent, before[agent.id]):
             where = f"keep {_who(agent.id, picks)} where it is"
         parts.append(where + _then(agent, wishes))
@@ -420,10 +376,15 @@ def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:
 
 
 def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | None) -> str:
-    here = _where((agent.x_m, agent.y_m), lanes)
+    here = _where(agent, lanes)
     if agent.type is AgentType.PEDESTRIAN:
-        if agent.walk_to_m is not None:
-            return f"a pedestrian who walks from {here} to {_where(agent.walk_to_m, lanes)}"
+        if lanes is not None and (walk := _find_walk(agent, lanes)) is not None:
+            start, end = map(_name_place, walk)
+            return f"a pedestrian who walks from {start} to {end}"
+        if lanes is not None and agent.walk_to_m is not None:
+            via = _find_place(agent, lanes).via
+            there = _name_place(find_place_along(lanes, via, agent.walk_to_m))
+            return f"a pedestrian who walks from {here} to {there}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
     what, drives = agent.type.lower().replace("_", " "), not is_stopped(agent)
@@ -439,19 +400,32 @@ def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | 
     return f"a {what} {here}, {turn}{pace}"
 
 
-def _where(point: Point, lanes: LanesAcross | None) -> str:
+def _where(agent: TrafficAgent, lanes: LanesAcross | None) -> str:
     """A place along the lanes; on a map without a lane for the ego, straight ahead of it."""
     if lanes is None:
-        side = f" and {abs(point[1]):.1f} m to its {_side(point[1])}"
-        return f"{_ahead(point[0])} the ego{side if abs(point[1]) >= _BESIDE_M else ''}"
-    place = _place_at(point, lanes)
-    where = f"{_ahead(place.ahead_m)} the ego along its lane"
-    aside = f"{abs(place.left_m):.1f} m"
-    side = _side(place.left_m)
-    if place.lane is None:
-        return f"{where} and {aside} to the {side} of its centre, beside the lanes"
-    where += f", {_LANES[place.lane]}"
-    return where if abs(place.left_m) < _BESIDE_M else f"{where}, {aside} {side} of its centre"
+        side = f" and {abs(agent.y_m):.1f} m to its {_side(agent.y_m)}"
+        aside = side if abs(agent.y_m) >= _BESIDE_M else ""
+        return f"{_ahead(agent.x_m)} the ego{aside}"
+    return _name_place(_find_place(agent, lanes))
+
+
+def _name_place(place: LanePlace) -> str:
+    way = "its lane" if place.via is None else _name_way(place.route, place.via)
+    lane = _LANES[place.lane].format(place.via or "the ego's lane")
+    where = f"{_ahead(place.ahead_m)} the ego along {way}, {'beside' if place.off_m else 'in'}"
+    if abs(place.left_m) < _BESIDE_M:
+        return f"{where} {lane}"
+    return f"{where} {lane}, {abs(place.left_m):.1f} m {_side(place.left_m)} of its centre"
+
+
+def _name_way(route: EgoRoute, via: str) -> str:
+    names = route.lane_ids
+    if route.lane_id == via:
+        return f"{via} from its point nearest to the ego"
+    way = map(route.graph.lane, names[names.index(route.lane_id) : names.index(via) + 1])
+    turns = [str(lane.turn_type) for lane in way if isinstance(lane, LaneConnector)]
+    turns = [turn for turn in turns if turn != TurnType.STRAIGHT]
+    return f"the way to {via}" + (f", which turns {', then '.join(turns)}" if turns else "")
 
 
 def _ahead(metres: float) -> str:

@@ -5,8 +5,8 @@ of `EgoRoute`: ahead along the route from the ego, left across it in its directi
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -19,12 +19,13 @@ from augment.scene.entities import (
     AgentType,
     AreaKind,
     LaneConnector,
+    Point,
     TrafficAgent,
     TrafficLight,
     TrafficSide,
     TurnType,
 )
-from augment.scene.lane_graph import Beside, best_aligned
+from augment.scene.lane_graph import Beside, LanePosition, best_aligned
 from augment.scene.presets import find_crossing
 
 _SAME_LANE_M = 1.0
@@ -34,6 +35,9 @@ _JOINT_M = 1.0
 _BESIDE_M = 15.0
 """Who is further from the route is on another road; prompts show as much beside it."""
 _ON_A_SIDE_M = 1.0
+_ALIGNED_RAD = math.radians(15.0)
+_MISSED_M = 0.1
+"""A place that leads further from its point than this does not tell where the point is."""
 _VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
 _SIGHTS = {
     **dict.fromkeys(
@@ -55,11 +59,35 @@ class Band:
     tangent_rad: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LanePlace:
+    """A point by the lane that it lies on or beside.
+
+    Attributes:
+        via: The lane of the map to which the way leads; None on the ego's route.
+        route: The way.
+        lane: A lane of the way, or one beside it.
+        ahead_m: From the ego along the way.
+        left_m: From the middle of the lane, in the way's direction of travel.
+        off_m: From the edge of the lane to the point, 0 on it.
+        tangent_rad: The direction of the lane.
+    """
+
+    via: str | None
+    route: EgoRoute
+    lane: intents.LaneChoice
+    ahead_m: float
+    left_m: float
+    off_m: float
+    tangent_rad: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LanesAcross:
     """The ego's route, and the lanes that lie beside it at any station."""
 
     route: EgoRoute
+    _over: dict[str, "LanesAcross | None"] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> "LanesAcross | None":
@@ -73,6 +101,15 @@ class LanesAcross:
         if turn is not TurnType.STRAIGHT:
             route = EgoRoute.of(ground.scene, ground.graph, turn=turn)
         return None if route is None else cls(route=route)
+
+    def over(self, via: str | None) -> "LanesAcross | None":
+        """Return those across the way to a lane, None where the map has no such lane."""
+        if via is None:
+            return self
+        if via not in self._over:
+            route = EgoRoute.of(self.route.scene, self.route.graph, turn=self.route.turn, via=via)
+            self._over[via] = None if route is None else LanesAcross(route=route)
+        return self._over[via]
 
     @property
     def kerb(self) -> float:
@@ -95,6 +132,21 @@ class LanesAcross:
             key=lambda band: abs(band.left_m),
             default=None,
         )
+
+    def place(self, choice: intents.LaneChoice, ahead_m: float) -> LanePosition | None:
+        """Return the place on a lane next to one on the ego's own, None where there is none.
+
+        There it is the nearest point of the lane's centre.
+        """
+        own = self.route.lane_position(ahead_m)
+        if own is None or choice is intents.LaneChoice.OWN:
+            return own
+        band = self.band(choice, ahead_m)
+        if band is None:
+            return None
+        line = self.route.graph.lane(band.lane_id).centerline
+        s_m = line.project(own.pose.x_m, own.pose.y_m).s_m
+        return self.route.graph.place(band.lane_id, s_m)
 
     def side_sign(self, lateral: intents.Lateral | None) -> float:
         """Return 1 for left of the ego's direction, -1 for right, 0 for the lane's centre."""
@@ -122,6 +174,61 @@ def _band(lane: Beside, tangent_rad: float, choice: intents.LaneChoice) -> Band 
     return Band(
         lane_id=lane.lane_id, left_m=left_m, width_m=lane.width_m, tangent_rad=lane.tangent_rad
     )
+
+
+def find_place(lanes: LanesAcross, point: Point, heading_rad: float | None = None) -> LanePlace:
+    """Return where a point lies along the lane that it is on, else along the nearest one.
+
+    The ego's route and the lanes beside it come first, then the way to the lane that fits the
+    heading best. A place has to lead back to the point: on the outside of a bend some don't.
+    """
+
+    def misfit(lane: Beside) -> tuple[float, float, float]:
+        turn_rad = difference(lane.tangent_rad, heading_rad or lane.tangent_rad)
+        return round(lane.off_m), round(abs(turn_rad) / _ALIGNED_RAD), lane.distance_m
+
+    near = sorted(lanes.route.graph.beside(*point), key=misfit)
+    ways = [(None, 0.0), *((lane.lane_id, round(lane.off_m)) for lane in near)]
+    places = list[tuple[float, LanePlace]]()
+    for via, off_m in ways:
+        if any(cost <= off_m for cost, _ in places):
+            break
+        for place, missed_m in _list_places(lanes.over(via), via, point):
+            is_missed = missed_m > _MISSED_M
+            places.append((round(place.off_m) + _BESIDE_M * is_missed, place))
+    return min(places, key=lambda item: item[0])[1]
+
+
+def find_place_along(lanes: LanesAcross, via: str | None, point: Point) -> LanePlace:
+    """Return where a point lies along a way's own lane, however far beside it."""
+    return next(_list_places(lanes.over(via), via, point))[0]
+
+
+def _list_places(
+    lanes: LanesAcross | None, via: str | None, point: Point
+) -> Iterator[tuple[LanePlace, float]]:
+    """Yield a point's place by each lane of a way, and how far from it that place leads."""
+    if lanes is None:
+        return
+    route = lanes.route
+    here = route.locate(*point)
+    for choice in intents.LaneChoice:
+        band, place = lanes.band(choice, here.ahead_m), lanes.place(choice, here.ahead_m)
+        if band is None or place is None:
+            continue
+        left_m = here.left_m - band.left_m
+        side = -1.0 if choice is intents.LaneChoice.ONCOMING else 1.0
+        there = route.graph.place(place.lane_id, place.s_m, side * left_m).pose
+        found = LanePlace(
+            via=via,
+            route=route,
+            lane=choice,
+            ahead_m=here.ahead_m,
+            left_m=left_m,
+            off_m=max(0.0, abs(left_m) - band.width_m / 2.0),
+            tangent_rad=band.tangent_rad,
+        )
+        yield found, math.dist(point, (there.x_m, there.y_m))
 
 
 def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, ...]:
@@ -185,14 +292,17 @@ def resolve_spot(
         anchor = named[spot.anchor]
         base = anchor.span_m
         is_approximate = anchor.distance is not None and anchor.distance.is_approximate
+        spot = replace(spot, anchor=None, via=anchor.via)
     elif spot.landmark is not None or spot.mark is not None:
         own = own or (0.0, 0.0)  # without a relation it is level with it
         place_m = find_mark(lanes, spot.mark) if spot.mark else None
         if spot.landmark is not None and (picked := find_picked(lanes, spot.landmark)):
             place_m = lanes.route.locate_agent(picked[0]).ahead_m
         base = None if place_m is None else (place_m, place_m)
-    else:
+    elif lanes.over(spot.via) is not None:
         return spot
+    else:
+        spot = replace(spot, via=None)
     bare = replace(spot, anchor=None, landmark=None, mark=None, distance=None, relation=None)
     if own is None or base is None or not math.isfinite(sum((*own, *base))):
         return bare
@@ -213,10 +323,12 @@ def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
     spots = [one.spot for one in asked]
     picks = [spot.landmark for spot in spots if spot.landmark is not None]
     picks += [*(move.who for move in intent.moves), *intent.removals]
+    ways = dict.fromkeys(spot.via for spot in spots if lanes.over(spot.via) is None)
     marks = [spot.mark for spot in spots if spot.mark is not None]
     starts = [wish.start for one in asked if (wish := getattr(one, "motion", None))]
     marks += [start.mark for start in starts if start is not None and start.mark is not None]
-    absent = [str(pick) for pick in picks if not find_picked(lanes, pick)]
+    absent = [f"a way to {via}" for via in ways]
+    absent += [str(pick) for pick in picks if not find_picked(lanes, pick)]
     return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
 
 

@@ -210,14 +210,18 @@ def _roles(request: wish.Request, added: Sequence[TrafficAgent]) -> list[Role]:
 
 
 def spot_middle(spot: wish.Spot, lanes: LanesAcross) -> Point:
-    """Return the point that a spot names: the middle of its range, on the middle of its lane.
+    """Return the point that a spot names: the middle of its range, by its offset in its lane.
 
     What is open is taken as the ego's own place and lane: it only says who is nearest.
     """
+    lanes = lanes.over(spot.via) or lanes
     span_m = [end for end in spot.span_m or (0.0,) if math.isfinite(end)]
     ahead_m = sum(span_m) / len(span_m)
     band = lanes.band(spot.lane or wish.LaneChoice.OWN, ahead_m)
-    return lanes.route.position(ahead_m, 0.0 if band is None else band.left_m)
+    left_m = 0.0 if band is None else band.left_m
+    if spot.lateral is not None and spot.lateral.offset is not None:
+        left_m += lanes.side_sign(spot.lateral) * spot.lateral.offset.high_m
+    return lanes.route.position(ahead_m, left_m)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -89,8 +89,29 @@ def check_against_intent(
     if intent is None or lanes is None:
         return alone
     asked = assign_parties(ground, modification, intent, lanes, tolerances)
-    held = [finding for check in ASKED_CHECKS for finding in check(asked)]
+    held = [
+        finding for check in ASKED_CHECKS for case in _by_way(asked) for finding in check(case)
+    ]
     return (*held, *_drop_answered(alone, held, asked))
+
+
+def _by_way(asked: Case) -> list[Case]:
+    """The case of the intent's route with all changes, then one for each other way's parties."""
+    cases: list[Case] = []
+    own, everyone = asked.lanes, asked.parties
+    for via in dict.fromkeys((None, *(party.request.spot.via for party in everyone))):
+        lanes = own.over(via)
+        assert lanes is not None, "spots without a way are left open"
+        parties = tuple(party for party in everyone if party.request.spot.via == via)
+        cases.append(replace(asked, lanes=lanes, parties=parties))
+        asked = replace(
+            asked,
+            modification=Modification(),
+            surplus=(),
+            to_move=frozenset(),
+            to_remove=frozenset(),
+        )
+    return cases
 
 
 def _drop_answered(

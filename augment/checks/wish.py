@@ -19,7 +19,7 @@ from augment.checks.ground import VEHICLES, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, list_arms, resolve_spot
 from augment.checks.parties import CRASH_M, Role, assign_parties, meets_route
 from augment.checks.wish_patterns import Chain, Link, Pattern
-from augment.checks.wish_places import ACROSS_M, Place, Span, list_stations
+from augment.checks.wish_places import ACROSS_M, Place, Span, find_across, list_stations
 from augment.checks.wish_shapes import find_nearest_cones, find_worker_ground
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
@@ -133,7 +133,7 @@ class _Fitting:
     """Objects of one modification fitted to an intent, request by request."""
 
     def __init__(self, lanes: LanesAcross) -> None:
-        self._lanes = lanes
+        self._lanes = self._own = lanes
         self._first: dict[str, TrafficAgent] = {}
 
     def resolve(self, request: wish.Request, counted: wish.Request) -> wish.Request:
@@ -143,19 +143,23 @@ class _Fitting:
             request: As the intent has it.
             counted: The same, counted from the ego; what it is for an anchor that is missing.
         """
+        via = counted.spot.via
         anchor = self._first.get(request.spot.anchor or "")
         if anchor is None or isinstance(request, wish.DoorRequest):
             return replace(counted, spot=request.spot) if anchor else counted
-        ahead_m = self._lanes.route.locate_agent(anchor).ahead_m
+        lanes = self._own.over(via) or self._own
+        ahead_m = lanes.route.locate_agent(anchor).ahead_m
         there = wish.Spot(
             distance=wish.Length(low_m=abs(ahead_m), high_m=abs(ahead_m)),
             relation=wish.Relation.AHEAD if ahead_m >= 0.0 else wish.Relation.BEHIND,
+            via=via,
         )
-        spot = resolve_spot(request.spot, self._lanes, {request.spot.anchor or "": there})
+        spot = resolve_spot(request.spot, self._own, {request.spot.anchor or "": there})
         return replace(counted, spot=spot)
 
     def place(self, request: wish.Request, agents: Sequence[TrafficAgent]) -> list[Point]:
         """Return where each agent of the main role belongs."""
+        self._lanes = self._own.over(request.spot.via) or self._own
         points = [(agent.x_m, agent.y_m) for agent in agents]
         match request:
             case wish.VehicleRequest():
@@ -270,9 +274,9 @@ class _Fitting:
         sign = request.start.sign if request.start else 0.0
 
         def beside(ahead_m: float) -> Span:
-            band = lanes.band(wish.LaneChoice.OWN, ahead_m) if request.on_road else None
-            if band is not None:
-                return -band.width_m / 2.0, band.width_m / 2.0
+            lateral, band = request.spot.lateral, lanes.band(wish.LaneChoice.OWN, ahead_m)
+            if band is not None and (request.on_road or lateral is not None):
+                return find_across(lateral, lanes.side_sign(lateral), band.width_m, 0.0)
             return min(sign, 0.0 if sign else -1.0) * ACROSS_M, max(
                 sign, 0.0 if sign else 1.0
             ) * ACROSS_M

@@ -7,6 +7,7 @@ Frame: the scene's.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -15,6 +16,9 @@ from augment.geometry.polyline import Polyline
 from augment.scene.entities import Point, Scene, TrafficAgent, TurnType
 from augment.scene.lane_graph import LaneGraph, LanePosition
 
+_ROUNDED_M = 1e-6
+_ROUND_M = 100.0
+"""A longer way to a lane near the ego leads round the block."""
 REACH_M = 300.0
 """How far ahead of the ego and behind it the lanes are followed."""
 
@@ -55,25 +59,40 @@ class EgoRoute:
 
     @classmethod
     def of(
-        cls, scene: Scene, graph: LaneGraph | None = None, *, turn: TurnType | None = None
+        cls,
+        scene: Scene,
+        graph: LaneGraph | None = None,
+        *,
+        turn: TurnType | None = None,
+        via: str | None = None,
     ) -> EgoRoute | None:
-        """The route of a scene's ego, None where the map has no lane for it.
+        """The route of a scene's ego, None where the map has no lane for it or no `via`.
 
         Args:
             scene: Whose ego.
             graph: Of the scene, where there is one already.
             turn: Where the lanes part; None for the scenario's goal, else straight on.
+            via: A lane or connector that it leads over, from the ego's lane or one abreast. A
+                lane that neither leads to or from is a route of its own, from its point nearest
+                to the ego on.
         """
         turn = turn or scene.options.goal or TurnType.STRAIGHT
         graph = LaneGraph(scene) if graph is None else graph
         own = find_ego_lane(scene, graph)
-        if own is None:
+        if own is None or via not in (None, *graph.lanes):
             return None
+        way = [own] if via is None else _find_way(graph, own, via)
+        own = next((name for name in graph.abreast(own) if name in way), way[0])
         lane_s_m = graph.lane(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
-        before = _list_before(graph, own)
-        lane_ids = (*before, *graph.route(own, lane_s_m + REACH_M, turn=turn))
+        before = _list_before(graph, way[0])
+        after = graph.route(way[-1], lane_s_m + REACH_M, turn=turn)
+        lane_ids = (*before, *way[:-1], *after)
         lines = [graph.lane(name).centerline for name in lane_ids]
-        ego_s_m = sum(line.length_m for line in lines[: len(before)]) + lane_s_m
+        to_own = lines[: len(before) + way.index(own)]
+        ego_s_m = sum(line.length_m for line in to_own) + lane_s_m
+        line = Polyline([point for line in lines for point in line.points_m.tolist()])
+        if way == [via]:
+            ego_s_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
         return cls(
             scene=scene,
             graph=graph,
@@ -81,7 +100,7 @@ class EgoRoute:
             lane_s_m=lane_s_m,
             lane_ids=lane_ids,
             ends_m=tuple(end - ego_s_m for end in accumulate(line.length_m for line in lines)),
-            line=Polyline([point for line in lines for point in line.points_m.tolist()]),
+            line=line,
             ego_s_m=ego_s_m,
             turn=turn,
         )
@@ -109,7 +128,12 @@ class EgoRoute:
 
     def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
-        return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m, turn=self.turn)
+        number = bisect_left(self.ends_m, ahead_m - _ROUNDED_M)
+        if number == len(self.ends_m) or ahead_m < -self.ego_s_m - _ROUNDED_M:
+            return None
+        name = self.lane_ids[number]
+        s_m = self.graph.lane(name).centerline.length_m - (self.ends_m[number] - ahead_m)
+        return self.graph.place(name, s_m, left_m)
 
 
 def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:
@@ -121,6 +145,18 @@ def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:
 
 
 # Private
+
+
+def _find_way(graph: LaneGraph, own: str, via: str) -> list[str]:
+    """Ids of the shortest way between the ego's lane or one abreast and a lane, either first."""
+    ways = [
+        way
+        for name in graph.abreast(own)
+        for way in (graph.find_way(name, via), graph.find_way(via, name))
+        if way is not None
+        and sum(graph.lane(lane).centerline.length_m for lane in way[1:-1]) <= _ROUND_M
+    ]
+    return min(ways, key=len, default=[via])
 
 
 def _list_before(graph: LaneGraph, lane_id: str) -> Sequence[str]:

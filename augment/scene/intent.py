@@ -19,6 +19,7 @@ from augment.scene.entities import TurnType
 from augment.scene.intent_parts import Length as Length
 from augment.scene.intent_parts import MapPlace as MapPlace
 from augment.scene.intent_parts import MotionWish as MotionWish
+from augment.scene.intent_parts import Setting as Setting
 from augment.scene.intent_parts import Side as Side
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
@@ -63,6 +64,8 @@ class Body(StrEnum):
     BUS = "bus"
     BARRIER = "barrier"
     CONSTRUCTION_SIGN = "construction sign"
+    TRAFFIC_CONE = "traffic cone"
+    PEDESTRIAN = "pedestrian"
 
 
 class Facing(StrEnum):
@@ -97,21 +100,6 @@ class Post(StrEnum):
     BEHIND = "behind the cones"
     BESIDE = "beside the cones"
     AT_LAST = "beside the last cones"
-
-
-class Setting(StrEnum):
-    """A named place: what the surroundings must be."""
-
-    BEFORE_INTERSECTION = "before the intersection"
-    IN_INTERSECTION = "in the intersection"
-    AT_INTERSECTION = "at the intersection"
-    AFTER_INTERSECTION = "past the intersection"
-    IN_BEND = "in the bend"
-    ON_CROSSWALK = "on the crosswalk"
-    OFF_CROSSWALK = "away from the crosswalk"
-    BY_PARKED = "beside parked vehicles"
-    BY_PARKED_LEFT = "between parked vehicles on the left"
-    BY_PARKED_RIGHT = "between parked vehicles on the right"
 
 
 class Relation(StrEnum):
@@ -215,6 +203,8 @@ class Spot:
             the ego, as for the two that follow, of which one alone may be given.
         landmark: A road user of the scene of whom the distance runs.
         mark: A place of the map of which the distance runs.
+        via: A lane of the map: the distance runs along the way to it, which takes the place of
+            the ego's lane; None for the intent's route.
         lane: None where no lane is said, or none is meant (walks).
     """
 
@@ -223,6 +213,7 @@ class Spot:
     anchor: Id | None = None
     landmark: Pick | None = None
     mark: MapPlace | None = None
+    via: Id | None = None
     lane: LaneChoice | None = None
     lateral: Lateral | None = None
     settings: _Several[Setting] = ()
@@ -231,8 +222,9 @@ class Spot:
     def _says_where(self) -> Self:
         if self.distance is not None and self.relation is None:
             raise ValueError("a distance needs a relation: ahead or behind")
-        if sum(one is not None for one in (self.anchor, self.landmark, self.mark)) > 1:
-            raise ValueError("a distance runs from one thing: an anchor, a landmark or a mark")
+        starts = (self.anchor, self.landmark, self.mark, self.via)
+        if sum(one is not None for one in starts) > 1:
+            raise ValueError("a distance runs from an anchor, a landmark, a mark or over a lane")
         if self.landmark is not None and self.landmark.every:
             raise ValueError("a landmark is one road user, not every one")
         return self
@@ -309,6 +301,8 @@ class WalkRequest:
         is_file: They walk one behind the other.
         behind: How far behind the first one the others walk in a file, where that is said.
         on_road: The first one stands in the ego's lane already.
+        end: Where across the lane a walk ends; beyond the road's edge where nobody says. Where
+            it begins is the spot's `lateral`.
         motion: They wait beside the road and start late.
     """
 
@@ -322,6 +316,7 @@ class WalkRequest:
     is_file: Yes = False
     behind: _Several[Length] = ()
     on_road: Yes = False
+    end: Lateral | None = None
     motion: MotionWish | None = None
 
     @model_validator(mode="after")

@@ -45,6 +45,21 @@ class MapPlace(StrEnum):
     CROSSWALK = "crosswalk"
 
 
+class Setting(StrEnum):
+    """A named place: what the surroundings must be."""
+
+    BEFORE_INTERSECTION = "before the intersection"
+    IN_INTERSECTION = "in the intersection"
+    AT_INTERSECTION = "at the intersection"
+    AFTER_INTERSECTION = "past the intersection"
+    IN_BEND = "in the bend"
+    ON_CROSSWALK = "on the crosswalk"
+    OFF_CROSSWALK = "away from the crosswalk"
+    BY_PARKED = "beside parked vehicles"
+    BY_PARKED_LEFT = "between parked vehicles on the left"
+    BY_PARKED_RIGHT = "between parked vehicles on the right"
+
+
 def _fill_high(given: object) -> object:
     """In a document the low end alone is one number."""
     for low, high in (("low_m", "high_m"), ("low", "high")):

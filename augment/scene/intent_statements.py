@@ -90,6 +90,8 @@ def _list_facts(request: intents.Request) -> Iterator[str]:
         yield f"crosses from the {request.start} to the {request.start.other}"
     if isinstance(request, intents.ConesRequest) and request.start is not None:
         yield f"begins at the {request.start} lane boundary"
+    if isinstance(request, intents.WalkRequest) and request.end is not None:
+        yield f"ends {_name_lateral(request.end)}"
     for name, words in _FACTS.items():
         value = getattr(request, name, None)
         if value is not None and value is not False:
@@ -114,7 +116,8 @@ def _list_place_facts(spot: intents.Spot) -> Iterator[str]:
         anchor = f"“{spot.anchor}”" if spot.anchor else str(spot.landmark or "the ego")
         anchor = f"the {spot.mark}" if spot.mark else anchor
         length = "" if spot.distance is None else f"{spot.distance} "
-        yield f"{length}{spot.relation.words} {anchor}"
+        way = f" on the way to {spot.via}" if spot.via else ""
+        yield f"{length}{spot.relation.words} {anchor}{way}"
     if spot.lane is not None:
         yield f"in the {spot.lane} lane"
     if spot.lateral is not None:

@@ -5,6 +5,7 @@ Frame: ego frame of the scene; any one frame for turns and sides.
 """
 
 import math
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -258,6 +259,18 @@ class LaneGraph:
             seen.add(following)
             total += self.lanes[following].centerline.length_m
         return route
+
+    def find_way(self, lane_id: str, to_id: str) -> list[str] | None:
+        """Return ids of the fewest lanes that lead from one to another, None if none do."""
+        ways = {lane_id: [lane_id]}
+        waiting = deque(ways)
+        while waiting and to_id not in ways:
+            here = waiting.popleft()
+            for following in self.successors(here):
+                if following not in ways:
+                    ways[following] = [*ways[here], following]
+                    waiting.append(following)
+        return ways.get(to_id)
 
     def _choose(self, lane_id: str, turn: TurnType) -> str | None:
         options = self.successors(lane_id)

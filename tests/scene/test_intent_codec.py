@@ -120,7 +120,7 @@ def test_what_is_open_is_absent() -> None:
     ("broken", "at", "reason"),
     [
         (document({"speed": 1.0}), "requests[0].vehicles.speed", "is not a field"),
-        (document({"body": "tram"}), "requests[0].vehicles.body", "or 'construction sign'"),
+        (document({"body": "tram"}), "requests[0].vehicles.body", "or 'pedestrian'"),
         (document({"count": 0}), "requests[0].vehicles.count", "greater than or equal to 1"),
         (document({"count": "two"}), "requests[0].vehicles.count", "valid integer"),
         (
