@@ -198,7 +198,7 @@ function act(what) {
     if (what === "restore" && id) edit.restore(id);
     if (what === "copy" && id) edit.copy(id);
     if (what === "snap") return id ? check(id).catch(fail) : undefined;
-    if (what === "ahead") edit.add(placed.value, 20, 0);
+    if (what === "ahead") edit.add(placed.value, ...scene.ahead);
     changed();
   }
   return undefined;

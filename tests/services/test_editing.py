@@ -17,7 +17,7 @@ from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import intent_to_document, modification_to_document
-from augment.scene.entities import Modification, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import LanePath, PlannedMotion
 from augment.services.judging.displacement import of_augmentation
@@ -34,7 +34,7 @@ from augment.services.scenarios.pictures import (
 from augment.services.scenarios.scenes import ScenarioContent, load_reference
 from tests.jobs.rows import add_scenario, launch
 from tests.render.pictures import at_camera_size
-from tests.scenes import pedestrian, scene, vehicle
+from tests.scenes import EGO, curve, pedestrian, scene, vehicle
 
 pytestmark = pytest.mark.django_db
 CAR = vehicle("Added1", 20.0, 0.4, 0.1)
@@ -70,6 +70,22 @@ def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:
     top = (camera["y_max_m"] - -8.0) * camera["px_per_m"]
     found = (columns.min(), columns.max() + 1, rows.min(), rows.max() + 1)
     assert found == pytest.approx((left, left + 100.0, top, top + 40.0), abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("here", "pose"),
+    [
+        (scene(), (20.0, 0.0, 0.0)),
+        # 10 m round a circle with a radius of 40 m: 0.25 rad, in steps of one degree.
+        (curve(), (19.9, 1.24, 0.25)),
+        (scene(lanes=(), ego=replace(EGO, lane_id=None)), (20.0, 0.0, 0.0)),
+    ],
+)
+def test_what_is_placed_ahead_stands_on_the_lane(
+    here: Scene, pose: tuple[float, float, float]
+) -> None:
+    shown = editor_document(add_scenario("road", scene=here, reference=None))
+    assert shown["ahead"] == pytest.approx(pose, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
     assert made.instruction.startswith("Change the scene: a traffic cone 9.0 m ahead of the ego")
     assert made.intent is not None
     [request] = made.intent["requests"]
-    assert (request["kind"], request["spot"]["distance"]) == ("cones", {"low_m": 9.0})
+    assert (request["kind"], request["spot"]["distance"]) == ("vehicles", {"low_m": 9.0})
     copied = reader.get(reverse("scene", args=[scene.code]) + f"?copy={made.code}")
     assert "&quot;TRAFFIC_CONE&quot;" in copied.content.decode()
     assert "my-bus" in shown

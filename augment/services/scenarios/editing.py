@@ -35,6 +35,7 @@ from augment.services.scenarios import scenes
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _SNAP_WITHIN_M = 15.0
+_AHEAD_M = 20.0
 _NUMBERS = {
     "speed_mps": "Comes to (m/s)",
     "braking_mps2": "Brakes with (m/s²)",
@@ -79,13 +80,20 @@ def make_draft(scene: BaseScene, scenario: Scenario | None, *, keep_traffic: boo
 def editor_document(draft: Scenario) -> dict[str, Any]:
     """Return the picture's window, who is there before the change, and what can be placed.
 
+    `ahead` is x, y and heading of what is placed ahead, on the ego's lane.
+
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    camera, scene = AROUND_THE_EGO, editable_ground(draft).scene
+    camera, ground = AROUND_THE_EGO, editable_ground(draft)
+    scene, route = ground.scene, ground.route
+    ahead = (_AHEAD_M, 0.0, 0.0)
+    if route is not None:
+        ahead = (*route.position(_AHEAD_M), route.heading_at(_AHEAD_M))
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
+        "ahead": [round(number, 2) for number in ahead],
         "recorded": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=True)),
         "cleared": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {
