@@ -10,6 +10,7 @@ import numpy as np
 
 from augment.baselines.placed_motions import give_motion
 from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
+from augment.checks.wish_shapes import Placement, lay_out, ring_radius_m
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
@@ -28,9 +29,6 @@ _EDGE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1] / 2.0
 """A cone at a lane boundary stands inside of it."""
 _WORKER_GAP_M = 1.6
 """How far from the cones a worker stands; interPlan's are 0.8 to 4.0 m from the nearest."""
-
-Place = tuple[float, float]
-"""(s, d)."""
 
 
 def place_walkers(
@@ -120,7 +118,7 @@ def place_cones(
     return tuple(added)
 
 
-def _at(ground: PlacingGround, lane: LaneChoice | None, place: Place) -> LanePosition:
+def _at(ground: PlacingGround, lane: LaneChoice | None, place: Placement) -> LanePosition:
     """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
     s_m, d_m = place
     centre = ground.beside(s_m, lane)
@@ -134,53 +132,25 @@ def _places(
     distance_m: float,
     spacing_m: float,
     edge_m: float,
-) -> list[Place]:
+) -> list[Placement]:
     count = request.count or 1
-    gaps = max(count - 1, 1)
-    along_m = spacing_m if request.reach_m is None else request.reach_m / gaps
-    if along_m < 2.0 * _EDGE_M:
+    if request.reach_m is not None and request.reach_m < 2.0 * _EDGE_M * max(count - 1, 1):
         raise CannotPlace(f"{count} cones have no room on {request.reach_m:g} m.")
-    if request.shape is Shape.RING:
-        return _ring(distance_m, count, spacing_m, edge_m)
-    if request.shape is Shape.ROW:
-        first_m = (count - 1) * spacing_m / 2.0
-        return [(distance_m, first_m - index * spacing_m) for index in range(count)]
-    if request.shape is Shape.LINE:
-        sides = (1.0, -1.0) if request.both_sides else (ground.side_sign(request.spot.lateral),)
-        return [
-            (distance_m + index * along_m, side * edge_m)
-            for side in sides
-            for index in range(count)
-        ]
-    # A taper: across the lane, as slanted as needed for the spacing, or over the whole reach.
-    from_d_m = SIGNS[request.start or ground.kerb] * edge_m
-    across_m = abs(from_d_m) * (1.0 if request.ends_in_middle else 2.0) / gaps
-    if request.reach_m is None:
-        across_m = min(across_m, spacing_m)
-        along_m = math.sqrt(spacing_m**2 - across_m**2)
-    inwards_m = -math.copysign(across_m, from_d_m)
-    return [(distance_m + i * along_m, from_d_m + i * inwards_m) for i in range(count)]
-
-
-def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> list[Place]:
-    """A circle around the centre, or two rows in the lane where the lane is too narrow for it.
-
-    An odd cone closes the rows towards the ego.
-    """
-    if count < 3:
+    if request.shape is Shape.RING and count < 3:
         raise CannotPlace("A ring needs at least three cones.")
-    radius_m = spacing_m / (2.0 * math.sin(math.pi / count))
-    if radius_m <= widest_m:
-        angles = (math.pi + 2.0 * math.pi * index / count for index in range(count))
-        return [(centre_m + radius_m * math.cos(a), radius_m * math.sin(a)) for a in angles]
-    side_m, rows = min(spacing_m / 2.0, widest_m), count // 2
-    first_m = centre_m - (rows - 1) * spacing_m / 2.0
-    along = [first_m + index * spacing_m for index in range(rows)]
-    closing = [(first_m - math.sqrt(spacing_m**2 - side_m**2), 0.0)] if count % 2 else []
-    return [*closing, *((s, -side_m) for s in along), *((s, side_m) for s in reversed(along))]
+    is_oblong = request.shape is Shape.RING and ring_radius_m(count, spacing_m) > edge_m
+    from_m, to = 0.0, 0.0
+    if request.shape is Shape.LINE:
+        from_m = edge_m * (1.0 if request.both_sides else ground.side_sign(request.spot.lateral))
+    elif request.shape is Shape.TAPER:
+        from_m = SIGNS[request.start or ground.kerb] * edge_m
+        to = 0.0 if request.ends_in_middle else -from_m
+    elif is_oblong:
+        to = min(spacing_m / 2.0, edge_m)
+    return lay_out(request, count, (distance_m, spacing_m, from_m, to), is_oblong=is_oblong)
 
 
-def _worker(request: ConesRequest, ground: PlacingGround, places: list[Place]) -> Place:
+def _worker(request: ConesRequest, ground: PlacingGround, places: list[Placement]) -> Placement:
     """Return the worker's place: the requested one, else the usual one at such a shape."""
     (first_s, first_d), (last_s, last_d) = places[0], places[-1]
     if request.shape is Shape.RING:

@@ -13,6 +13,7 @@ import numpy as np
 
 from augment.baselines.placed_motions import find_arm, give_motion, is_on_other_arm
 from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.checks.wish_places import EDGE_GAP_M, find_across
 from augment.errors import CannotPlace
 from augment.geometry.frames import Box, Pose, overlap, wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
@@ -32,12 +33,16 @@ from augment.scene.lane_graph import LanePosition
 
 _SIZES_M = {Body.VAN: (5.9, 2.0), Body.TRUCK: (8.0, 2.4)}
 _FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
-_EDGE_GAP_M = 0.1
-"""What is left between a box at the edge of a lane and that edge."""
 BUMPER_GAP_M = 1.0
 """Between neighbours in a row, where no distance is said."""
 SLIGHT_OFFSET_M = 0.75
 """What "slightly" means without a number: the middle of the paper's range of 0 to 1.5 m."""
+_INSIDE_M = {
+    None: SLIGHT_OFFSET_M,
+    Nearness.SLIGHTLY: SLIGHT_OFFSET_M,
+    Nearness.OUTSIDE: EDGE_GAP_M,
+}
+"""How far inside of what is admitted something stands, from the lane's centre outwards."""
 
 _CRASH_GAP_M = 0.05
 _MOST_SHARED = 0.1
@@ -127,13 +132,8 @@ def _offset_m(
         if size_m > half_lane_m + half_box_m and not is_beside:
             raise CannotPlace(f"An offset of {size_m:.1f} m leaves the lane.")
     else:
-        size_m = {
-            None: SLIGHT_OFFSET_M,
-            Nearness.SLIGHTLY: SLIGHT_OFFSET_M,
-            Nearness.AT_EDGE: max(0.0, half_lane_m - half_box_m - _EDGE_GAP_M),
-            Nearness.HALF_OUT: half_lane_m,
-            Nearness.OUTSIDE: half_lane_m + half_box_m + _EDGE_GAP_M,
-        }[lateral.nearness]
+        low_m, _ = find_across(lateral, 1.0, 2.0 * half_lane_m, 2.0 * half_box_m)
+        size_m = max(0.0, low_m) + _INSIDE_M.get(lateral.nearness, 0.0)
     to_left = (side is Side.LEFT) is not (request.spot.lane is LaneChoice.ONCOMING)
     return size_m if to_left else -size_m
 

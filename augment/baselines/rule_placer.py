@@ -8,7 +8,8 @@ refused. So is an intent that leaves open what a placement needs.
 """
 
 import itertools
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
 from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_spots
 from augment.checks.registry import check_against_intent
+from augment.checks.wish_places import Span, find_off, list_stations
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
 from augment.scene import intent as intents
@@ -30,6 +32,8 @@ _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
 _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
+_FROM_END_M = 20.0
+"""So far from its end at most something stands where a named place has one end alone."""
 _NEEDS: dict[type[intents.Request], tuple[str, str, str]] = {
     intents.VehicleRequest: ("vehicles", "speed_mps", "whether they stand or how fast they drive"),
     intents.WalkRequest: ("pedestrians", "start", "the side that they come from"),
@@ -104,7 +108,7 @@ def list_open(request: intents.Request) -> list[str]:
     who, field, what = _NEEDS[type(request)]
     comes = isinstance(request, intents.VehicleRequest) and is_on_other_arm(request.motion)
     needs = {
-        "the distance": request.spot.distance or comes,
+        "the distance": request.spot.distance or request.spot.settings or comes,
         what: getattr(request, field),
         "the count": request.count,
     }
@@ -141,7 +145,11 @@ class _Fitting:
             raise CannotPlace(open_part)
         wanted = request.spot.distance or intents.Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.drawn(self._rng)
-        sign = 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
+        asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
+        spans_m = list_stations(request.spot, self._place.lanes)
+        is_open = wanted.is_range or (request.spot.distance is None and of is None)
+        if is_open and request.spot.settings:
+            asked_m = _find_inside(spans_m, asked_m)
         draw = int(self._rng.integers(2**32))
         arrangements = (
             count_arrangements(request) if isinstance(request, intents.CrashRequest) else 1
@@ -149,12 +157,12 @@ class _Fitting:
         first_problem = ""
         best: tuple[int, _Agents, float] | None = None
         for shift_m, arrangement in itertools.product(_shifts(wanted), range(arrangements)):
-            distance_m = asked_m + shift_m
-            if wanted.is_range and not (wanted.low_m <= distance_m <= wanted.high_m):
+            distance_m = asked_m + math.copysign(shift_m, shift_m * asked_m)
+            if is_open and find_off(distance_m, spans_m) > 0.0:
                 continue
             again = np.random.default_rng(draw)
-            agents = self._put(request, sign * distance_m, again, arrangement, of)
-            problem, doubts = self._judge(request, sign * distance_m, agents)
+            agents = self._put(request, distance_m, again, arrangement, of)
+            problem, doubts = self._judge(request, distance_m, agents)
             first_problem = first_problem or problem
             if not problem and (best is None or doubts < best[0]):
                 best = doubts, agents, distance_m
@@ -166,7 +174,7 @@ class _Fitting:
         if of is not None or request.spot.distance is None:
             return agents, ""
         who = _NEEDS[type(request)][0]
-        return agents, f"{who.capitalize()}: {distance_m:.1f} m {request.spot.relation}."
+        return agents, f"{who.capitalize()}: {abs(distance_m):.1f} m {request.spot.relation}."
 
     def _put(
         self,
@@ -242,6 +250,13 @@ def _number_agents(agents: _Agents, scene: Scene) -> _Agents:
     return tuple(
         replace(agent, id=f"Agent{number}") for number, agent in enumerate(agents, start=first)
     )
+
+
+def _find_inside(spans_m: Sequence[Span], ahead_m: float) -> float:
+    """Return the middle of the range of stations nearest ahead, as far as it is near its end."""
+    low_m, high_m = min(spans_m, key=lambda span_m: find_off(max(ahead_m, 0.0), [span_m]))
+    low_m, high_m = max(low_m, high_m - _FROM_END_M), min(high_m, low_m + _FROM_END_M)
+    return (low_m + high_m) / 2.0
 
 
 def _shifts(wanted: intents.Length) -> list[float]:

@@ -10,7 +10,7 @@ from augment.checks.bodies import end_of_walk
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
 from augment.checks.parties import CRASH_M, Bounds, Case, Party, apart_m, hold, meets_route
-from augment.checks.wish_places import find_across
+from augment.checks.wish_places import EVERYWHERE, find_across, find_off, list_stations
 from augment.checks.wish_shapes import CONE_M, WORKER_M
 from augment.scene import intent as wish
 from augment.scene.entities import TrafficAgent
@@ -27,9 +27,11 @@ def check_distance(asked: Case) -> Iterator[Finding]:
     its own, any may be the first, and where the first is missing the next one is.
     """
     for party in asked.parties:
-        span_m = party.request.spot.span_m
-        if not party.placed or span_m is None:
+        spans_m = list_stations(party.request.spot, asked.lanes)
+        if not party.placed or spans_m == (EVERYWHERE,):
             continue
+        nearest_m = asked.ahead_m(party.placed[0])
+        span_m = min(spans_m, key=lambda span_m: find_off(nearest_m, [span_m]))
         allowed_m, furthest_m = asked.tolerances.distance_m, max(map(abs, span_m))
         if math.isfinite(furthest_m):
             share_m = asked.tolerances.distance_share * furthest_m
@@ -142,13 +144,10 @@ def _across(
 
 def _bounds(asked: Case, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
     """Return the requested place across its lane, left positive; anywhere in it by default."""
-    sign, half_lane_m = asked.lanes.side_sign(lateral), band.width_m / 2.0
-    if lateral is None:
-        return Bounds(-half_lane_m, half_lane_m, asked.tolerances.edge_m)
-    if sign == 0.0:
-        return Bounds(0.0, 0.0, asked.tolerances.middle_m)
-    low_m, high_m = find_across(lateral, sign, band.width_m, 2.0 * half_box_m)
-    return Bounds(low_m, high_m, asked.tolerances.across_m)
+    sign, allowed = asked.lanes.side_sign(lateral), asked.tolerances
+    allowed_m = allowed.across_m if sign else allowed.middle_m
+    span_m = find_across(lateral, sign, band.width_m, 2.0 * half_box_m)
+    return Bounds(*span_m, allowed.edge_m if lateral is None else allowed_m)
 
 
 def _cones(asked: Case, party: Party, request: wish.ConesRequest, band: Band) -> Iterator[Finding]:

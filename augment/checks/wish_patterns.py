@@ -130,28 +130,30 @@ class Chain:
         orders = [tuple(range(len(points)))]
         if len(points) <= MOST_ORDERED:
             orders = list(permutations(orders[0]))
-        placed = [self._place([points[at] for at in order], None) for order in orders]
+        placed = [self._place([points[at] for at in order], points[order[0]]) for order in orders]
         _, order = min((_sum_m(points, p, o), o) for p, o in zip(placed, orders, strict=True))
         ordered = [points[at] for at in order]
-        best = min(
-            (self._place(ordered, start) for start in (None, *self._starts(ordered))),
-            key=lambda tried: sum(map(math.dist, tried, ordered)),
-        )
+
+        def total_m(start: FloatArray) -> float:
+            placed = self._place(ordered, (float(start[0]), float(start[1])))
+            return sum(map(math.dist, placed, ordered))
+
+        # The first may give way for the others: it begins where each of them would have it.
+        starts = [np.array(ordered[0])]
+        for link, point in zip(self.links, ordered[1:], strict=False):
+            there = link.nearest(ordered[link.base], point)
+            starts.append(starts[0] + np.array(point) - np.array(there))
+        start = min(starts, key=total_m)
+        if self.links and total_m(start) > THERE_M * len(points):
+            from scipy.optimize import minimize
+
+            start = minimize(total_m, start, method="Nelder-Mead", options={"xatol": 1e-4}).x
+        best = self._place(ordered, (float(start[0]), float(start[1])))
         back = dict(zip(order, best, strict=True))
         return [back[at] for at in range(len(points))]
 
-    def _starts(self, points: Sequence[Point]) -> list[Point]:
-        """Return where the first may stand as well: where another one would have it stand."""
-        moved = []
-        for link, point in zip(self.links, points[1:], strict=False):
-            base = points[link.base]
-            there = link.nearest(base, point)
-            moved.append((base[0] + point[0] - there[0], base[1] + point[1] - there[1]))
-        sums = [(x + points[0][0], y + points[0][1]) for x, y in moved]
-        return [*moved, *((x / 2.0, y / 2.0) for x, y in sums)]
-
-    def _place(self, points: Sequence[Point], start: Point | None) -> list[Point]:
-        placed = [self.first(start or points[0])]
+    def _place(self, points: Sequence[Point], start: Point) -> list[Point]:
+        placed = [self.first(start)]
         for link, point in zip(self.links, points[1:], strict=False):
             placed.append(link.nearest(placed[link.base], point))
         return placed

@@ -33,6 +33,8 @@ SLIGHT_M = 1.5
 """The end of the paper's range for a slight offset."""
 FAR_OUT_M = 3.0
 """How far beside the road something may stand that is to stand beside it."""
+EDGE_GAP_M = 0.1
+"""What may be left between a box at the edge of a lane and that edge."""
 _ABOUT_SHARE = 0.1
 """"About 20 m" is 18 to 22 m: numbers are rounded to their second digit."""
 _AT_JUNCTION_M = 10.0
@@ -111,7 +113,7 @@ def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m:
     near_m, far_m = {
         None: (0.0, half_lane_m),
         wish.Nearness.SLIGHTLY: (0.0, SLIGHT_M),
-        wish.Nearness.AT_EDGE: (half_lane_m - half_box_m, half_lane_m),
+        wish.Nearness.AT_EDGE: (half_lane_m - half_box_m - EDGE_GAP_M, half_lane_m),
         wish.Nearness.HALF_OUT: (half_lane_m, half_lane_m),
         wish.Nearness.OUTSIDE: (outside_m, outside_m + FAR_OUT_M),
     }[lateral.nearness]

@@ -60,7 +60,7 @@ def lay_out(
         case wish.Shape.RING if is_oblong:
             return _lay_out_rows(first_m, from_m, count, gap_m, to)
         case wish.Shape.RING:
-            radius_m = gap_m / (2.0 * math.sin(math.pi / max(count, 2)))
+            radius_m = ring_radius_m(count, gap_m)
             angles = [math.pi + to + 2.0 * math.pi * index / count for index in range(count)]
             return [
                 (first_m + radius_m * math.cos(a), from_m + radius_m * math.sin(a)) for a in angles
@@ -76,6 +76,11 @@ def lay_out(
             return [(first_m + i * along_m, from_m + i * across_m) for i in range(count)]
     sides = (1.0, -1.0) if request.both_sides else (1.0,)
     return [(first_m + i * along_m, side * from_m) for side in sides for i in range(count)]
+
+
+def ring_radius_m(count: int, gap_m: float) -> float:
+    """Return the radius of a ring of cones that are so far apart."""
+    return gap_m / (2.0 * math.sin(math.pi / max(count, 2)))
 
 
 def _lay_out_rows(

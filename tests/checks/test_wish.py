@@ -1,11 +1,16 @@
 """Distance to the wish, against values worked out by hand, and its properties."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
+from augment.baselines.rule_placer import place
 from augment.checks import Ground
-from augment.checks.wish import measure_wish
+from augment.checks.wish import WishDistance, measure_wish
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import (
     Bearing,
@@ -70,6 +75,17 @@ RING = cones(20.0, 4, Shape.RING, spacing=metres(2.0), has_worker=True)
 WORKED = cones(20.0, 2, Shape.ROW, spacing=metres(1.0), has_worker=True, post=Post.BEHIND)
 PAIR = crash(20.0, 2, CrashedCar(gap=metres(4.0), bearing=Bearing.LEFT))
 WALK = walk(20.0, Side.LEFT)
+QUEUE = Intent(
+    requests=(
+        VehicleRequest(
+            spot=parked(20.0).requests[0].spot,
+            body=Body.CAR,
+            count=3,
+            spacing=metres(6.0, 8.0),
+            speed_mps=0.0,
+        ),
+    )
+)
 FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
 
 HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]] = [
@@ -153,3 +169,67 @@ def test_the_distance_is_the_way_to_the_nearest_admitted_placement(
     assert found is not None
     assert found.distances_m == pytest.approx(distances_m, abs=0.01)
     assert (found.missing, found.surplus) == (0 if added else 1, ())
+
+
+INTENTS = {
+    **{"side": SIDE, "range": RANGE, "oncoming": ONCOMING, "walk": WALK},
+    **{"line": LINE, "row": ROW, "taper": TAPER, "ring": RING, "worked": WORKED},
+    **{"pair": PAIR, "file": FILE, "queue": QUEUE},
+}
+PLACED = {
+    name: place(STREET, intent, seed=7).modification.added for name, intent in INTENTS.items()
+}
+"""What the rule placer makes of each intent."""
+
+
+def shifted(added: Sequence[TrafficAgent], shifts: Sequence[tuple[float, float]]) -> Modification:
+    moved = [
+        replace(one, x_m=one.x_m + dx_m, y_m=one.y_m + dy_m, walk_to_m=None)
+        for one, (dx_m, dy_m) in zip(added, shifts, strict=False)
+    ]
+    return Modification(added=tuple(moved))
+
+
+def measured(intent: Intent, change: Modification) -> WishDistance:
+    found = measure_wish(Ground.of(STREET), change, intent)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", PLACED)
+def test_what_the_rule_placer_places_is_what_was_asked_for(name: str) -> None:
+    found = measured(INTENTS[name], Modification(added=PLACED[name]))
+    assert found.distances_m == pytest.approx([0.0] * len(PLACED[name]), abs=0.002)
+
+
+@given(
+    name=st.sampled_from(sorted(PLACED)),
+    shifts=st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 2), min_size=8, max_size=8),
+)
+@settings(max_examples=60, deadline=None)
+def test_the_distance_is_never_above_that_to_a_placement_that_meets_the_intent(
+    name: str, shifts: list[tuple[float, float]]
+) -> None:
+    change = shifted(PLACED[name], shifts)
+    found = measured(INTENTS[name], change)
+    displaced_m = sum(math.hypot(*shift) for shift, _ in zip(shifts, change.added, strict=False))
+    assert sum(found.distances_m) <= displaced_m + 0.01
+
+
+@given(
+    name=st.sampled_from(["side", "range", "oncoming"]),
+    shift=st.tuples(*[st.floats(-9.0, 9.0)] * 2),
+    further_m=st.floats(0.1, 9.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_the_distance_grows_by_as_much_as_one_goes_further_away(
+    name: str, shift: tuple[float, float], further_m: float
+) -> None:
+    change = shifted(PLACED[name], [shift])
+    (match,) = measured(INTENTS[name], change).matches
+    (one,) = change.added
+    assume(match.distance_m > 0.01)
+    share = further_m / match.distance_m
+    away = [((one.x_m - match.nearest_m[0]) * share, (one.y_m - match.nearest_m[1]) * share)]
+    (further,) = measured(INTENTS[name], shifted([one], away)).matches
+    assert further.distance_m == pytest.approx(match.distance_m + further_m, abs=0.002)
