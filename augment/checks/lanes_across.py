@@ -299,6 +299,11 @@ def resolve_spot(
         if spot.landmark is not None and (picked := find_picked(lanes, spot.landmark)):
             place_m = lanes.route.locate_agent(picked[0]).ahead_m
         base = None if place_m is None else (place_m, place_m)
+        if spot.mark is intents.MapPlace.CROSSWALK and place_m is not None:
+            # Before it is before its near edge, past it past its far one; level is on it.
+            near_m, far_m = list_crosswalks(lanes)[0]
+            edges = {intents.Relation.BEHIND: (near_m, near_m), None: (near_m, far_m)}
+            base = edges.get(spot.relation, (far_m, far_m))
     elif lanes.over(spot.via) is not None:
         return spot
     else:
