@@ -146,7 +146,7 @@ class _Fitting:
         wanted = request.spot.distance or intents.Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.drawn(self._rng)
         asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
-        spans_m = list_stations(request.spot, self._place.lanes)
+        spans_m = list_stations(request.spot, self._place.over(request.spot.via).lanes)
         is_open = wanted.is_range or (request.spot.distance is None and of is None)
         if is_open and request.spot.settings:
             asked_m = _find_inside(spans_m, asked_m)

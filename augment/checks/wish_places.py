@@ -35,8 +35,8 @@ FAR_OUT_M = 3.0
 """How far beside the road something may stand that is to stand beside it."""
 EDGE_GAP_M = 0.1
 """What may be left between a box at the edge of a lane and that edge."""
-_ABOUT_SHARE = 0.1
-""""About 20 m" is 18 to 22 m: numbers are rounded to their second digit."""
+_ABOUT_SHARE = 0.05
+""""About 20 m" is 19 to 21 m: a number that is rounded."""
 _AT_JUNCTION_M = 10.0
 _BEND_OVER_M, _BEND_RAD, _BEND_ENDS_M = 20.0, math.radians(8.0), 10.0
 """A bend turns by so much over so far; its ends reach a little into the straight."""

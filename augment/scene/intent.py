@@ -202,7 +202,8 @@ class Spot:
         anchor: The name of an earlier request, of whose first object the distance runs; None for
             the ego, as for the two that follow, of which one alone may be given.
         landmark: A road user of the scene of whom the distance runs.
-        mark: A place of the map of which the distance runs.
+        mark: A place of the map of which the distance runs; before a crosswalk from its near
+            edge, past it from its far one.
         via: A lane of the map: the distance runs along the way to it, which takes the place of
             the ego's lane; None for the intent's route.
         lane: None where no lane is said, or none is meant (walks).

@@ -11,15 +11,17 @@ from hypothesis import strategies as st
 from augment.baselines.rule_placer import place
 from augment.checks import Ground
 from augment.checks.wish import WishDistance, measure_wish
-from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.entities import Area, AreaKind, Modification, Scene, TrafficAgent
 from augment.scene.intent import (
     Bearing,
     Body,
     CrashedCar,
     Intent,
     LaneChoice,
+    MapPlace,
     Nearness,
     Post,
+    Relation,
     Setting,
     Shape,
     Side,
@@ -40,7 +42,18 @@ from tests.intents import (
 from tests.scenes import cone, curve, junction, pedestrian, scene, vehicle
 
 STREET, BEND = scene(), curve()
-"""Lanes are 3.5 m wide. The bend begins 10 m ahead, on 40 m to the left."""
+_STRIPES = Area(
+    id="Area9",
+    kind=AreaKind.CROSSWALK,
+    boundary_m=((30.0, -1.75), (34.0, -1.75), (34.0, 5.25), (30.0, 5.25)),
+)
+ZEBRA = replace(
+    STREET,
+    areas=(*STREET.areas, _STRIPES),
+    agents=(vehicle("Agent8", 16.0, -3.0), vehicle("Agent9", 24.0, -3.0)),
+)
+"""Lanes are 3.5 m wide. The bend begins 10 m ahead, on 40 m to the left. The zebra crossing is
+30 to 34 m ahead; before it two cars of 4.8 m are parked on the right."""
 
 
 def bent(ahead_m: float, left_m: float = 0.0) -> tuple[float, float]:
@@ -56,6 +69,13 @@ def car(ahead_m: float, left_m: float, number: int = 2) -> TrafficAgent:
 def named(*settings: Setting) -> Intent:
     """One car in the ego's lane at a named place."""
     where = Spot(lane=LaneChoice.OWN, settings=settings)
+    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, count=1),))
+
+
+def by_zebra(relation: Relation | None) -> Intent:
+    """One car 5 m from the zebra, or on it."""
+    five = metres(5.0) if relation else None
+    where = Spot(distance=five, relation=relation, mark=MapPlace.CROSSWALK)
     return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, count=1),))
 
 
@@ -93,8 +113,8 @@ HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]]
     (STREET, AT_20, (car(20.0, 1.5),), [0.0]),
     (STREET, AT_20, (car(23.0, 0.0),), [3.0]),
     (STREET, AT_20, (car(23.0, 5.75),), [5.0]),  # 3 m on, 4 m past the lane's edge
-    (STREET, parked(20.0, about=True), (car(21.9, 0.0),), [0.0]),
-    (STREET, parked(20.0, about=True), (car(24.0, 0.0),), [2.0]),
+    (STREET, parked(20.0, about=True), (car(20.9, 0.0),), [0.0]),
+    (STREET, parked(20.0, about=True), (car(23.0, 0.0),), [2.0]),
     (STREET, parked(20.0, lateral=CENTRED), (car(20.0, -0.4),), [0.4]),
     (STREET, SIDE, (car(20.0, 0.9),), [0.3]),
     (STREET, SIDE, (car(20.3, 0.8),), [0.5]),
@@ -157,6 +177,14 @@ HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]]
     (junction(), named(Setting.IN_INTERSECTION), (car(30.0, 0.0),), [0.0]),
     (junction(), named(Setting.IN_INTERSECTION), (car(17.5, 0.0),), [2.5]),
     (junction(), named(Setting.AFTER_INTERSECTION), (car(30.0, 0.0),), [6.0]),
+    (ZEBRA, by_zebra(Relation.BEHIND), (car(25.0, 0.0),), [0.0]),  # before its near edge
+    (ZEBRA, by_zebra(Relation.AHEAD), (car(40.0, 0.0),), [1.0]),  # past its far edge
+    (ZEBRA, by_zebra(None), (car(33.0, 0.0),), [0.0]),
+    (ZEBRA, named(Setting.ON_CROSSWALK), (car(37.0, 0.0),), [3.0]),
+    (ZEBRA, named(Setting.OFF_CROSSWALK), (car(31.0, 0.0),), [1.0]),
+    (ZEBRA, named(Setting.BY_PARKED_RIGHT), (car(21.0, 0.0),), [0.0]),
+    (ZEBRA, named(Setting.BY_PARKED_RIGHT), (car(30.0, 0.0),), [3.6]),
+    (ZEBRA, named(Setting.BY_PARKED_LEFT), (car(30.0, 0.0),), [0.0]),  # nobody is: it is open
     (BEND, named(Setting.IN_BEND), (car(-10.0, 0.0),), [6.0]),
 ]
 
