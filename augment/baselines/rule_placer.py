@@ -68,6 +68,8 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
         raise CannotPlace("The scenario has no intent that says what its instruction asks for.")
     if intent.unmet:
         raise CannotPlace(f"The wish can't be met: {intent.unmet}")
+    if intent.purpose is not None:
+        raise CannotPlace("The wish names a purpose; rules place what has a place.")
     rng = np.random.default_rng(seed)
     lanes = LanesAcross.of(Ground.of(scene), intent.route)
     if lanes is None:

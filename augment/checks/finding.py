@@ -43,6 +43,7 @@ class FindingKind(StrEnum):
     ASKED_MOTION = "asked_motion"
     ASKED_START = "asked_start"
     UNASKED = "unasked"
+    PURPOSE = "purpose"
 
     @property
     def fault(self) -> FaultClass:

@@ -234,6 +234,7 @@ class Case:
         surplus: Added agents that no request asks for.
         to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
         unmet: Why the wish can't be met; None where it can.
+        purpose: What the change is for; then nothing is surplus.
     """
 
     ground: Ground
@@ -245,6 +246,7 @@ class Case:
     to_move: frozenset[str] = frozenset()
     to_remove: frozenset[str] = frozenset()
     unmet: str | None = None
+    purpose: wish.Purpose | None = None
 
     @property
     def route(self) -> EgoRoute:
@@ -289,6 +291,9 @@ def assign_parties(
         if name in moved:
             parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
+    movable = {name for _, name in picked}
+    if intent.purpose is not None:  # which any change may serve
+        surplus, gone, movable = (), [*gone, *modification.removed], movable | moved.keys()
     return Case(
         ground=ground,
         modification=modification,
@@ -296,9 +301,10 @@ def assign_parties(
         parties=tuple(parties),
         surplus=surplus,
         tolerances=tolerances,
-        to_move=frozenset(name for _, name in picked),
+        to_move=frozenset(movable),
         to_remove=frozenset(gone),
         unmet=intent.unmet,
+        purpose=intent.purpose,
     )
 
 

@@ -4,24 +4,75 @@ Nobody's answer is held against another one: of a change only the effect counts.
 `find_motion` has it, whatever it sees. Frame: the scene's. T steps.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 import shapely
 from shapely.ops import substring
 
+from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import ChangedScene, is_stopped
+from augment.checks.parties import Bounds, Case, hold
 from augment.geometry.frames import Pose, corners
 from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.intent_parts import Amount, Purpose
 from augment.scene.motion import Motion, Movement
 
 HIDING = (AgentType.VEHICLE, AgentType.BUS)
 """Who hides a pedestrian; all else is too low or too slim."""
-WIDEST_M = 8.0
-"""Wider ways are not told apart."""
+WIDEST_M, LONGEST_TTC_S = 8.0, 3.0
+"""Wider ways and longer times are not told apart."""
 _ASIDE_M, _BEYOND_M, _LOOKS_M = 15.0, 10.0, 60.0
 _SETS_OUT_WITHIN_M = 2.0
-_HALVINGS = 10
+_HALVINGS = 12
+
+
+def check_purpose(asked: Case) -> Iterator[Finding]:
+    """Hold what a scene alone tells of a purpose against its windows; drives tell the rest."""
+    purpose, change = asked.purpose, asked.modification
+    if purpose is None:
+        return
+    situation, changed = ChangedScene.of(asked.ground, change), change.changed
+    if purpose.sight is not None:
+        wanted = Bounds(purpose.sight.low_m, purpose.sight.high_m, 0.0)
+        seen_m = measure_sight(situation)
+        if seen_m:
+            nearest_m = min(seen_m.values(), key=wanted.off)
+            what = "The ego's distance when it first sees the pedestrian"
+            yield hold(FindingKind.PURPOSE, changed, what, nearest_m, wanted)
+        else:
+            words = "Nobody on foot who gets into the ego's way is hidden from it at first."
+            yield find(FindingKind.PURPOSE, False, changed, words)
+    if purpose.passage is not None:
+        wanted = Bounds(purpose.passage.low_m, purpose.passage.high_m, 0.0)
+        what = "The width of the widest way past"
+        yield hold(FindingKind.PURPOSE, changed, what, measure_passage(situation), wanted)
+
+
+def check_drive(
+    purpose: Purpose, planner: str, *, braking_mps2: float, ttc_s: float, crashes: bool
+) -> Iterator[Finding]:
+    """Hold a drive against the windows of a purpose that are about driving, if it has any.
+
+    Args:
+        purpose: What the change that was driven is for.
+        planner: Who drove.
+        braking_mps2: The hardest braking that it was forced to.
+        ttc_s: Its least time to collision; infinite above what is measured.
+        crashes: Whether it touched anybody.
+    """
+    windows: tuple[tuple[Amount | None, str, float, str], ...] = (
+        (purpose.braking_mps2, "The hardest braking required of", braking_mps2, "m/s²"),
+        (purpose.ttc_s, "The least time to collision of", min(ttc_s, LONGEST_TTC_S), "s"),
+    )
+    for window, what, value, unit in windows:
+        if window is not None:
+            wanted = Bounds(window.low, window.high, 0.0)
+            yield hold(FindingKind.PURPOSE, [], f"{what} {planner}", value, wanted, unit=unit)
+    if crashes and (purpose.braking_mps2 or purpose.ttc_s):
+        yield find(FindingKind.PURPOSE, False, [], f"{planner} crashes.")
 
 
 def measure_sight(situation: ChangedScene) -> dict[str, float]:

@@ -35,6 +35,7 @@ from augment.checks.motions import (
 )
 from augment.checks.parties import USUAL, AskedCheck, Case, Tolerances, assign_parties
 from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
+from augment.checks.purpose import check_purpose
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, VehicleRequest
 
@@ -44,7 +45,7 @@ CHECKS: tuple[Check, ...] = (
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(check_count, check_type, check_distance, check_across, check_heading, check_crash),
-    *(check_walk, check_motion, check_spacing, check_changes, check_course),
+    *(check_walk, check_motion, check_spacing, check_changes, check_course, check_purpose),
 )
 _OF_PLACE = frozenset(
     {
@@ -124,7 +125,8 @@ def _drop_answered(
     place across it has been, or of what stands where that belongs which it is taken for. Where
     and how a thing stands that nobody asked for is no fault of its own.
     """
-    answering, placed = set[str](), set[str]()
+    answering = {agent.id for agent in asked.modification.changed if asked.purpose is not None}
+    placed = set(answering)
     for party in asked.parties:
         placed.update(agent.id for agent, _ in party.mistyped)
         if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None:

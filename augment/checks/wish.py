@@ -89,13 +89,15 @@ def measure_wish(
 ) -> WishDistance | None:
     """Return how far a modification is from what is asked for; None off every lane.
 
+    None as well where the wish is open: a purpose has no place.
+
     Args:
         ground: Of the scene before the change.
         modification: The change; an empty one for an answer that was unreadable or refused.
         intent: What the instruction asks for.
     """
     lanes = LanesAcross.of(ground, intent.route)
-    if lanes is None:
+    if lanes is None or intent.purpose is not None:
         return None
     case = assign_parties(ground, modification, intent, lanes)
     fitting, missing, matches = _Fitting(lanes), 0, list[WishMatch]()

@@ -16,8 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from augment.baselines.rule_placer import place
+from augment.checks import Ground
+from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.fake_llm import careless, sight
+from augment.fake_llm.searching import search
 from augment.fake_llm.sight import Heard, KnownTasks, Task
 from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
@@ -99,7 +102,7 @@ class Character:
         if task is None:
             return _write_answer(Modification(), UNKNOWN), ()
         try:
-            right = place(task.scene, task.intent).modification
+            right = _find_right(task, heard)
         except CannotPlace as refused:
             if self.in_prose:
                 rng = careless.dice(task.prompt)
@@ -130,11 +133,13 @@ def _rate(problems: list[Problem]) -> str:
 
 def review_problems(task: Task) -> list[Problem]:
     """Return the problems of the work in the task, by the stand-in's own placement."""
+    changed = sight.read_changed_agents(task.prompt)
+    if task.intent.purpose is not None:
+        return _purpose_problems(task, changed)
     try:
         right = list(place(task.scene, task.intent).modification.changed)
     except CannotPlace:
         return []
-    changed = sight.read_changed_agents(task.prompt)
     if len(changed) != len(right):
         said = f"{len(changed)} agents were added or moved, {len(right)} were asked for."
         return [_problem(said, "Count.")]
@@ -152,6 +157,16 @@ def review_problems(task: Task) -> list[Problem]:
         if problem is not None:
             problems.append(problem)
     return problems
+
+
+def _purpose_problems(task: Task, changed: Sequence[TrafficAgent]) -> list[Problem]:
+    known = {agent.id for agent in task.scene.agents}
+    change = Modification(
+        added=tuple(agent for agent in changed if agent.id not in known),
+        moved=tuple(agent for agent in changed if agent.id in known),
+    )
+    findings = check_against_intent(Ground.of(task.scene), change, task.intent)
+    return [_problem(one.sentence(), "Place it otherwise.") for one in findings if one.is_fault]
 
 
 # --- Answers -----------------------------------------------------------------------------------
@@ -334,10 +349,20 @@ def _with_results(
 # --- The characters ----------------------------------------------------------------------------
 
 
+def _find_right(task: Task, heard: Heard, *, misses: bool = False) -> Modification:
+    """Return what rules place; where the wish is open the first that is found."""
+    if task.intent.purpose is None:
+        return place(task.scene, task.intent).modification
+    dice = careless.dice(f"{heard.seed}\n{heard.all_told}")
+    return search(task.scene, task.intent, dice, misses=misses)
+
+
 def _bend(task: Task, right: Modification, heard: Heard) -> Modification | None:
     rng = careless.dice(heard.all_told)
     if careless.is_unreadable(rng):
         return None
+    if task.intent.purpose is not None:
+        return _find_right(task, heard, misses=True)
     spared = careless.SPARED_BY_TOOL if heard.called or heard.may_call else frozenset()
     return careless.bend(task.scene, right, rng, spared)[0]
 

@@ -63,6 +63,7 @@ class Heard:
             a call that failed.
         called: Whether it has called anything since then.
         feedback: What reviews sent back since the last wish.
+        seed: That the request names.
     """
 
     role: ModelRole
@@ -73,6 +74,7 @@ class Heard:
     results: tuple[list[float] | None, ...]
     called: bool
     feedback: tuple[str, ...]
+    seed: int | None
 
     @property
     def all_told(self) -> str:
@@ -122,6 +124,7 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
         results=tuple(results),
         called=called,
         feedback=tuple(messages[number].text for number in told),
+        seed=request.seed,
     )
 
 

@@ -182,6 +182,11 @@ class Scenario(models.Model):
         return bool(self.catalogue_set)
 
     @property
+    def is_open(self) -> bool:
+        """True if its wish is a purpose; the reference is then an example, not a measure."""
+        return bool((self.intent or {}).get("purpose"))
+
+    @property
     def followed(self) -> "list[Scenario]":
         """Scenarios before it in a conversation, the first one first.
 

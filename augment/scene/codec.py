@@ -12,12 +12,12 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
+from pydantic import AliasChoices, BeforeValidator, Field, PlainSerializer, TypeAdapter
 
 from augment.errors import InvalidModification
 from augment.scene import entities
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
-from augment.scene.intent_parts import Amount
+from augment.scene.intent_parts import Aim, Amount
 from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_scene_motions
@@ -231,6 +231,8 @@ class CatalogueEntry:
         keep_traffic: Whether the recorded traffic stays in the scene.
         notes: What a reader of the catalogue should know; may be empty.
         intent: What the instruction asks for; None where nobody has written it down.
+        reference: What a person made of it; where the wish is open an `example` in the document,
+            one right answer among many, which nobody's answer is measured by.
     """
 
     __pydantic_config__ = CLOSED
@@ -238,7 +240,7 @@ class CatalogueEntry:
     slug: _Words
     scene: _Words
     follows: Annotated[str, Field(exclude_if=lambda slug: not slug)] = ""
-    type: entities.ScenarioType | MotionPreset
+    type: entities.ScenarioType | MotionPreset | Aim
     language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
     instruction: _Words
     paraphrases: Annotated[
@@ -254,10 +256,24 @@ class CatalogueEntry:
     ] = None
     reference: Annotated[
         entities.Modification,
+        Field(validation_alias=AliasChoices("reference", "example")),
         BeforeValidator(modification_from_document),
         PlainSerializer(modification_to_document),
     ]
 
+    @property
+    def is_open(self) -> bool:
+        """True if the intent names a purpose."""
+        return self.intent is not None and self.intent.purpose is not None
+
 
 _ENTRY = Codec("scenario", TypeAdapter(CatalogueEntry))
-entry_to_document, entry_from_document = _ENTRY.to_document, _ENTRY.from_document
+entry_from_document = _ENTRY.from_document
+
+
+def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
+    """Return the entry as a JSON document; the answer to an open wish stands as its example."""
+    document = _ENTRY.to_document(entry)
+    if entry.is_open:
+        document["example"] = document.pop("reference")
+    return document

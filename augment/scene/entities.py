@@ -412,3 +412,4 @@ class CatalogueSet(StrEnum):
     HARD = "hard"
     MOVING = "moving"
     FOLLOW_UPS = "follow-ups"
+    OPEN = "open"

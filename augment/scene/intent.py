@@ -19,6 +19,7 @@ from augment.scene.entities import TurnType
 from augment.scene.intent_parts import Length as Length
 from augment.scene.intent_parts import MapPlace as MapPlace
 from augment.scene.intent_parts import MotionWish as MotionWish
+from augment.scene.intent_parts import Purpose as Purpose
 from augment.scene.intent_parts import Setting as Setting
 from augment.scene.intent_parts import Side as Side
 from augment.scene.planned_motion import MotionPreset
@@ -468,6 +469,7 @@ class Intent:
         requests: What is to be added.
         moves: Who of the scene is to be elsewhere.
         removals: Who of the scene is to go.
+        purpose: What the change is for, if any change will do that has this effect.
         route: Where the way leads along which the distances run, where it first parts.
         unmet: Why the wish can't be met in its scene; then nothing else is asked for, and the
             right outcome is a refusal. None where it can be met.
@@ -479,15 +481,16 @@ class Intent:
     requests: _Changes[_AnyRequest] = ()
     moves: _Changes[Move] = ()
     removals: _Changes[Pick] = ()
+    purpose: Purpose | None = None
     route: TurnType = TurnType.STRAIGHT
     unmet: _Words | None = None
     beyond: _Several[_Words] = ()
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
-        asks = bool(self.requests or self.moves or self.removals)
+        asks = bool(self.requests or self.moves or self.removals or self.purpose)
         if self.unmet is None and not asks:
-            raise ValueError("asks for nothing: no requests, moves or removals")
+            raise ValueError("asks for nothing: no requests, moves, removals or purpose")
         if self.unmet is not None and asks:
             raise ValueError("what can't be met asks for nothing else")
         return self

@@ -37,6 +37,26 @@ class Side(StrEnum):
         return 1.0 if self is Side.LEFT else -1.0
 
 
+class Aim(StrEnum):
+    """Type of an open wish, by its purpose."""
+
+    HIDE = "hide_pedestrian"
+    LEAVE_WAY = "leave_narrow_way"
+    FORCE_BRAKING = "force_braking"
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        return _AIMS[self]
+
+
+_AIMS = {
+    Aim.HIDE: "Hide a pedestrian until late",
+    Aim.LEAVE_WAY: "Leave one narrow way past",
+    Aim.FORCE_BRAKING: "Make the ego brake hard",
+}
+
+
 class MapPlace(StrEnum):
     """A place of the map on the ego's route; a merge is a junction too."""
 
@@ -185,4 +205,27 @@ class MotionWish:
                 raise ValueError(f"{name} is more than 0")
         if self.side is not None and self.preset is not MotionPreset.RED_LIGHT:
             raise ValueError("only who runs a red light comes from a side")
+        return self
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Purpose:
+    """What a change is for, as windows in which what is measured of it has to lie.
+
+    Attributes:
+        sight: How near the ego is to a pedestrian, hidden at first, when it first sees it.
+        passage: How wide the widest way past is that the road has left.
+        braking_mps2: The hardest braking that each planner, which must not crash, is forced to.
+        ttc_s: The least time to collision of each planner, which must not crash.
+    """
+
+    sight: Length | None = None
+    passage: Length | None = None
+    braking_mps2: Amount | None = None
+    ttc_s: Amount | None = None
+
+    @model_validator(mode="after")
+    def _has_a_window(self) -> Self:
+        if self == Purpose():
+            raise ValueError("a purpose has a window: sight, passage, braking_mps2 or ttc_s")
         return self

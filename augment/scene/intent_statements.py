@@ -24,6 +24,12 @@ _FACTS = {
     "post_side": "the worker is on the {} of them",
 }
 """Fields that a request may have, and what a value of theirs says."""
+_PURPOSES = {
+    "sight": "the ego sees a pedestrian who crosses its way only from {} away",
+    "passage": "the widest way past is {} wide",
+    "braking_mps2": "the ego is forced to brake with {} m/s² and does not crash",
+    "ttc_s": "the ego's least time to collision is {} s and it does not crash",
+}
 _MOTION_FACTS = {
     "speed_mps": "comes to {} m/s",
     "braking_mps2": "brakes with {} m/s²",
@@ -43,6 +49,8 @@ def list_statements(intent: intents.Intent) -> tuple[str, ...]:
         facts = [*where, *_list_place_facts(move.spot), *_list_pose_facts(move)]
         statements += [f"{move.who}: {fact}" for fact in facts]
     statements += [f"{removal}: goes" for removal in intent.removals]
+    windows = {name: getattr(intent.purpose, name, None) for name in _PURPOSES}
+    statements += [_PURPOSES[name].format(one) for name, one in windows.items() if one]
     if intent.route in _ROUTES:
         statements.append(f"distances run along the way that turns {_ROUTES[intent.route]}")
     if intent.unmet:

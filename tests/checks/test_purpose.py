@@ -1,14 +1,19 @@
 """Purposes measured in small worlds: the numbers in the comments are worked out by hand."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from augment.checks import Ground
 from augment.checks.ground import ChangedScene
-from augment.checks.purpose import measure_passage, measure_sight
+from augment.checks.purpose import check_drive, measure_passage, measure_sight
+from augment.checks.registry import check_against_intent
 from augment.scene.entities import Modification, TrafficAgent
+from augment.scene.intent import Intent, Length, Purpose
+from augment.scene.intent_parts import Amount
 from tests.scenes import cone, pedestrian, scene, vehicle
 from tests.simulation.worlds import street
 
@@ -64,3 +69,59 @@ def test_off_the_map_nothing_is_measured() -> None:
     off = replace(scene(), lanes=(), connectors=())
     situation = ChangedScene.of(Ground.of(off), Modification())
     assert (measure_sight(situation), measure_passage(situation)) == ({}, 0.0)
+
+
+WIDE = Intent(purpose=Purpose(passage=Length(low_m=2.0, high_m=4.3)))
+HIDDEN = Intent(purpose=Purpose(sight=Length(low_m=9.0, high_m=10.0)))
+ACROSS = vehicle("A", 30.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("intent", "added", "words"),
+    [
+        (WIDE, [vehicle("A", 30.0, 0.0)], []),
+        (WIDE, [], ["past is 7.00 m; 2 to 4.3 m is asked for."]),
+        (WIDE, [vehicle("A", 30.0, -1.0)], ["past is 5.25 m; 2 to 4.3 m is asked for."]),
+        (WIDE, [ACROSS], []),  # that it stands across is nobody's fault: nothing forbids it
+        (HIDDEN, [SCREEN, WALKER], []),
+        (HIDDEN, [WALKER], ["is hidden from it at first."]),
+        (
+            replace(HIDDEN, purpose=Purpose(sight=Length(low_m=2.0, high_m=9.0))),
+            [SCREEN, WALKER],
+            ["first sees the pedestrian is 9.32 m; 2 to 9 m is asked for."],
+        ),
+    ],
+)
+def test_the_effect_alone_is_held_against_a_purpose(
+    intent: Intent, added: list[TrafficAgent], words: list[str]
+) -> None:
+    change = Modification(added=tuple(added))
+    found = check_against_intent(Ground.of(street()), change, intent)
+    faults = [one.sentence() for one in found if one.is_fault]
+    assert len(faults) == len(words), faults
+    assert all(said.endswith(end) for said, end in zip(faults, words, strict=True)), faults
+
+
+def test_moving_and_removing_may_serve_a_purpose() -> None:
+    scene = replace(street(), agents=(vehicle("A", 30.0, 0.0), vehicle("B", 50.0, 0.0)))
+    moved = replace(scene.agents[0], x_m=35.0)
+    change = Modification(moved=(moved,), removed=("B",))
+    found = check_against_intent(Ground.of(scene), change, WIDE)
+    assert [one.sentence() for one in found if one.is_fault] == []
+
+
+@pytest.mark.parametrize(
+    ("drive", "faults"),
+    [
+        ({"braking_mps2": 4.0, "ttc_s": 1.5, "crashes": False}, 0),
+        ({"braking_mps2": 8.1, "ttc_s": 1.5, "crashes": False}, 1),
+        ({"braking_mps2": 2.9, "ttc_s": math.inf, "crashes": False}, 2),
+        ({"braking_mps2": 4.0, "ttc_s": 1.5, "crashes": True}, 1),
+    ],
+)
+def test_a_drive_is_held_against_what_a_purpose_says_of_driving(
+    drive: dict[str, Any], faults: int
+) -> None:
+    purpose = Purpose(braking_mps2=Amount(low=3.0, high=8.0), ttc_s=Amount(low=1.0, high=2.5))
+    assert sum(one.is_fault for one in check_drive(purpose, "idm", **drive)) == faults
+    assert list(check_drive(Purpose(passage=Length(low_m=3.0, high_m=3.0)), "idm", **drive)) == []

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.checks import Ground
+from augment.checks import FindingKind, Ground
+from augment.checks.registry import check_against_intent
 from augment.fake_llm.careless import MOTION_MISTAKES
 from augment.fake_llm.playing import review_problems
 from augment.fake_llm.server import FakeServer, running
@@ -22,11 +23,15 @@ from augment.variants.pipeline import EditTask, Outcome, run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 from tests.checks.test_asked_motions import WISHES
+from tests.fixtures.shelf import entry, shown_scene
 from tests.variants.memory import MemoryTranscript
+
+OPEN = "way-ferry-road"
+KNOWN = WISHES | {OPEN: (shown_scene(OPEN), entry(OPEN).intent or Intent())}
 
 
 def known(instruction: str) -> list[tuple[Scene, Intent]]:
-    return [WISHES[instruction]] if instruction in WISHES else []
+    return [KNOWN[instruction]] if instruction in KNOWN else []
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +40,14 @@ def server() -> Iterator[FakeServer]:
         yield serving
 
 
-def asked(server: FakeServer, name: str, variant: str, *, native: bool = False) -> Outcome:
+def asked(
+    server: FakeServer, name: str, variant: str, *, native: bool = False, model: str = "fake-good"
+) -> Outcome:
     with OpenAIWire(base_url=server.url, api_key=None, timeout_s=60.0) as client:
-        good = RespondentClient(client=client, model="fake-good", native_tools=native)
+        good = RespondentClient(client=client, model=model, native_tools=native)
         return run(
             find_recipe(variant),
-            EditTask(scene=WISHES[name][0], instruction=name),
+            EditTask(scene=KNOWN[name][0], instruction=name),
             modifier=good,
             transcript=MemoryTranscript(),
             patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
@@ -80,6 +87,20 @@ def apart_m(scene: Scene, one: Modification, other: Modification) -> float:
 @pytest.mark.parametrize("name", WISHES)
 def test_a_good_reviewer_accepts_what_is_asked(server: FakeServer, name: str) -> None:
     assert asked(server, name, "tqa").is_accepted
+
+
+@pytest.mark.parametrize(
+    ("model", "misses"), [("fake-good", []), ("fake-careless", [FindingKind.PURPOSE])]
+)
+def test_an_open_wish_is_served_or_missed_by_what_was_found(
+    server: FakeServer, model: str, misses: list[FindingKind]
+) -> None:
+    scene, intent = KNOWN[OPEN]
+    made = asked(server, OPEN, "otm", model=model)
+    assert made.modification is not None
+    found = check_against_intent(Ground.of(scene), made.modification, intent)
+    assert [one.kind for one in found if one.is_fault] == misses
+    assert asked(server, OPEN, "tqa").is_accepted
 
 
 @pytest.mark.parametrize(

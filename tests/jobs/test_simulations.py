@@ -15,8 +15,13 @@ from pytest_django import Settings
 
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Scenario, Simulation
+from augment.scene.codec import intent_to_document
+from augment.scene.intent import Intent, IntentOrigin, Purpose
+from augment.scene.intent_parts import Amount
 from augment.services.driving import driving_scores, simulations
 from augment.services.driving.simulations import DRIVES, Options
+from augment.services.judging.displacement import MissingReason, of_augmentation
+from augment.services.judging.findings import FindingKind, check_augmentation, read_findings
 from augment.services.work import Settlement
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
@@ -93,6 +98,23 @@ def test_a_drive_keeps_both_scores_their_parts_and_the_way() -> None:
     assert [one["changed"] for one in trace["objects"]] == [True, True]
     assert {event["kind"] for event in trace["events"]} >= {"collision"}
     assert job.augmentations.count() == 1
+
+
+def test_an_open_wish_about_driving_is_held_against_the_drives() -> None:
+    job = finished_job()
+    purpose = Purpose(braking_mps2=Amount(low=3.0, high=8.0))
+    intent = intent_to_document(Intent(purpose=purpose))
+    Scenario.objects.update(intent=intent, intent_origin=IntentOrigin.ENTERED)
+    row = job.augmentations.select_related("scenario__base_scene").get()
+    assert not any(one.kind is FindingKind.PURPOSE for one in read_findings([row.pk])[row.pk])
+    driven(job, Options(planner="idm"))
+    checked = check_augmentation(row)
+    assert checked is not None
+    for findings in (read_findings([row.pk])[row.pk], checked.findings):
+        words = [one.sentence() for one in findings if one.kind is FindingKind.PURPOSE]
+        assert words[0].startswith("The hardest braking required of idm is ")
+        assert words[0].endswith(" m/s²; 3 to 8 m/s² is asked for.")
+    assert of_augmentation(row).why_not is MissingReason.OPEN_WISH
 
 
 def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:

@@ -23,6 +23,7 @@ from augment.scene.intent import (
     Nearness,
     Pick,
     Post,
+    Purpose,
     Relation,
     Setting,
     Shape,
@@ -93,6 +94,12 @@ FULL = Intent(
         ),
     ),
     removals=(Pick(kind=Sight.BUS, side=Side.LEFT, every=True),),
+    purpose=Purpose(
+        sight=metres(8.0, 14.0),
+        passage=metres(3.0),
+        braking_mps2=Amount(low=3.0, high=8.0),
+        ttc_s=Amount(low=0.5, high=2.0),
+    ),
     route=TurnType.RIGHT,
     beyond=("in the rain",),
 )
@@ -109,7 +116,7 @@ def test_an_intent_comes_back_from_its_document_and_can_be_said() -> None:
         written = json.dumps(intent_to_document(intent), allow_nan=False)
         assert intent_from_document(json.loads(written)) == intent
         assert not any("{" in statement for statement in list_statements(intent))
-    assert len(list_statements(FULL)) == 34
+    assert len(list_statements(FULL)) == 38
 
 
 def test_what_is_open_is_absent() -> None:
@@ -129,6 +136,7 @@ def test_what_is_open_is_absent() -> None:
             "'vehicles', 'walk', 'cones', 'crash', 'door'",
         ),
         (document(), "", "asks for nothing"),
+        (document(purpose={}), "purpose", "a purpose has a window"),
         (
             document({"spot": {"distance": {"low_m": 20.0}}}),
             "requests[0].vehicles.spot",

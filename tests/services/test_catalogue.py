@@ -25,11 +25,12 @@ from augment.models import (
 )
 from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
+from augment.services.benchmarks.benchmarks import load_standard
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import NewScenario, add_scenario, load_reference
-from tests.fixtures.shelf import FOLDER, HARD, MOVING
+from tests.fixtures.shelf import FOLDER, HARD, MOVING, OPEN
 from tests.intents import parked
 from tests.scenes import scene, vehicle
 
@@ -152,6 +153,21 @@ def test_the_moving_set_brings_those_scenes_of_the_others_that_it_is_on(folder: 
     assert resolve_scenarios(["set:moving"]) == ["hard-braking-mill-junction"]
     again = load_catalogue(folder=folder, sets=["moving"])
     assert again == report(scenes=(0, 0, 1), scenarios=(0, 0, 1))
+
+
+def test_an_open_wish_has_an_example_that_nobody_is_measured_by(folder: Path) -> None:
+    for shelf, name in (
+        (FOLDER, "scenes/ferry-road.json"),
+        (OPEN, "scenarios/way-ferry-road.json"),
+    ):
+        place = folder / shelf.relative_to(FOLDER) / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(shelf / name, place)
+    load_catalogue(folder=folder, sets=["open"])
+    scenario = Scenario.objects.get()
+    assert (scenario.is_open, scenario.get_type_display()) == (True, "Leave one narrow way past")
+    assert load_reference(scenario) is not None
+    assert load_standard(scenario) is None
 
 
 def test_a_scene_that_was_augmented_stays_as_stored_and_is_named(folder: Path) -> None:

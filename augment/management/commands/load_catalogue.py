@@ -11,7 +11,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """load_catalogue [--set paper|hard|moving|all] [--paraphrases] [--folder FOLDER]."""
+    """load_catalogue [--set NAME|all] [--paraphrases] [--folder FOLDER]."""
 
     help = (
         "Load the catalogue: base scenes, instructions and reference modifications. "

@@ -26,6 +26,7 @@ from augment.benchmark.values import Stratum as Stratum
 from augment.errors import Conflict, UnknownName
 from augment.models import Benchmark, BenchmarkItem, Scenario
 from augment.scene.codec import recording_from_document
+from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios import scenes
@@ -93,9 +94,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
                 f"“{row.slug}” says how to change an answer to “{row.follows.slug}”: alone it is "
                 "no task of a benchmark."
             )
-    sizes = {
-        row.slug: measure_task(scenes.load_intent(row), scenes.load_reference(row)) for row in rows
-    }
+    sizes = {row.slug: measure_task(scenes.load_intent(row), load_standard(row)) for row in rows}
     strata = choose_strata(sizes)
     past = BenchmarkItem.objects.order_by("split")  # the test last
     earlier = {key: Split(split) for key, split in past.values_list("scenario__origin", "split")}
@@ -110,6 +109,11 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
         )
         for place, row in enumerate(rows, start=1)
     ]
+
+
+def load_standard(row: Scenario) -> Modification | None:
+    """Return the reference that answers are measured by, None where the wish is open."""
+    return None if row.is_open else scenes.load_reference(row)
 
 
 def public_origins() -> QuerySet[Scenario, Any]:
@@ -142,7 +146,7 @@ def _candidate(row: Any, stratum: Stratum, earlier: Mapping[UUID | None, Split])
     shared = [f"origin {row.origin}"]
     if row.intent is not None:
         shared.append(json.dumps(["intent", row.intent], sort_keys=True))
-    reference = scenes.load_reference(row)
+    reference = load_standard(row)
     if reference is not None and not reference.is_empty:
         place = row.place or row.base_scene_id
         shared.append(json.dumps([place, row.reference], sort_keys=True))
@@ -277,5 +281,5 @@ def _make_task(item: BenchmarkItem) -> BenchmarkTask:
         recording=None if recording is None else recording_from_document(recording),
         keeps_traffic=row.keep_traffic,
         paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,
-        reference=scenes.load_reference(row),
+        reference=load_standard(row),
     )

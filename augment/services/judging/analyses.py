@@ -19,7 +19,7 @@ from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import DISTANCES, KeptSummary, MeasuredRow, of_job
-from augment.services.judging.findings import FINDINGS
+from augment.services.judging.findings import FINDINGS, read_findings
 from augment.services.judging.measures import Measure, compute_once, digest_code, digest_rows
 from augment.services.judging.realism import REALISM, realism_of_job
 
@@ -59,7 +59,7 @@ class AugmentationLine:
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample."""
     ids = list(job.augmentations.values_list("pk", flat=True))
-    found = FINDINGS.of(ids)
+    found = read_findings(ids)
     for line in _lines(job):
         if line.row.pk in found:
             counts = Counter(finding.severity for finding in found[line.row.pk])

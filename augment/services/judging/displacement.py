@@ -50,6 +50,7 @@ class MissingReason(StrEnum):
 
     UNFINISHED = "waits, runs, failed or was cancelled"
     NO_REFERENCE = "its scenario has no reference that can be read"
+    OPEN_WISH = "its scenario names a purpose, which many answers serve"
     UNREADABLE_ROW = "its stored modification can't be read"
     UNFIT_MOTION = "its motion can't be followed in its scene"
 
@@ -248,6 +249,8 @@ def _measure_row(
     row: Augmentation, standard_of: Callable[[Augmentation], "_Standard"]
 ) -> Distance:
     reference, answer, before = standard_of(row).reference, _read_answer(row), row.follows
+    if row.scenario.is_open:
+        return Distance(why_not=MissingReason.OPEN_WISH)
     if reference is None:
         return Distance(why_not=MissingReason.NO_REFERENCE)
     if answer is None and row.state == State.DONE:

@@ -3,6 +3,8 @@
 The reference and anybody's labels stay out of it.
 """
 
+import math
+from collections import defaultdict
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,16 +14,22 @@ from augment.checks import Finding as Finding
 from augment.checks import FindingKind as FindingKind
 from augment.checks import Ground, Severity
 from augment.checks.finding import FaultClass as FaultClass
+from augment.checks.purpose import check_drive
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace, InvalidDocument, InvalidModification, UnknownName
 from augment.metrics.fault_guess import first_guess
-from augment.models import Augmentation, Scenario
+from augment.models import Augmentation, Scenario, Simulation
 from augment.scene.codec import EGO_ID as EGO_ID
-from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.codec import (
+    intent_from_document,
+    modification_from_document,
+    modification_to_document,
+)
 from augment.scene.intent import Intent
 from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios import editing
 from augment.services.scenarios.scenes import load_ground, load_intent
+from augment.simulation.planners import NAMED
 
 _WAY_STEPS = 10
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
@@ -73,6 +81,12 @@ def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     return found
 
 
+def read_findings(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
+    """Return the findings about rows that can be checked, those of their drives among them."""
+    found, driven = FINDINGS.of(ids), _check_drives(ids)
+    return {pk: _worst_first((*one, *driven.get(pk, ()))) for pk, one in found.items()}
+
+
 FINDINGS = Measure("findings", tuple[Finding, ...], _compute)
 """The findings about rows that can be checked, the worst first."""
 
@@ -83,6 +97,7 @@ def check_augmentation(row: Augmentation) -> CheckedRow | None:
         return None
     try:
         findings = _check(row, load_ground(row.scenario), load_intent(row.scenario))
+        findings = _worst_first((*findings, *_check_drives([row.pk]).get(row.pk, ())))
     except (InvalidDocument, InvalidModification) as error:
         return CheckedRow(problem=str(error))
     return CheckedRow(findings=findings, is_against_intent=row.scenario.intent is not None)
@@ -125,7 +140,7 @@ def check_edit(
 
 def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
     """Guess a row's faults by its findings; None without a modification that can be read."""
-    findings = FINDINGS.of([row.pk]).get(row.pk)
+    findings = read_findings([row.pk]).get(row.pk)
     return None if findings is None else first_guess(findings)
 
 
@@ -135,6 +150,28 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
 def _check(row: Augmentation, ground: Ground, intent: Intent | None) -> tuple[Finding, ...]:
     modification = modification_from_document(row.modification)
     return _worst_first(check_against_intent(ground, modification, intent))
+
+
+def _check_drives(ids: Collection[int]) -> dict[int, list[Finding]]:
+    """Hold drives of the built-in planners, with recorded traffic, against open wishes."""
+    driven = Simulation.objects.filter(augmentation__in=ids, state=Simulation.State.DONE)
+    plain = driven.filter(planner__in=NAMED, offsets="paper", is_reactive=False)
+    rows = plain.filter(scenario__intent__has_key="purpose").order_by("planner", "version")
+    columns = rows.values_list("augmentation", "planner", "document", "scenario__intent")
+    newest = {(pk, planner): rest for pk, planner, *rest in columns}
+    found: defaultdict[int, list[Finding]] = defaultdict(list)
+    for (pk, planner), (drive, intent) in newest.items():
+        purpose, document = intent_from_document(intent).purpose, drive or {}
+        critical = document.get("criticality", {})
+        if purpose is not None and "required_braking_mps2" in critical:
+            found[pk] += check_drive(
+                purpose,
+                planner,
+                braking_mps2=critical["required_braking_mps2"],
+                ttc_s=math.inf if critical["least_ttc_s"] is None else critical["least_ttc_s"],
+                crashes=bool(document["collisions"]),
+            )
+    return found
 
 
 def _worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:

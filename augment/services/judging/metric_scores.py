@@ -9,7 +9,7 @@ from augment.checks import Severity
 from augment.models import Augmentation, Contestant, Simulation
 from augment.services.driving.simulations import SCORES, Options
 from augment.services.judging.displacement import of_rows
-from augment.services.judging.findings import FINDINGS
+from augment.services.judging.findings import read_findings
 
 SAME_M = 0.15
 """Displacements that differ by no more are equal: objects so near each other look the same."""
@@ -53,7 +53,7 @@ def _displacement(ids: Collection[int]) -> MetricScores:
 def _checks(ids: Collection[int]) -> MetricScores:
     """Fewer wrong findings are better, then fewer doubtful ones; no answer is worst."""
     rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
-    found, scores = FINDINGS.of(ids), dict[str, float]()
+    found, scores = read_findings(ids), dict[str, float]()
     for pk, code, state in rows.values_list("pk", "code", "state"):
         if state in UNREADABLE_OR_REFUSED:
             scores[str(code)] = -math.inf

@@ -29,6 +29,7 @@ SOURCE = "authored"
 _SHARED = {
     CatalogueSet.MOVING: (CatalogueSet.PAPER, CatalogueSet.HARD),
     CatalogueSet.FOLLOW_UPS: (CatalogueSet.PAPER,),
+    CatalogueSet.OPEN: (CatalogueSet.PAPER, CatalogueSet.HARD),
 }
 """Sets on scenes of others."""
 Problems = list[tuple[str, str]]
@@ -147,8 +148,8 @@ def load_catalogue(
     made on it, and the report names them.
 
     Args:
-        folder: Holds `scenes` and `scenarios`, and those of the other sets in `hard` and
-            `moving`; None for what comes with the project.
+        folder: Holds `scenes` and `scenarios`, and those of the other sets in folders of
+            their names; None for what comes with the project.
         actor: Who did it.
         sets: Which parts of it.
         with_paraphrases: Whether every paraphrase becomes a scenario of its own beside the one

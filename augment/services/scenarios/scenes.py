@@ -26,6 +26,7 @@ from augment.scene.density import keep_clear, spawn_traffic
 from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
+from augment.scene.intent_parts import Aim
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_motions
@@ -62,15 +63,15 @@ def label_for(name: str) -> str:
     """
     if known_type(name) is not None:
         return ""
-    if name in list(MotionPreset):
-        return MotionPreset(name).label
+    for kind in (MotionPreset, Aim):
+        if name in list(kind):
+            return kind(name).label
     if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
         known = ", ".join(one.value for one in ScenarioType)
-        rule = f"one of {known}, or lower-case letters, digits and single _ or -"
-        problem = f"{name!r} must be {rule}, at most {LONGEST_TYPE}"
-        raise InvalidDocument("scenario", [("type", problem)])
-    before = Scenario.objects.filter(type=name).values_list("type_label", flat=True).first()
-    return before or re.sub(r"[_-]", " ", name).capitalize()
+        rule = f"one of {known}, or up to {LONGEST_TYPE} lower-case letters, digits, _ or -"
+        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
+    before = Scenario.objects.filter(type=name).values_list("type_label", flat=True)
+    return before.first() or re.sub(r"[_-]", " ", name).capitalize()
 
 
 SLUG_LENGTH = 80
@@ -434,9 +435,8 @@ def scene_key(scenario: Scenario) -> str:
 
 def load_reference(scenario: Scenario) -> entities.Modification | None:
     """The human modification, None for a scenario without one."""
-    if scenario.reference is None:
-        return None
-    return codec.modification_from_document(scenario.reference)
+    document = scenario.reference
+    return None if document is None else codec.modification_from_document(document)
 
 
 def load_intent(scenario: Scenario) -> Intent | None:
