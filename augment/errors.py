@@ -47,13 +47,13 @@ class UnknownName(AugmentError):
         super().__init__(f"Unknown {kind} '{name}'. Known: {', '.join(allowed) or 'none yet'}.")
 
 
-def check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
+def check_names(kind: str, names: Iterable[str], allowed_names: Iterable[str]) -> None:
     """Do nothing where all names are known.
 
     Raises:
         UnknownName: For the first that is not.
     """
-    allowed = list(known)
+    allowed = list(allowed_names)
     for name in names:
         if name not in allowed:
             raise UnknownName(kind, name, allowed)

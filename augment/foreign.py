@@ -53,8 +53,8 @@ def look_up(table: Mapping[Key, Value], key: object, place: str) -> Value:
     try:
         return table[key]  # type: ignore[index]
     except (KeyError, TypeError):
-        known = ", ".join(map(str, [*table][:_MOST_LISTED]))
-        raise fault_at(place, f"unknown {str(key)[:40]!r}; known: {known}") from None
+        choices = ", ".join(map(str, [*table][:_MOST_LISTED]))
+        raise fault_at(place, f"unknown {str(key)[:40]!r}; known: {choices}") from None
 
 
 def read_numbers(rows: Any, place: str, columns: int | None = None) -> FloatArray:

@@ -124,34 +124,34 @@ class RequestBody(StrictSerializer):
     def get_fields(self) -> dict[str, Field]:
         """Return a field for each input."""
         return {
-            one.name: body_field(one) for one in to_inputs(self.request)
+            item.name: body_field(item) for item in to_inputs(self.request)
         } | super().get_fields()
 
 
-def body_field(asked: Input) -> Field:
+def body_field(declared: Input) -> Field:
     """Return the field of a body."""
-    given: dict[str, Any] = {"help_text": asked.explanation, "required": asked.is_required}
-    if not asked.is_required:
-        given["default"] = asked.default
-        given["allow_null"] = asked.default is None
-    bounds: dict[str, Any] = {"min_value": asked.least, "max_value": asked.most}
-    match asked.kind:
+    options: dict[str, Any] = {"help_text": declared.explanation, "required": declared.is_required}
+    if not declared.is_required:
+        options["default"] = declared.default
+        options["allow_null"] = declared.default is None
+    bounds: dict[str, Any] = {"min_value": declared.least, "max_value": declared.most}
+    match declared.kind:
         case InputKind.TEXT:
-            given["allow_blank"] = asked.default == ""
-            return TextField(**given | {"max_length": asked.most})
+            options["allow_blank"] = declared.default == ""
+            return TextField(**options | {"max_length": declared.most})
         case InputKind.WHOLE:
-            return WholeNumberField(**given, **bounds)
+            return WholeNumberField(**options, **bounds)
         case InputKind.NUMBER:
-            return NumberField(**given, **bounds)
+            return NumberField(**options, **bounds)
         case InputKind.DECIMAL:
-            return serializers.DecimalField(16, 9, **given, **bounds)
+            return serializers.DecimalField(16, 9, **options, **bounds)
         case InputKind.SWITCH:
-            return FlagField(**given)
+            return FlagField(**options)
         case InputKind.CHOICE:
-            return serializers.ChoiceField(**given, choices=list(asked.choices))
+            return serializers.ChoiceField(**options, choices=list(declared.choices))
         case InputKind.LINES:
             line = TextField(max_length=LONGEST_LINE, allow_blank=True)
-            return serializers.ListField(**given, child=line, max_length=MOST_LINES)
+            return serializers.ListField(**options, child=line, max_length=MOST_LINES)
         case InputKind.NAMES:
             name = TextField(max_length=LONGEST_NAME)
-            return serializers.ListField(**given, child=name, max_length=MOST_NAMES)
+            return serializers.ListField(**options, child=name, max_length=MOST_NAMES)

@@ -33,7 +33,7 @@ from arena.shell.receipts import StoredAnswer, answer_once, digest_body
 from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)
-Given = dict[str, Any]
+Params = dict[str, Any]
 """The validated body or query of a request."""
 
 
@@ -71,7 +71,7 @@ class ApiView(APIView):
     def answer_page(
         self,
         rows: QuerySet[Row],
-        query: Given,
+        query: Params,
         line: type[serializers.Serializer[Any]],
         *,
         order: str = "-pk",
@@ -99,12 +99,12 @@ class ApiView(APIView):
             if last is None:
                 raise ValidationError({"after": ["No row of this list has that code."]})
             rows = rows.filter(**{f"{column}__{sign}": last})
-        found = list(rows[: limit + 1])
-        shown = found[:limit]
+        candidates = list(rows[: limit + 1])
+        shown = candidates[:limit]
         body: dict[str, Any] = {"results": line(lines(shown), many=True).data, "next": None}
-        if len(found) > limit:
-            kept = self.request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
-            body["next"] = f"{self.request.path}?{urlencode(kept)}"
+        if len(candidates) > limit:
+            next_query = self.request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
+            body["next"] = f"{self.request.path}?{urlencode(next_query)}"
         return Response(body)
 
 
@@ -133,8 +133,8 @@ class WarnedDocument(serializers.Serializer[Any]):
 
     def get_warnings(self, row: Any) -> list[str]:
         """Return the warnings that the request collected."""
-        found: list[str] = self.context.get("warnings", [])
-        return found
+        warnings: list[str] = self.context.get("warnings", [])
+        return warnings
 
 
 def keep_and_send(keep: Callable[[], Row], send: Callable[[int], object]) -> tuple[Row, list[str]]:
@@ -224,16 +224,16 @@ class ArenaSchema(AutoSchema):
     """Adds the errors that every operation can have."""
 
     def _get_response_bodies(self, direction: Any = "response") -> dict[str, Any]:
-        found: dict[str, Any] = super()._get_response_bodies(direction)
+        bodies: dict[str, Any] = super()._get_response_bodies(direction)
         reads = self.method in SAFE_METHODS
         for status, meaning in (ERRORS if reads else ERRORS_OF_CHANGES).items():
             answer: dict[str, Any] = self._get_response_for_code(  # type: ignore[no-untyped-call]
                 ErrorBody, str(status), [JSON]
             )
-            found[str(status)] = answer | {"description": meaning}
+            bodies[str(status)] = answer | {"description": meaning}
         if reads and not getattr(self.view, "is_never_cached", False):
-            found["304"] = {"description": "Unchanged since the ETag that came with the request."}
-        return dict(sorted(found.items()))
+            bodies["304"] = {"description": "Unchanged since the ETag that came with the request."}
+        return dict(sorted(bodies.items()))
 
 
 def operation(
@@ -246,7 +246,7 @@ def operation(
 ) -> Callable[[Callable[..., Any]], Callable[..., HttpResponseBase]]:
     """Describe an operation by its docstring, validate its input, and serialize its result.
 
-    The method gets the validated body or query as `given`. It returns what `answers` serializes,
+    The method gets the validated body or query as `params`. It returns what `answers` serializes,
     beside a list of warnings where workers are involved, or a finished response.
 
     Args:
@@ -264,9 +264,9 @@ def operation(
 
         def act(view: Any, request: Request, **path: Any) -> HttpResponseBase:
             if takes is not None:
-                path["given"] = validate(takes, request.data)
+                path["params"] = validate(takes, request.data)
             elif query is not None:
-                path["given"] = validate(query, request.query_params.dict())
+                path["params"] = validate(query, request.query_params.dict())
             result = method(view, **path)
             if isinstance(result, HttpResponseBase):
                 return result
@@ -315,9 +315,9 @@ def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[s
     Raises:
         ValidationError: A field is unknown, missing or invalid.
     """
-    given = serializer(data=data)
-    given.is_valid(raise_exception=True)
-    return dict(given.validated_data)
+    checked = serializer(data=data)
+    checked.is_valid(raise_exception=True)
+    return dict(checked.validated_data)
 
 
 def file_operation(
@@ -331,7 +331,7 @@ def file_operation(
         exports: What the `name` and the `form` in its path choose from.
     """
     exports = exports or {}
-    formats = {name: form for one in exports.values() for name, form in one.formats.items()}
+    formats = {name: form for export in exports.values() for name, form in export.formats.items()}
     parts = [
         OpenApiParameter(part, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(allowed))
         for part, allowed in (("name", exports), ("form", formats))

@@ -61,18 +61,18 @@ def read_media(url: str) -> dict[str, Any]:
     """
     if not url:
         return {"BACKEND": "arena.config.storage.WholeFiles"}
-    found = re.fullmatch(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(/[^?]*)?(?:\?(.*))?", url)
-    wanted = dict(parse_qsl(found[3])) if found and found[3] else {}
+    match = re.fullmatch(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(/[^?]*)?(?:\?(.*))?", url)
+    wanted = dict(parse_qsl(match[3])) if match and match[3] else {}
     endpoint = urlsplit(wanted.get("endpoint", "https://given"))
     is_address = endpoint.scheme in {"http", "https"} and bool(endpoint.hostname)
-    if not found or not wanted.keys() <= {"endpoint", "region"} or not is_address:
+    if not match or not wanted.keys() <= {"endpoint", "region"} or not is_address:
         raise ValueError(
             "use s3://BUCKET/PREFIX?endpoint=https://HOST:PORT&region=REGION, all but BUCKET "
             "optional"
         )
     options = {
-        "bucket_name": found[1],
-        "location": (found[2] or "").strip("/"),
+        "bucket_name": match[1],
+        "location": (match[2] or "").strip("/"),
         "endpoint_url": wanted.get("endpoint"),
         "region_name": wanted.get("region"),
     }

@@ -31,13 +31,13 @@ HTTPS = ENV.ARENA_HTTPS
 
 def _secret_key() -> str:
     """From the environment, else a key that is made once and kept in var/."""
-    kept = VAR_DIR / "secret_key"
+    path = VAR_DIR / "secret_key"
     if ENV.ARENA_SECRET_KEY:
         return ENV.ARENA_SECRET_KEY
-    if not kept.exists():
+    if not path.exists():
         # The server and its workers start at once: the first key made is the key of all.
-        write_once(kept, secrets.token_urlsafe(50).encode())
-    return kept.read_text()
+        write_once(path, secrets.token_urlsafe(50).encode())
+    return path.read_text()
 
 
 SECRET_KEY = _secret_key()
@@ -169,12 +169,12 @@ def _database() -> dict[str, object]:
     readers go on meanwhile. FULL: what is confirmed is on the disk, also after a power cut; it
     costs a vote 0.3 ms.
     """
-    found: dict[str, object] = ENV.DATABASE_URL or {
+    engine: dict[str, object] = ENV.DATABASE_URL or {
         "ENGINE": "django.db.backends.sqlite3",
         "NAME": str(VAR_DIR / "arena.sqlite3"),  # not every path can be written as a URL
     }
-    if found["ENGINE"] == "django.db.backends.sqlite3":
-        found["OPTIONS"] = {
+    if engine["ENGINE"] == "django.db.backends.sqlite3":
+        engine["OPTIONS"] = {
             "timeout": 20,
             "transaction_mode": "IMMEDIATE",
             # Else INSERT OR REPLACE would pass by the triggers that refuse to delete.
@@ -182,13 +182,13 @@ def _database() -> dict[str, object]:
             "PRAGMA recursive_triggers=ON;",
         }
         # Tests run on a file as well: threads that vote at once need what a memory database lacks.
-        found["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}
-        make_sqlite_file(Path(str(found["NAME"])))
+        engine["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}
+        make_sqlite_file(Path(str(engine["NAME"])))
     else:
-        found["CONN_HEALTH_CHECKS"] = True
+        engine["CONN_HEALTH_CHECKS"] = True
     # Opening a connection for every request would cost as much as a vote, on SQLite as well.
-    found["CONN_MAX_AGE"] = 600
-    return found
+    engine["CONN_MAX_AGE"] = 600
+    return engine
 
 
 DATABASES = {"default": _database()}

@@ -13,8 +13,8 @@ from arena.api.access import ADMINS, STAFF
 from arena.api.fields import RequestBody, StrictSerializer, TextField
 from arena.api.views import (
     ApiView,
-    Given,
     PageQuery,
+    Params,
     RowDocument,
     WarnedDocument,
     keep_and_send,
@@ -73,21 +73,21 @@ class ContestantsView(ApiView):
     readers, writers = STAFF, ADMINS
 
     @operation(page_serializer(ContestantDocument), query=ContestantQuery, name="listContestants")
-    def get(self, given: Given) -> Response:
+    def get(self, params: Params) -> Response:
         """Contestants by slug.
 
         Retired ones have a date in `retired_at`.
         """
         rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-        return self.answer_page(rows, given, ContestantDocument, order="slug")
+        return self.answer_page(rows, params, ContestantDocument, order="slug")
 
     @operation(ContestantDocument, takes=ContestantBody, status=201, name="createContestant")
-    def post(self, given: Given) -> Contestant:
+    def post(self, params: Params) -> Contestant:
         """Add a contestant that asks a language model.
 
         The same one twice is one.
         """
-        return add_contestant(ContestantRequest(**given), self.user)
+        return add_contestant(ContestantRequest(**params), self.user)
 
 
 class EndpointDocument(RowDocument[Endpoint]):
@@ -148,12 +148,12 @@ class EndpointsView(ApiView):
     writers = ADMINS
 
     @operation(EndpointDocument, takes=EndpointBody, status=201, name="createEndpoint")
-    def post(self, given: Given) -> Endpoint:
+    def post(self, params: Params) -> Endpoint:
         """Add an endpoint.
 
         409 where the label is taken.
         """
-        return add_endpoint(EndpointRequest(**given), self.user)
+        return add_endpoint(EndpointRequest(**params), self.user)
 
 
 class ModelsView(ApiView):
@@ -162,13 +162,13 @@ class ModelsView(ApiView):
     writers = ADMINS
 
     @operation(EndpointModelDocument, takes=NewModelBody, status=201, name="addModel")
-    def post(self, code: uuid.UUID, given: Given) -> EndpointModel:
+    def post(self, code: uuid.UUID, params: Params) -> EndpointModel:
         """Add a model to an endpoint and have it probed.
 
         Comes with its listed price; all else is unknown before the probe's end.
         """
         row = get_object_or_404(Endpoint, code=code)
-        plan = partial(add_model, row, model=given["model"], actor=self.user)
+        plan = partial(add_model, row, model=params["model"], actor=self.user)
         return keep_and_send(plan, enqueue_probe)[0].model
 
 
@@ -183,10 +183,10 @@ class ProbeView(ApiView):
 
         Line by line while it runs; 404 before the first.
         """
-        found = _model(code).probes.first()
-        if found is None:
+        probe = _model(code).probes.first()
+        if probe is None:
             raise Http404
-        return found
+        return probe
 
     @operation(ProbeDocument, status=202, name="probeModel")
     def post(self, code: uuid.UUID) -> tuple[Probe, list[str]]:

@@ -48,7 +48,7 @@ class OptionsForm(RequestForm):
     @property
     def option_fields(self) -> list[forms.BoundField]:
         """For the template."""
-        return [self[one.name] for one in OPTION_INPUTS]
+        return [self[field.name] for field in OPTION_INPUTS]
 
     @property
     def has_options(self) -> bool:
@@ -60,7 +60,7 @@ class ContestantForm(OptionsForm):
     """A model, a variant, and how it asks."""
 
     inputs = (
-        *(one for one in to_inputs(ContestantRequest) if one.name in ("variant", "name")),
+        *(field for field in to_inputs(ContestantRequest) if field.name in ("variant", "name")),
         *OPTION_INPUTS,
     )
     model = forms.ChoiceField(label="Model")
@@ -73,18 +73,18 @@ class ContestantForm(OptionsForm):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        known = EndpointModel.objects.order_by("endpoint__label", "model")
-        pairs = known.values_list("endpoint__label", "model")
+        models = EndpointModel.objects.order_by("endpoint__label", "model")
+        pairs = models.values_list("endpoint__label", "model")
         choices = [(f"{at}{SEPARATOR}{model}", f"{model} at {at}") for at, model in pairs]
         offer(self, "model", choices)
 
     def to_request(self) -> ContestantRequest:
         """Return the request; the short name is made where none is entered."""
-        given = self.cleaned_data
-        options = read_values(OPTION_INPUTS, given)
-        endpoint, model = given["model"].split(SEPARATOR, 1)
-        slug = given["slug"] or free_slug(model, given["variant"], options)
-        whole = given | {"endpoint": endpoint, "model": model, "slug": slug}
+        values = self.cleaned_data
+        options = read_values(OPTION_INPUTS, values)
+        endpoint, model = values["model"].split(SEPARATOR, 1)
+        slug = values["slug"] or free_slug(model, values["variant"], options)
+        whole = values | {"endpoint": endpoint, "model": model, "slug": slug}
         return read_request(ContestantRequest, whole, options=options)
 
 

@@ -41,7 +41,7 @@ def probe_state(model: EndpointModel, probe: Probe | None) -> str:
     if probe is not None and probe.state in (*Probe.UNDER_WAY, Probe.State.FAILED):
         return "failed" if probe.state == Probe.State.FAILED else "asked"
     findings = (model.probe_report or {}).get("findings", ())
-    answers = {found["ability"]: found["has_it"] for found in findings}.get("answers")
+    answers = {finding["ability"]: finding["has_it"] for finding in findings}.get("answers")
     return {True: "works", False: "silent", None: "unknown"}[answers]
 
 
@@ -60,12 +60,12 @@ def show_options(
     lacking = list_unsent_options(contestant)
     lines = [
         {
-            "label": one.label,
-            "value": one.shown(options[one.name]),
-            "is_chosen": one.name in contestant.options,
-            "left_out": [role for role, names in lacking.items() if one.name in names],
+            "label": option.label,
+            "value": option.shown(options[option.name]),
+            "is_chosen": option.name in contestant.options,
+            "left_out": [role for role, names in lacking.items() if option.name in names],
         }
-        for one in OPTION_INPUTS
-        if one.name in options
+        for option in OPTION_INPUTS
+        if option.name in options
     ]
     return {"lines": lines, "is_frozen": contestant.frozen_options is not None}

@@ -117,8 +117,8 @@ def draw_interval(
         upright: Whether the bar stands.
         label: Of the mark, in a key.
     """
-    known = [value for value in interval if value is not None]
-    if not known:
+    present = [value for value in interval if value is not None]
+    if not present:
         return
     lower, middle, upper = interval
     colour, shape = (SIMULATED, "D") if simulated else (colour, "o")
@@ -126,14 +126,14 @@ def draw_interval(
     def at(value: float) -> tuple[float, float]:
         return (place, value) if upright else (value, place)
 
-    ends = zip(at(known[0]), at(known[-1]), strict=True)
+    ends = zip(at(present[0]), at(present[-1]), strict=True)
     axes.plot(*ends, color=colour, linewidth=1.6)
     if middle is None:
-        shape, middle = "_" if upright else "|", known[0]
+        shape, middle = "_" if upright else "|", present[0]
     look: dict[str, Any] = {"marker": shape, "markersize": 5, "linestyle": "", "color": colour}
     axes.plot(*zip(at(middle), strict=True), label=label or None, **look)
     if (lower is None) != (upper is None):
-        start, edge = (known[0], 0.0) if lower is None else (known[-1], 1.0)
+        start, edge = (present[0], 0.0) if lower is None else (present[-1], 1.0)
         to_edge = axes.get_xaxis_transform() if upright else axes.get_yaxis_transform()
         arrow = {"arrowstyle": "->", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", at(edge), at(start), to_edge, "data", arrowprops=arrow)

@@ -92,7 +92,7 @@ _UNIX = 3
 def zip_folder(folder: Path, packed: IO[bytes]) -> None:
     """Write a zip of a folder's files into an open one, one file after the other."""
     with zipfile.ZipFile(packed, "w") as archive:
-        for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+        for path in sorted(entry for entry in folder.rglob("*") if entry.is_file()):
             archive.writestr(_entry(path.relative_to(folder).as_posix()), path.read_bytes())
 
 

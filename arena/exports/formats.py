@@ -75,14 +75,14 @@ def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
     return made
 
 
-def format_named(known: Mapping[str, Named], name: str) -> Named:
+def format_named(named: Mapping[str, Named], name: str) -> Named:
     """Return the format of that name.
 
     Raises:
         UnknownName: It is none of the known ones.
     """
-    check_names("format", [name], known)
-    return known[name]
+    check_names("format", [name], named)
+    return named[name]
 
 
 def drawings(chart: Callable[..., bytes]) -> dict[str, Format[Any]]:
@@ -91,19 +91,19 @@ def drawings(chart: Callable[..., bytes]) -> dict[str, Format[Any]]:
 
 
 def download(
-    known: Mapping[str, Format[Table]], name: str, stem: str, table: Table
+    named: Mapping[str, Format[Table]], name: str, stem: str, table: Table
 ) -> HttpResponse:
     """Return a table as a file to be saved; 404 for a format that it does not have.
 
     Args:
-        known: The formats that it has.
+        named: The formats that it has.
         name: Which of them.
         stem: The file's name without its suffix.
         table: What they write.
     """
-    if name not in known:
+    if name not in named:
         raise Http404
-    chosen = known[name]
+    chosen = named[name]
     return attach(chosen.write(table), chosen.content_type, f"{stem}.{chosen.suffix}")
 
 

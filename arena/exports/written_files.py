@@ -73,7 +73,7 @@ def ask_for(row: Row, owner: Study | GenerationJob | Benchmark, **after: str) ->
     return row
 
 
-def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
+def keep_file(row: Row, lease: Lease[Row], made: MadeFile) -> None:
     """Store the content and remove older files of the same owner and kind.
 
     The content itself goes where a newer file was faster and has removed the row.
@@ -87,18 +87,18 @@ def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
         digest.update(piece)
     size_bytes = made.content.tell()
     made.content.seek(0)
-    kept = default_storage.save(stored, made.content)
+    stored_name = default_storage.save(stored, made.content)
     columns = {
         "name": made.name,
-        "stored": kept,
+        "stored": stored_name,
         "size_bytes": size_bytes,
         "digest": digest.hexdigest(),
         "warnings": list(made.warnings),
         "is_non_commercial": made.marked,
     }
     with transaction.atomic():
-        if not held.settle(Settlement(state=WrittenFile.State.READY, columns=columns)):
-            transaction.on_commit(partial(default_storage.delete, kept))
+        if not lease.settle(Settlement(state=WrittenFile.State.READY, columns=columns)):
+            transaction.on_commit(partial(default_storage.delete, stored_name))
             return
         # Locked, so that none is kept between the reading of its name and its removal.
         older = row.alike().filter(pk__lt=row.pk).order_by("pk").select_for_update()

@@ -17,8 +17,8 @@ from arena.api.fields import RequestBody
 from arena.api.views import (
     ApiView,
     FileView,
-    Given,
     PageQuery,
+    Params,
     RowDocument,
     WarnedDocument,
     file_operation,
@@ -89,9 +89,9 @@ class ProgressDocument(CountsDocument):
     calls = serializers.IntegerField(source="job.spent_calls")
     is_worked_on = serializers.SerializerMethodField()
 
-    def get_is_worked_on(self, found: JobCounts) -> bool:
+    def get_is_worked_on(self, counts: JobCounts) -> bool:
         """Return whether it is under way and workers run."""
-        return found.is_moving and workforce().works
+        return counts.is_moving and workforce().works
 
 
 class EstimateBody(RequestBody):
@@ -142,20 +142,22 @@ class JobsView(ApiView):
     readers, writers = STAFF, ADMINS
 
     @operation(page_serializer(JobDocument), query=JobQuery, name="listJobs")
-    def get(self, given: Given) -> Response:
+    def get(self, params: Params) -> Response:
         """Jobs, the youngest first.
 
         With their counts.
         """
-        return self.answer_page(GenerationJob.objects.all(), given, JobDocument, lines=count_each)
+        return self.answer_page(GenerationJob.objects.all(), params, JobDocument, lines=count_each)
 
     @operation(ChangedJobDocument, takes=JobBody, status=201, name="launchJob")
-    def post(self, given: Given) -> tuple[JobCounts, list[str]]:
+    def post(self, params: Params) -> tuple[JobCounts, list[str]]:
         """Launch a job.
 
         Workers begin at once.
         """
-        job, warnings = keep_and_send(partial(launch, JobRequest(**given), self.user), enqueue_job)
+        job, warnings = keep_and_send(
+            partial(launch, JobRequest(**params), self.user), enqueue_job
+        )
         return count_rows(job), warnings
 
 
@@ -193,12 +195,12 @@ class EstimateView(ApiView):
     writers = ADMINS
 
     @operation(EstimateDocument, takes=EstimateBody, name="estimateJob")
-    def post(self, given: Given) -> Any:
+    def post(self, params: Params) -> Any:
         """Return the estimate of a job.
 
         From recorded calls; null where there are none, or no price.
         """
-        return estimate(JobScope(**given))
+        return estimate(JobScope(**params))
 
 
 class JobExportView(FileView):
@@ -269,12 +271,12 @@ class FollowUpsView(ApiView):
     writers = ADMINS
 
     @operation(AugmentationDocument, takes=FollowUpBody, status=201, name="followUp")
-    def post(self, code: uuid.UUID, given: Given) -> tuple[Augmentation, list[str]]:
+    def post(self, code: uuid.UUID, params: Params) -> tuple[Augmentation, list[str]]:
         """Have a language model change its own answer further.
 
         A job of its own does it; to go back is to follow up an earlier step.
         """
-        ask = partial(ask_follow_up, _augmentation(code), FollowUpRequest(**given))
+        ask = partial(ask_follow_up, _augmentation(code), FollowUpRequest(**params))
         return keep_and_send(partial(ask, actor=self.user), enqueue_augmentation)
 
 

@@ -118,15 +118,15 @@ def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:
 
 def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
     """The class of the model that modifies, by the contestant's primary key; one query."""
-    asked = [row for row in contestants if row.endpoint_id is not None]
-    wanted = Q(endpoint__in={row.endpoint_id for row in asked})
-    known = {
+    own = [row for row in contestants if row.endpoint_id is not None]
+    wanted = Q(endpoint__in={row.endpoint_id for row in own})
+    sizes = {
         (endpoint, model): EndpointModel.ModelClass(classes).value
         for endpoint, model, classes in EndpointModel.objects.filter(wanted)
         .exclude(model_class="")
         .values_list("endpoint", "model", "model_class")
     }
-    classes = {row.pk: known.get((row.endpoint_id or 0, row.model)) for row in asked}
+    classes = {row.pk: sizes.get((row.endpoint_id or 0, row.model)) for row in own}
     return {pk: name for pk, name in classes.items() if name is not None}
 
 

@@ -100,11 +100,11 @@ def save_label(
     if task is None:
         raise NotYours("This picture is not yours to label.")
     seen = {fault.value: fault in faults for fault in FaultClass}
-    known = FaultLabel.objects.filter(task=task).first()
-    if known is not None:
-        if any(getattr(known, name) != value for name, value in seen.items()):
+    label = FaultLabel.objects.filter(task=task).first()
+    if label is not None:
+        if any(getattr(label, name) != value for name, value in seen.items()):
             raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
-        return known
+        return label
     if task.labelling.closed_at is not None:
         raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
     guessed = guess_faults(task.augmentation)
@@ -122,9 +122,9 @@ def save_label(
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:
-    known = {user.username: user for user in expert_accounts()}
-    check_names("expert", usernames, sorted(known))
-    experts = [known[username] for username in sorted(set(usernames))]
+    by_username = {user.username: user for user in expert_accounts()}
+    check_names("expert", usernames, sorted(by_username))
+    experts = [by_username[username] for username in sorted(set(usernames))]
     simulated = [user.username for user in experts if user.person.is_simulated]
     if simulated:
         raise Conflict(f"Simulated experts label nothing: {', '.join(simulated)}.")

@@ -54,9 +54,9 @@ def prepare(say: Callable[[str], None]) -> None:
     models.Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
     say(f"Contestants: {', '.join(models.Contestant.objects.values_list('slug', flat=True))}")
-    known = set(User.objects.values_list("username", flat=True))
+    usernames = set(User.objects.values_list("username", flat=True))
     for username, role in PEOPLE:
-        if username not in known:
+        if username not in usernames:
             create_person(username=username, password=PASSWORD, role=role)
     demo.add_experts()
 
@@ -128,8 +128,8 @@ def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:
     if not Study.objects.filter(name=OPEN_STUDY).exists():
         # Two of a scenario's six pairs can be decided, and nobody sees one twice.
         votes = min(YOUR_VOTES, 2 * len(scenarios))
-        asked = demo.study_asked(OPEN_STUDY, scenarios) | {"experts": ["expert"]}
-        open_study(StudyPlan.read(asked | {"votes_per_expert": votes}))
+        values = demo.study_asked(OPEN_STUDY, scenarios) | {"experts": ["expert"]}
+        open_study(StudyPlan.read(values | {"votes_per_expert": votes}))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []

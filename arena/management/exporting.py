@@ -120,8 +120,8 @@ def _write_votes(options: Chosen, say: Say) -> ExportedFile:
 # --- Of a job ------------------------------------------------------------------------------------
 
 
-def _write_table(name: str, asked: Chosen, **more: Any) -> ExportedFile:
-    return _write(JOB_FILES[name], asked["format"], lambda: find_job(asked["job"]), **more)
+def _write_table(name: str, chosen: Chosen, **more: Any) -> ExportedFile:
+    return _write(JOB_FILES[name], chosen["format"], lambda: find_job(chosen["job"]), **more)
 
 
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
@@ -158,8 +158,12 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         find_job(options["job"]), file_format=options["format"], contestant=options["contestant"]
     )
     written = exported.written
-    told = {"Left out": exported.missing, "Refused": written.refused, "Lost": written.losses}
-    for word, losses in told.items():
+    losses_by_word = {
+        "Left out": exported.missing,
+        "Refused": written.refused,
+        "Lost": written.losses,
+    }
+    for word, losses in losses_by_word.items():
         for loss in losses:
             say(f"{word}: {loss}.")
     for warning in exported.warnings:

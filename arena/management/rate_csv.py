@@ -195,12 +195,12 @@ class RatedCsv:
     def method(self) -> str:
         """Method behind the numbers, in one line."""
         board = self.board
-        found = (
+        origin = (
             f"in closed form ({_CLUSTERED[board.unit]})"
             if board.intervals is Intervals.CLOSED_FORM
             else f"by {board.rounds} resamples ({board.unit.value}), seed {board.seed}"
         )
-        return f"{METHOD_TEXTS[board.method]}; 95 % intervals {found}"
+        return f"{METHOD_TEXTS[board.method]}; 95 % intervals {origin}"
 
     @property
     def missing(self) -> list[str]:
@@ -270,9 +270,9 @@ def _write_json(rated: RatedCsv) -> str:
     return json.dumps(_round(document), indent=2, ensure_ascii=False) + "\n"
 
 
-def _pairs(board: Leaderboard, found: Separation) -> list[dict[str, Any]]:
+def _pairs(board: Leaderboard, separation: Separation) -> list[dict[str, Any]]:
     """Pairs with p-values adjusted for all of them."""
-    pairs = found.judged([line.name for line in board.lines])
+    pairs = separation.judged([line.name for line in board.lines])
     return [
         {
             **{name: getattr(pair, name) for name in ("a", "b", "difference", "lower", "upper")},

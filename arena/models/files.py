@@ -57,8 +57,8 @@ class WrittenFile(Work):
 
 def state_is_known(name: str) -> models.CheckConstraint:
     """No other state than those above."""
-    known = ["queued", "running", "ready", "failed"]
-    return models.CheckConstraint(name=name, condition=Q(state__in=known))
+    states = ["queued", "running", "ready", "failed"]
+    return models.CheckConstraint(name=name, condition=Q(state__in=states))
 
 
 def ready_is_stored(name: str) -> models.CheckConstraint:

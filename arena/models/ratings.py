@@ -30,8 +30,8 @@ class ResultsField(_JSONField):
         name, _, args, kwargs = super().deconstruct()
         return name, "django.db.models.JSONField", args, kwargs | {"default": dict}
 
-    def from_db_value(self, *given: Any) -> Any:
-        return self.to_python(super().from_db_value(*given))
+    def from_db_value(self, *arguments: Any) -> Any:
+        return self.to_python(super().from_db_value(*arguments))
 
     def to_python(self, value: Any) -> Any:
         return read_results(value) if isinstance(value, dict) else value

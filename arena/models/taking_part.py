@@ -257,5 +257,5 @@ class StudyDraft(CodedModel):
 
     def names_in(self, field: str) -> list[str]:
         """Return the names chosen in a field."""
-        found: Any = self.entered.get(field, [])
-        return list(found)
+        names: Any = self.entered.get(field, [])
+        return list(names)

@@ -67,27 +67,27 @@ def deal(
     Raises:
         NothingToPlan: A pair has no scenario left for any of them.
     """
-    known = {name: set(main_units(grid, so_far[name])) for name in to}
+    columns_of = {name: set(main_units(grid, so_far[name])) for name in to}
     counts = judges(grid, so_far)
     dealt: dict[str, list[GridUnit]] = {name: [] for name in to}
     for index in rng.permutation(len(units)):
         wanted = units[index]
         order = sorted(to, key=lambda name: (len(dealt[name]), rng.random()))
-        fits = [name for name in order if wanted not in known[name]]
+        fits = [name for name in order if wanted not in columns_of[name]]
         taker, scenario = (
             (fits[0], wanted.scenario)
             if fits
-            else _find_elsewhere(grid, counts, known, order, wanted, rng)
+            else _find_elsewhere(grid, counts, columns_of, order, wanted, rng)
         )
         dealt[taker].append(GridUnit(wanted.pair, scenario))
-        known[taker].add(dealt[taker][-1])
+        columns_of[taker].add(dealt[taker][-1])
     return dealt
 
 
 def _find_elsewhere(
     grid: Grid,
     counts: IntArray,
-    known: Mapping[str, set[GridUnit]],
+    columns_of: Mapping[str, set[GridUnit]],
     order: Sequence[str],
     wanted: GridUnit,
     rng: np.random.Generator,
@@ -95,7 +95,7 @@ def _find_elsewhere(
     """Return who judges the pair on which other scenario."""
     for name in order:
         columns = rng.permutation(np.flatnonzero(grid.showable[wanted.pair])).tolist()
-        free = [column for column in columns if (wanted.pair, column) not in known[name]]
+        free = [column for column in columns if (wanted.pair, column) not in columns_of[name]]
         if free:
             best = min(free, key=lambda column: counts[wanted.pair, column])
             counts[wanted.pair, best] += 1

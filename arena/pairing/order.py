@@ -73,11 +73,11 @@ def order_units(
     for row, more in zip(counts, extras, strict=True):
         for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
             row[scenario] += 1
-    held = min(largest_gap(_sum_samples(row, bases), gap) for row in counts)
+    best_gap = min(largest_gap(_sum_samples(row, bases), gap) for row in counts)
     return [
-        _order(mine, more, row, held, distance, rng, bases)
+        _order(mine, more, row, best_gap, distance, rng, bases)
         for mine, more, row in zip(chosen, extras, counts, strict=True)
-    ], held
+    ], best_gap
 
 
 def _order(

@@ -154,8 +154,8 @@ class Grid:
     def bases(self) -> IntArray:
         """(S,) which columns are samples of one scenario: those with the same number."""
         names = [scenario_at(place) for place in self.scenarios]
-        known = {name: number for number, name in enumerate(dict.fromkeys(names))}
-        return np.array([known[name] for name in names], dtype=np.int64)
+        numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+        return np.array([numbers[name] for name in names], dtype=np.int64)
 
 
 def make_grid(
@@ -167,7 +167,7 @@ def make_grid(
 
     Pairs without a challenger are neither, where there are challengers.
     """
-    settled = {(scenario, *sorted((one, other))) for scenario, one, other in alike}
+    settled = {(scenario, *sorted((first, other))) for scenario, first, other in alike}
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in entries}
     scenarios = tuple(sorted({entry.scenario for entry in entries}))
     contestants = sorted({entry.contestant for entry in entries})
@@ -201,9 +201,9 @@ def draw_shown(alike: Sequence[Triple], entries: Sequence[Entry], *, seed: int) 
     """Return the pairs to show, a tenth of those whose pictures differ at all, sorted."""
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in entries}
     differing = sorted(
-        (place, one, other)
-        for place, one, other in alike
-        if pictures[place, one] != pictures[place, other]
+        (place, first, other)
+        for place, first, other in alike
+        if pictures[place, first] != pictures[place, other]
     )
     number = round(SHOWN_SHARE * len(differing))
     return sorted(Random(f"shown {seed}").sample(differing, number))

@@ -188,12 +188,12 @@ def _exchange(
     gain[~fits] = 0
     if not gain.size or not gain.max():
         return False
-    one, other = np.unravel_index(int(gain.argmax()), gain.shape)
+    first, other = np.unravel_index(int(gain.argmax()), gain.shape)
     for unit, change in (
-        ((pair[one], scenario[one]), -1),
+        ((pair[first], scenario[first]), -1),
         ((pair[other], scenario[other]), -1),
-        ((pair[one], scenario[other]), 1),
-        ((pair[other], scenario[one]), 1),
+        ((pair[first], scenario[other]), 1),
+        ((pair[other], scenario[first]), 1),
     ):
         mine[unit] = change > 0
         judges[unit] += change
@@ -211,8 +211,8 @@ def _take_over(mine: BoolArray, judges: IntArray, _: BoolArray, rng: np.random.G
         here, there = alone[:, None, axis], others[None, :, axis]
         for counts in (mine.sum(axis=1 - axis), judges.sum(axis=1 - axis)):
             cost = cost + np.where(here == there, 0, counts[there] - counts[here] + 1)
-    given, taken = np.unravel_index(int(cost.argmin()), cost.shape)
-    for unit, change in ((alone[given], -1), (others[taken], 1)):
+    giver, taken = np.unravel_index(int(cost.argmin()), cost.shape)
+    for unit, change in ((alone[giver], -1), (others[taken], 1)):
         mine[tuple(unit)] = change > 0
         judges[tuple(unit)] += change
     return True

@@ -9,7 +9,7 @@ from rest_framework import serializers
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
 from arena.api.tokens import make_api_token
-from arena.api.views import ApiView, Given, operation
+from arena.api.views import ApiView, Params, operation
 from arena.people.links import accept, find_invitation, make_link_path
 from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin
 from arena.shell.accounts import ROLES, role_given, top_role
@@ -78,12 +78,12 @@ class PeopleView(ApiView):
     writers = ADMINS
 
     @operation(NewPersonDocument, takes=PersonBody, status=201, name="createPerson")
-    def post(self, given: Given) -> User:
+    def post(self, params: Params) -> User:
         """Make an account and the link that lets its owner in.
 
         The link is shown this once.
         """
-        made = create_person(**given, password=None, actor=self.user)
+        made = create_person(**params, password=None, actor=self.user)
         path = make_link_path(made, actor=self.user)
         made.link = self.request.build_absolute_uri(path)  # type: ignore[attr-defined]
         return made
@@ -96,13 +96,13 @@ class FirstView(ApiView):
     permission_classes = ()
 
     @operation(TokenDocument, takes=FirstBody, status=201, name="makeFirstAdmin")
-    def post(self, given: Given) -> dict[str, Any]:
+    def post(self, params: Params) -> dict[str, Any]:
         """Make the first admin by the link that `serve` prints.
 
         Answers with a token of the new admin.
         """
         user = make_first_admin(
-            code=given["link"], username=given["username"], password=given["password"]
+            code=params["link"], username=params["username"], password=params["password"]
         )
         return _token(user, "first start")
 
@@ -114,16 +114,16 @@ class WelcomeView(ApiView):
     permission_classes = ()
 
     @operation(TokenDocument, takes=WelcomeBody, status=201, name="acceptWelcome")
-    def post(self, given: Given) -> dict[str, Any]:
+    def post(self, params: Params) -> dict[str, Any]:
         """Exchange the link of an account for a token in its role.
 
         Anybody but an expert sets a password by it.
         """
-        end = end_of_link(given["link"])
+        end = end_of_link(params["link"])
         with transaction.atomic():  # the link stays valid where no token can be made
             if find_invitation(end) is not None:
                 return _token(accept(token=end).expert, "welcome")
-            user = accept_welcome(token=end, password=given.get("password", ""))
+            user = accept_welcome(token=end, password=params.get("password", ""))
             return _token(user, "welcome")
 
 

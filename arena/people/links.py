@@ -182,8 +182,8 @@ def mark_author(
     _must_take_part(study, expert)
     row = study.contestants.filter(slug=contestant).first()
     if row is None:
-        known = study.contestants.order_by("slug").values_list("slug", flat=True)
-        raise UnknownName("contestant", contestant, list(known))
+        slugs = study.contestants.order_by("slug").values_list("slug", flat=True)
+        raise UnknownName("contestant", contestant, list(slugs))
     marks = Authorship.objects.filter(study=study, expert=expert, contestant=row)
     if is_author:
         _, is_changed = marks.get_or_create(

@@ -27,11 +27,11 @@ def experts() -> QuerySet[User]:
     Those may know which contestant made what, and their role opens no voting page. Who enrolled
     by a link for one study is asked for that one alone.
     """
-    found = User.objects.filter(
+    accounts = User.objects.filter(
         is_active=True, is_superuser=False, groups__name="expert", enrolled=None
     )
-    found = found.exclude(groups__name__in=("admin", "researcher")).exclude(person=None)
-    return found.select_related("person")
+    accounts = accounts.exclude(groups__name__in=("admin", "researcher")).exclude(person=None)
+    return accounts.select_related("person")
 
 
 def may_be_let_in(user: User) -> bool:
@@ -39,9 +39,9 @@ def may_be_let_in(user: User) -> bool:
     return top_role(user) == "expert" and not user.person.is_simulated
 
 
-def by_pseudonym(found: QuerySet[User]) -> list[User]:
+def by_pseudonym(accounts: QuerySet[User]) -> list[User]:
     """Return accounts with a person, Expert 2 before Expert 10."""
-    return sorted(found, key=lambda user: natural_order(user.person.pseudonym))
+    return sorted(accounts, key=lambda user: natural_order(user.person.pseudonym))
 
 
 def natural_order(name: str) -> list[tuple[bool, int, str]]:

@@ -71,10 +71,10 @@ def rater_by_scores(
         tolerance: Scores that differ by no more are equal.
     """
 
-    def prefers(one: str, other: str) -> int | None:
-        if one not in scores or other not in scores:
+    def prefers(left: str, other: str) -> int | None:
+        if left not in scores or other not in scores:
             return None
-        first, second = scores[one], scores[other]
+        first, second = scores[left], scores[other]
         if first == second or abs(first - second) <= tolerance:  # both may be infinite
             return 0
         return 1 if first > second else -1
@@ -85,10 +85,10 @@ def rater_by_scores(
 def rater_by_pairs(name: str, preferences: Mapping[tuple[str, str], int]) -> NamedRater:
     """Return a rater by its preference for each pair, in either order of the two."""
 
-    def prefers(one: str, other: str) -> int | None:
-        if (one, other) in preferences:
-            return preferences[one, other]
-        back = preferences.get((other, one))
+    def prefers(first: str, other: str) -> int | None:
+        if (first, other) in preferences:
+            return preferences[first, other]
+        back = preferences.get((other, first))
         return None if back is None else -back
 
     return NamedRater(name=name, prefers=prefers)
@@ -171,7 +171,7 @@ def measure_agreement(
         if line.known or line.role is not LineRole.RATER
     ]
     order = list(LineRole)
-    measured.sort(key=lambda one: (order.index(one[0].role), -(one[0].share.value or 0.0)))
+    measured.sort(key=lambda pair: (order.index(pair[0].role), -(pair[0].share.value or 0.0)))
     types = list(dict.fromkeys(vote.type for vote in votes))
     of_types = [
         _line(numbered, *opinion, scenario_type=name)
@@ -204,10 +204,10 @@ def share_text(share: Estimate) -> str:
     """Return a share in percent, with its interval if there is one: 78 % (71 to 84)."""
     if share.value is None:
         return "unknown"
-    said = f"{whole_percent(share.value)} %"
+    text = f"{whole_percent(share.value)} %"
     if share.lower is None or share.upper is None:
-        return said
-    return f"{said} ({whole_percent(share.lower)} to {whole_percent(share.upper)})"
+        return text
+    return f"{text} ({whole_percent(share.lower)} to {whole_percent(share.upper)})"
 
 
 def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Estimate:
@@ -302,8 +302,10 @@ def _places(names: Sequence[Hashable]) -> IntArray:
 
 def _opinion(votes: _NumberedVotes, rater: NamedRater) -> tuple[FloatArray, FloatArray]:
     """(V,) what a rater prefers in each vote's pair, not a number if unknown; (V,) its ties."""
-    found = [rater.prefers(*pair) for pair in votes.pairs]
-    lean = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
+    opinions = [rater.prefers(*pair) for pair in votes.pairs]
+    lean = np.array(
+        [np.nan if opinion is None else opinion for opinion in opinions], dtype=np.float64
+    )
     lean = lean[votes.pair_of]
     return lean, np.asarray(lean == 0.0, dtype=np.float64)
 
@@ -337,15 +339,15 @@ def _line(
     is_asked: BoolArray = votes.sign != 0.0
     if scenario_type:
         is_asked &= np.array(votes.types) == scenario_type
-    known = is_asked & ~np.isnan(lean)
-    hits = 0.5 + 0.5 * votes.sign[known] * lean[known]
-    expert, scenario = votes.expert[known], votes.scenario[known]
-    ties = round(float(tied[known].sum()))
+    is_known = is_asked & ~np.isnan(lean)
+    hits = 0.5 + 0.5 * votes.sign[is_known] * lean[is_known]
+    expert, scenario = votes.expert[is_known], votes.scenario[is_known]
+    ties = round(float(tied[is_known].sum()))
     if role is LineRole.COIN:
         share, ties = Estimate(value=0.5), 0
     else:
         share = two_way_share(hits, expert, scenario)
-    agrees = round(float(hits.sum()) - 0.5 * float(tied[known].sum()))
+    agrees = round(float(hits.sum()) - 0.5 * float(tied[is_known].sum()))
     return AgreementLine(
         rater=name,
         role=role,
@@ -353,8 +355,8 @@ def _line(
         share=share,
         agrees=agrees,
         ties=ties,
-        differs=int(known.sum()) - agrees - ties,
-        unknown=int(is_asked.sum() - known.sum()),
+        differs=int(is_known.sum()) - agrees - ties,
+        unknown=int(is_asked.sum() - is_known.sum()),
         experts=len(np.unique(expert)),
         scenarios=len(np.unique(scenario)),
     )

@@ -182,12 +182,12 @@ def _cluster_draws(
 ) -> Sequence[tuple[Callable[[int], NDArray[np.float32]], IntArray]]:
     """For each kind of cluster what draws further rounds of it, and (R,) which one a row is in."""
     children = dict(zip(Unit.TWO_WAY.kinds, np.random.SeedSequence(seed).spawn(2), strict=True))
-    found = []
+    draws = []
     for kind in unit.kinds:
         codes, of_row = np.unique(getattr(votes, kind), return_inverse=True)
         rng = np.random.default_rng(children[kind])
-        found.append((partial(_draw_clusters, rng, len(codes)), of_row))
-    return found
+        draws.append((partial(_draw_clusters, rng, len(codes)), of_row))
+    return draws
 
 
 def _draw_clusters(rng: np.random.Generator, clusters: int, rounds: int) -> NDArray[np.float32]:
@@ -254,10 +254,10 @@ def rate_rounds(
     size = len(votes.names)
     by_votes = np.argsort(-tally(votes).sum(axis=1), kind="stable")
     met = Meetings(size, counts)
-    found: list[RatedRounds] = []
+    rated: list[RatedRounds] = []
     for block in blocks:
         is_fine = are_determined(met, block.games, block.scores)
-        found.append(RatedRounds.of_values(refit(block.chosen(np.flatnonzero(is_fine)), None)))
+        rated.append(RatedRounds.of_values(refit(block.chosen(np.flatnonzero(is_fine)), None)))
         left = np.flatnonzero(~is_fine)
         at_once = max(1, _NUMBERS_OF_COMPONENTS // size**2)
         for first in range(0, len(left), at_once):
@@ -266,10 +266,10 @@ def rate_rounds(
             together = reached & reached.transpose(0, 2, 1)
             inside = together[:, counts.low, counts.high].T
             inner = replace(rounds, games=rounds.games * inside, scores=rounds.scores * inside)
-            found.append(_place_components(reached, refit(inner, together), by_votes))
+            rated.append(_place_components(reached, refit(inner, together), by_votes))
     columns = [field.name for field in fields(RatedRounds)]
     return RatedRounds(
-        **{name: np.hstack([getattr(some, name) for some in found]) for name in columns}
+        **{name: np.hstack([getattr(some, name) for some in rated]) for name in columns}
     )
 
 

@@ -211,7 +211,12 @@ def join_few(names: Sequence[str]) -> Sequence[str]:
 
 def _list(votes: Comparisons, groups: Sequence[IntArray]) -> str:
     return "; ".join(
-        join_few([", ".join(join_few([votes.shown[one] for one in group])) for group in groups])
+        join_few(
+            [
+                ", ".join(join_few([votes.shown[contestant] for contestant in group]))
+                for group in groups
+            ]
+        )
     )
 
 

@@ -94,7 +94,7 @@ class PairCounts:
 
 
 def _array_names() -> list[str]:
-    return [one.name for one in fields(Comparisons) if one.name not in ("names", "shown")]
+    return [column.name for column in fields(Comparisons) if column.name not in ("names", "shown")]
 
 
 def select_votes(votes: Comparisons, rows: BoolArray | IntArray) -> Comparisons:
@@ -208,9 +208,9 @@ def share(hits: BoolArray, clusters: IntArray) -> Estimate:
     if not n:
         return Estimate(value=None)
     value = float(hits.mean())
-    found, cluster = np.unique(clusters, return_inverse=True)
-    surplus = np.bincount(cluster, weights=hits - value, minlength=len(found))
-    groups = len(found)
+    names, cluster = np.unique(clusters, return_inverse=True)
+    surplus = np.bincount(cluster, weights=hits - value, minlength=len(names))
+    groups = len(names)
     spread = math.sqrt(float((surplus**2).sum()) * groups / max(groups - 1, 1)) / n
     if groups < 2 or spread == 0.0:
         return wilson(int(hits.sum()), n)

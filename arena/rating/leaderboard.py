@@ -172,8 +172,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     rated = [rate_part(restrict_to(counting, part.tolist()), rules) for part in parts]
     lines = _blank_lines(votes.names, counted.tolist())
     across = np.zeros((len(lines), len(lines)), dtype=np.bool_)
-    for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
-        fill_lines(lines, present[part], number, found)
+    for number, (part, group) in enumerate(zip(parts, rated, strict=True)):
+        fill_lines(lines, present[part], number, group)
     if chains.reaches.any():
         _rank_across(lines, present, counting, chains, rules)
         if rules.intervals is Intervals.CLOSED_FORM:
@@ -188,8 +188,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         lines=tuple(lines),
         order=(*present[order].tolist(), *absent),
         status=_refine(status, rated),
-        reasons=_unique(reasons, *(found.explanation for found in rated)),
-        warnings=_unique(*(found.warnings for found in rated)),
+        reasons=_unique(reasons, *(group.explanation for group in rated)),
+        warnings=_unique(*(group.warnings for group in rated)),
         method=rules.method,
         unit=rules.unit,
         intervals=rules.intervals,
@@ -200,12 +200,12 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         scenarios=numbers[1],
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength if whole else None,
-        degenerate_rounds=max((found.degenerate for found in rated), default=0),
+        degenerate_rounds=max((group.degenerate for group in rated), default=0),
         separation=join_separations(
             [
-                found.separation.among(present[part], len(lines))
-                for part, found in zip(parts, rated, strict=True)
-                if found.separation
+                group.separation.among(present[part], len(lines))
+                for part, group in zip(parts, rated, strict=True)
+                if group.separation
             ],
             across,
         ),
@@ -225,9 +225,9 @@ def _refine(status: Status, rated: list[RatedGroup]) -> Status:
     """Return the status by what came out where all could be rated together."""
     if status is not Status.RATED:
         return status
-    if any(found.rating is None for found in rated):
+    if any(group.rating is None for group in rated):
         return Status.UNBOUNDED
-    if any(found.lower is None for found in rated):
+    if any(group.lower is None for group in rated):
         return Status.NO_INTERVALS
     return Status.OPEN_INTERVALS if any(map(any, (x.note for x in rated))) else Status.RATED
 
@@ -251,12 +251,12 @@ def _blank_lines(names: tuple[str, ...], counted: list[list[int]]) -> list[Line]
     ]
 
 
-def fill_lines(lines: list[Line], members: IntArray, number: int, found: RatedGroup) -> None:
+def fill_lines(lines: list[Line], members: IntArray, number: int, group: RatedGroup) -> None:
     """Put what a part has under the names of a line's fields into its lines."""
     columns = {
         column.name: np.asarray(values).tolist()
         for column in fields(lines[members[0]])
-        if (values := getattr(found, column.name, None)) is not None
+        if (values := getattr(group, column.name, None)) is not None
     }
     for place, index in enumerate(members):
         values = {name: column[place] for name, column in columns.items()}

@@ -50,20 +50,20 @@ def judge_rater(rater: PanelRater) -> Judgement:
     whose is closer to theirs, and clearly more than none, is reliable.
     """
     (checks, passed), (repeats, alike) = rater.checks, rater.repeats
-    found = rater.evidence + _evidence_of_checks(rater)
+    evidence = rater.evidence + _evidence_of_checks(rater)
     reasons = _reasons_to_look(rater)
     must_look = bool(reasons)
     reliability = Reliability.LOOK if must_look else Reliability.UNKNOWN
-    if found.scale > 0.0:
-        attention, error = found.gain / found.scale, found.looking**0.5 / found.scale
+    if evidence.scale > 0.0:
+        attention, error = evidence.gain / evidence.scale, evidence.looking**0.5 / evidence.scale
         reasons.append(
             f"attention {whole_percent(attention)} % ± {whole_percent(MORE * error)}, where "
             "guessing is 0 and the others are 100"
         )
         is_half = attention >= 0.5
-        if not is_half and attention + LESS * error < 1.0 and found.scale >= LEAST_SCALE:
+        if not is_half and attention + LESS * error < 1.0 and evidence.scale >= LEAST_SCALE:
             reliability = Reliability.LOOK
-        elif not must_look and is_half and found.gain > MORE * found.guessing**0.5:
+        elif not must_look and is_half and evidence.gain > MORE * evidence.guessing**0.5:
             reliability = Reliability.RELIABLE
     counts = {
         f"passed {passed} of {checks} attention checks": checks,
@@ -94,7 +94,7 @@ def _reasons_to_look(rater: PanelRater) -> list[str]:
     checks, passed = rater.checks
     left, decided = rater.left.value or 0.0, (1.0 - rater.ties) * rater.votes
     share, side = max((left, "left"), (1.0 - left, "right"))
-    found = {
+    reasons = {
         f"{whole_percent(rater.fast or 0.0)} % of the votes took less than a second": (
             (rater.fast or 0.0) >= TOO_FAST
         ),
@@ -105,4 +105,4 @@ def _reasons_to_look(rater: PanelRater) -> list[str]:
             checks - passed > 1 and passed < 0.8 * checks
         ),
     }
-    return [reason for reason, holds in found.items() if holds]
+    return [reason for reason, holds in reasons.items() if holds]

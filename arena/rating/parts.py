@@ -81,43 +81,43 @@ def rate_part(votes: Comparisons, rules: Rules) -> RatedGroup:
         warnings=(remarks.ELO_NOTE,) if rules.method is Method.ELO else (),
     )
     values, reference = bootstrap.place_on_one_scale(point.rating, rounds)
-    found = _find_intervals(point, values, reference, rules)
-    if found is None or (votes.score == 0.5).all():
+    intervals = _find_intervals(point, values, reference, rules)
+    if intervals is None or (votes.score == 0.5).all():
         why = remarks.why_no_intervals(votes, rules.unit)
         if why != remarks.NO_INTERVALS:
             plain = replace(plain, note=(remarks.NOTHING_DIFFERS,) * len(votes.names))
         return replace(plain, explanation=(why,))
     average = float(point.rating[reference].mean())
-    said = remarks.warnings(
+    remarks_said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
     )
-    rated = _with_intervals(plain, found, average)
+    rated = _with_intervals(plain, intervals, average)
     is_open = np.array([bool(note) for note in rated.note])
     return replace(
         rated,
         explanation=(remarks.who_is_open(votes, is_open),) if is_open.any() else (),
-        warnings=(*plain.warnings, *said),
+        warnings=(*plain.warnings, *remarks_said),
     )
 
 
-def _with_intervals(plain: RatedGroup, found: "_Intervals", average: float) -> RatedGroup:
+def _with_intervals(plain: RatedGroup, intervals: "_Intervals", average: float) -> RatedGroup:
     """Add bounds and ranks, and why some are missing."""
-    rank = decide_ranks(found.lower, found.upper, average=average)
-    best, worst = rank_sets(above_by_bounds(found.above, found.lower, found.upper))
-    has_lower, has_upper = ~np.isnan(found.lower), ~np.isnan(found.upper)
-    known = zip(has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True)
+    rank = decide_ranks(intervals.lower, intervals.upper, average=average)
+    best, worst = rank_sets(above_by_bounds(intervals.above, intervals.lower, intervals.upper))
+    has_lower, has_upper = ~np.isnan(intervals.lower), ~np.isnan(intervals.upper)
+    bounds = zip(has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True)
     return replace(
         plain,
-        lower=found.lower,
-        upper=found.upper,
+        lower=intervals.lower,
+        upper=intervals.upper,
         rank=rank,
         rank_best=np.where(has_lower | has_upper, best, 0),
         rank_worst=np.where(has_lower | has_upper, worst, 0),
         note=tuple(
             remarks.note_on_bounds(has_lower=lower, has_upper=upper, has_rank=ranked)
-            for lower, upper, ranked in known
+            for lower, upper, ranked in bounds
         ),
-        separation=found.separation,
+        separation=intervals.separation,
     )
 
 
@@ -177,11 +177,11 @@ def _rate_rounds(
         is_fine = (rounds.ties > 0) & (rounds.ties < rounds.games.sum(axis=0))
         fine = rounds.chosen(np.flatnonzero(is_fine))
         inside = None if together is None else together[is_fine]
-        found = np.full((met.contestants, len(is_fine)), np.nan)
-        found[:, is_fine] = fit(
+        values = np.full((met.contestants, len(is_fine)), np.nan)
+        values[:, is_fine] = fit(
             met, fine.games, fine.scores, fine.ties, start=point.answer, together=inside
         )[:-1]
-        return to_elo(found)
+        return to_elo(values)
 
     number = bootstrap.rounds_to_draw(votes, counts, rules.rounds) if is_closed else rules.rounds
     blocks = bootstrap.resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)

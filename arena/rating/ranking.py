@@ -67,9 +67,9 @@ def decide_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> Int
     """
     no_lower, no_upper = np.isnan(lower), np.isnan(upper)
     low = np.where(no_lower, -np.inf, lower)
-    found = ranks(low, np.where(no_upper, np.inf, upper))
-    decided = (found > 1) | ~(no_lower | no_upper) | (no_upper & (low > average))
-    return np.where(decided, found, 0)
+    places = ranks(low, np.where(no_upper, np.inf, upper))
+    decided = (places > 1) | ~(no_lower | no_upper) | (no_upper & (low > average))
+    return np.where(decided, places, 0)
 
 
 def rank_sets(above: BoolArray) -> tuple[IntArray, IntArray]:
@@ -166,13 +166,13 @@ class Separation:
     def judged(self, names: Sequence[str]) -> tuple[PairP, ...]:
         """Return every pair that was judged, by the names of the C contestants."""
         low, high = np.triu_indices(len(names), 1)
-        known = ~np.isnan(self.p_value[low, high])
-        low, high = low[known], high[known]
+        is_compared = ~np.isnan(self.p_value[low, high])
+        low, high = low[is_compared], high[is_compared]
         p, gap, half = (square[low, high] for square in (self.p_value, self.difference, self.half))
         columns = (low, high, p, gap, gap - half, gap + half)
         return tuple(
-            PairP(a=names[i], b=names[j], p=one, difference=points, lower=lower, upper=upper)
-            for i, j, one, points, lower, upper in zip(
+            PairP(a=names[i], b=names[j], p=p_value, difference=points, lower=lower, upper=upper)
+            for i, j, p_value, points, lower, upper in zip(
                 *(column.tolist() for column in columns), strict=True
             )
         )
@@ -303,8 +303,8 @@ def _draw_variances(
     """(N, P) what a component would add to the variances of differences."""
     degrees = float(np.median(component.own_degrees))
     if degrees >= _MANY_CLUSTERS:
-        known = variances_of_pairs(component.common, low, high).astype(np.float32)
-        return np.broadcast_to(known, (number, len(low)))
+        variances = variances_of_pairs(component.common, low, high).astype(np.float32)
+        return np.broadcast_to(variances, (number, len(low)))
     clusters, contestants = max(1, round(degrees)), len(component.common)
     pulls = rng.standard_normal((number, clusters, contestants), dtype=np.float32) @ root
     weights = 1.0 / np.maximum(component.common.diagonal(), 1e-30)

@@ -85,13 +85,13 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         return Agreement(
             alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
         )
-    found, cluster = np.unique(scenario, return_inverse=True)
+    scenarios, cluster = np.unique(scenario, return_inverse=True)
     by_unit = np.hstack([_coincidences(table), _shares(table)])
-    sums = np.zeros((len(found), by_unit.shape[1]))
+    sums = np.zeros((len(scenarios), by_unit.shape[1]))
     np.add.at(sums, cluster, by_unit)
     rng = np.random.default_rng(seed)
-    chance = np.full(len(found), 1.0 / len(found))
-    drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
+    chance = np.full(len(scenarios), 1.0 / len(scenarios))
+    drawn = rng.multinomial(len(scenarios), chance, size=rounds) @ sums
     whole = sums.sum(axis=0)[None]
     several = len(np.unique(scenario[is_shared])) > 1
     measures: dict[str, Callable[[FloatArray], FloatArray]] = {
@@ -125,8 +125,8 @@ def krippendorff_alpha(table: IntArray, metric: DifferenceMetric) -> float | Non
     paired = table[table.sum(axis=1) >= 2]
     if not len(paired):
         return None
-    found = float(_alpha(_coincidences(paired).sum(axis=0)[None], metric)[0])
-    return None if np.isnan(found) else found
+    alpha = float(_alpha(_coincidences(paired).sum(axis=0)[None], metric)[0])
+    return None if np.isnan(alpha) else alpha
 
 
 # --- Coefficients --------------------------------------------------------------------------------
@@ -239,8 +239,8 @@ class Evidence:
     def __add__(self, other: "Evidence") -> "Evidence":
         return Evidence(
             **{
-                one.name: getattr(self, one.name) + getattr(other, one.name)
-                for one in fields(self)
+                part.name: getattr(self, part.name) + getattr(other, part.name)
+                for part in fields(self)
             }
         )
 
@@ -286,7 +286,7 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
     agreed, others = agreement_with_others(votes)
     evidence = evidence_of_votes(votes)
     won_left = votes.score == 1.0
-    found = []
+    lines = []
     for expert in np.unique(votes.expert).tolist():
         own = votes.expert == expert
         timed = ms[own & ~np.isnan(ms)]
@@ -294,7 +294,7 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
         lead = without[expert][votes.first] - without[expert][votes.second]
         foreseen = decided & ~np.isnan(lead) & (lead != 0.0)
         shared = own & others
-        found.append(
+        lines.append(
             Rater(
                 expert=expert,
                 votes=int(own.sum()),
@@ -309,7 +309,7 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
                 evidence=evidence[expert],
             )
         )
-    return tuple(found)
+    return tuple(lines)
 
 
 def evidence_of_votes(votes: Comparisons) -> dict[int, Evidence]:
@@ -323,8 +323,8 @@ def evidence_of_votes(votes: Comparisons) -> dict[int, Evidence]:
     foreseen = _net_score(votes, lean, votes.first) - _net_score(votes, lean, votes.second)
     sums = np.stack(
         [
-            np.bincount(votes.expert, weights=one)
-            for one in (lean * foreseen, foreseen**2, lean**2, np.ones(len(lean)))
+            np.bincount(votes.expert, weights=weights)
+            for weights in (lean * foreseen, foreseen**2, lean**2, np.ones(len(lean)))
         ]
     )
     product, square, size, number = sums.sum(axis=1, keepdims=True) - sums
@@ -349,15 +349,17 @@ def _net_score(votes: Comparisons, lean: FloatArray, contestant: IntArray) -> Fl
     ends = np.concatenate([votes.first, votes.second, contestant])
     values = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]).repeat(number, axis=1)
     values[1] *= np.tile(lean, 3)
-    found = np.zeros(number)
+    score = np.zeros(number)
     for place in (ends, np.tile(votes.scenario, 3) * len(votes.names) + ends):
         own = np.unique(place * experts + np.tile(votes.expert, 3), return_inverse=True)[1]
         count, net = (
-            (np.bincount(place, weights=one)[place] - np.bincount(own, weights=one)[own])[-number:]
-            for one in values
+            (np.bincount(place, weights=column)[place] - np.bincount(own, weights=column)[own])[
+                -number:
+            ]
+            for column in values
         )
-        found = (net + _PRIOR_VOTES * found) / (count + _PRIOR_VOTES)
-    return found
+        score = (net + _PRIOR_VOTES * score) / (count + _PRIOR_VOTES)
+    return score
 
 
 def agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
@@ -452,13 +454,13 @@ def evidence_of_repeats(repeats: Repeats, ties: Mapping[int, float]) -> dict[int
     """
     chance = {who: min(ties[who] ** 2 + (1.0 - ties[who]) ** 2 / 2.0, 0.9) for who in ties}
     surplus = {who: alike - n * chance[who] for who, (n, alike) in repeats.by_expert.items()}
-    found = {}
+    evidence = {}
     for who, (number, alike) in repeats.by_expert.items():
         others = sum(surplus.values()) - surplus[who] + _PRIOR_REPEATS * _STEADIER
         steadier = max(others / (repeats.number - number + _PRIOR_REPEATS), 0.02)
         looking = min(chance[who] + steadier, 0.95)
-        found[who] = Evidence.of_trials(alike, number, looking=looking, guessing=chance[who])
-    return found
+        evidence[who] = Evidence.of_trials(alike, number, looking=looking, guessing=chance[who])
+    return evidence
 
 
 # --- Two raters ----------------------------------------------------------------------------------
@@ -479,7 +481,7 @@ def cohens_kappa(first: Sequence[bool], second: Sequence[bool]) -> float | None:
     n = len(first)
     if n == 0:
         return None
-    seen = sum(one == other for one, other in zip(first, second, strict=True)) / n
+    seen = sum(answer == other for answer, other in zip(first, second, strict=True)) / n
     yes_first, yes_second = sum(first) / n, sum(second) / n
     by_chance = yes_first * yes_second + (1.0 - yes_first) * (1.0 - yes_second)
     if by_chance >= 1.0:

@@ -82,28 +82,28 @@ def why_no_intervals(votes: Comparisons, unit: Unit) -> str:
 
 def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) -> list[str]:
     """Return the caveats of intervals by these rules."""
-    found: list[str] = []
+    texts: list[str] = []
     is_resampled = rules.intervals is Intervals.RESAMPLES
     for kind in Unit.TWO_WAY.kinds:
         number = count_codes(getattr(votes, kind))
         is_drawn = kind in rules.unit.kinds and is_resampled
         limit = FEWEST_DRAWN if is_drawn else FEWEST[kind]
         if number == 1 and kind in rules.unit.kinds:
-            found.append(
+            texts.append(
                 f"All votes belong to one {kind}: how much {kind}s differ can't be seen, and the "
                 f"intervals hold for this {kind} only."
             )
         elif 1 < number < limit:
-            found.append(
+            texts.append(
                 f"Only {number} {kind}s: intervals that rest on fewer than {limit} of them are "
                 "rough."
             )
     if degenerate and is_resampled:
-        found.append(
+        texts.append(
             f"In {degenerate} of {rounds} resamples the votes did not determine everybody's "
             "rating; there it counts as far above or below the others, as the votes say."
         )
-    return found
+    return texts
 
 
 def remark_on_ignored(kinds: Sequence[str]) -> list[str]:

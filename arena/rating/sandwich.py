@@ -96,9 +96,9 @@ class Pulls:
         amount = np.tile(self.information * self.votes.count, 2)
         place = np.concatenate([self.votes.first, self.votes.second]) * clusters
         met, where = np.unique(place + np.tile(cluster_of, 2), return_inverse=True)
-        given = np.bincount(where, weights=amount)
-        total = np.bincount(met // clusters, weights=given, minlength=size)
-        shares = given / total[met // clusters]
+        weights = np.bincount(where, weights=amount)
+        total = np.bincount(met // clusters, weights=weights, minlength=size)
+        shares = weights / total[met // clusters]
         squares, cubes = (
             np.bincount(met // clusters, weights=shares**power, minlength=size) for power in (2, 3)
         )
@@ -243,8 +243,8 @@ def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None
     if not components:
         if unit is not Unit.VOTE:
             base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
-        known = np.full(len(base), _FAR)
-        return Spread(covariance=base, degrees=known, common=base, base=base, components=())
+        degrees = np.full(len(base), _FAR)
+        return Spread(covariance=base, degrees=degrees, common=base, base=base, components=())
     covariance = np.asarray(sum(component.covariance for component in components))
     # What clusters add is never negative: equals drawn with less would be told apart too often.
     added = (part.common - base for part in components if part.common.trace() > base.trace())
@@ -343,10 +343,10 @@ def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> 
     The spread of own squares (C,) around the common ones (C,), less what chance alone gives with
     so many degrees of freedom (C,), as moments of a scaled F distribution.
     """
-    known = (degrees > 0.5) & (common > 0.0)
-    if known.sum() < 3:
+    is_usable = (degrees > 0.5) & (common > 0.0)
+    if is_usable.sum() < 3:
         return MOST_PRIOR
-    ratio, weight = own[known] / common[known], degrees[known]
+    ratio, weight = own[is_usable] / common[is_usable], degrees[is_usable]
     surplus = float((weight * ((ratio - 1.0) ** 2 - 2.0 / weight)).sum() / weight.sum())
     surplus /= 1.0 + 2.0 / float(weight.mean())
     return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
@@ -356,8 +356,8 @@ def _centre(values: FloatArray, reference: BoolArray) -> FloatArray:
     """(C, C) covariance of independent numbers with these variances (C,), around a mean."""
     number = reference.sum()
     of_mean = np.where(reference, values, 0.0)
-    found = np.diag(values) - (of_mean[:, None] + of_mean) / number
-    return np.asarray(found + of_mean.sum() / number**2)
+    centred = np.diag(values) - (of_mean[:, None] + of_mean) / number
+    return np.asarray(centred + of_mean.sum() / number**2)
 
 
 def _with_variances(covariance: FloatArray, variances: FloatArray) -> FloatArray:

@@ -306,7 +306,7 @@ def read_document(shape: type[Value], document: Mapping[str, Any], *, what: str)
     try:
         return cast(Value, _make_adapter(cast(Any, shape)).validate_python(document))
     except ValidationError as error:
-        faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
+        faults = [(".".join(map(str, fault["loc"])), fault["msg"]) for fault in error.errors()]
         raise InvalidDocument(what, faults) from error
 
 
@@ -326,12 +326,12 @@ def _make_adapter(shape: Any) -> TypeAdapter[Any]:
 def _document(value: Any, version: int) -> Any:
     if is_dataclass(value):
         return {
-            field.name: _document(found, version)
+            field.name: _document(part, version)
             for field in fields(value)
             # What is set stays, whatever the version.
-            if (found := getattr(value, field.name)) != field.default
+            if (part := getattr(value, field.name)) != field.default
             or version >= field.metadata.get("since", 0)
         }
     if isinstance(value, dict):
-        return {str(key): _document(found, version) for key, found in value.items()}
-    return [_document(one, version) for one in value] if isinstance(value, tuple) else value
+        return {str(key): _document(part, version) for key, part in value.items()}
+    return [_document(part, version) for part in value] if isinstance(value, tuple) else value

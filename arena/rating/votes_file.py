@@ -284,7 +284,7 @@ def _read_parquet(content: io.BytesIO) -> VotesTable:
     groups = [file.metadata.row_group(number) for number in range(file.num_row_groups)]
     parts = [group.column(at) for group in groups for at in range(group.num_columns)]
     wanted = [names[at] for at in places.values()]
-    sizes = [one.total_uncompressed_size for one in parts if one.path_in_schema in wanted]
+    sizes = [chunk.total_uncompressed_size for chunk in parts if chunk.path_in_schema in wanted]
     _check_size(sum(sizes))
     # A dictionary counts once there however often it is named: a cell of CSV has two bytes.
     _check_size(2 * file.metadata.num_rows * len(places))

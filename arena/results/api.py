@@ -17,7 +17,7 @@ from arena.api.fields import RequestBody
 from arena.api.views import (
     ApiView,
     FileView,
-    Given,
+    Params,
     RowDocument,
     file_operation,
     keep_and_send,
@@ -121,14 +121,14 @@ class SnapshotsView(ApiView):
     writers = STAFF
 
     @operation(SnapshotDocument, takes=SnapshotBody, status=201, name="rateStudy")
-    def post(self, code: uuid.UUID, given: Given) -> Snapshot:
+    def post(self, code: uuid.UUID, params: Params) -> Snapshot:
         """Rate the votes as they are now.
 
         A worker rates large studies: poll the rating until its state is ready.
         """
         study = get_study(code)
         must_read_results(user=self.user, study=study)
-        choices = read_request(RatingRequest, given).choices()
+        choices = read_request(RatingRequest, params).choices()
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
             snapshot = rate(study=study, **choices)

@@ -16,8 +16,8 @@ from arena.api.access import ADMINS, ENTRANTS, STAFF
 from arena.api.fields import FlagField, RequestBody, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
     ApiView,
-    Given,
     PageQuery,
+    Params,
     RowDocument,
     WarnedDocument,
     keep_and_send,
@@ -130,24 +130,24 @@ class ScenariosView(ApiView):
     readers = writers = STAFF
 
     @operation(page_serializer(ScenarioDocument), query=ScenarioQuery, name="listScenarios")
-    def get(self, given: Given) -> Response:
+    def get(self, params: Params) -> Response:
         """Scenarios by slug.
 
         Without their scenes, references and intents.
         """
-        if "set" in given:
-            chosen = given.pop("set")
-            given["catalogue_set"] = "" if chosen == OWN else chosen
+        if "set" in params:
+            chosen = params.pop("set")
+            params["catalogue_set"] = "" if chosen == OWN else chosen
         rows = _scenarios().defer("reference", "intent")
-        return self.answer_page(rows, given, ScenarioDocument, order="slug")
+        return self.answer_page(rows, params, ScenarioDocument, order="slug")
 
     @operation(NewScenarioDocument, takes=ScenarioBody, status=201, name="addScenario")
-    def post(self, given: Given) -> tuple[Scenario, list[str]]:
+    def post(self, params: Params) -> tuple[Scenario, list[str]]:
         """Add a scenario.
 
         A worker draws it.
         """
-        add = partial(add_scenario, NewScenario(**given), actor=self.user)
+        add = partial(add_scenario, NewScenario(**params), actor=self.user)
         row, warnings = keep_and_send(add, enqueue_scenario)
         return _scenarios().get(pk=row.pk), warnings
 
@@ -239,12 +239,12 @@ class UploadsView(FilesView):
     writers = STAFF
 
     @operation(UploadDocument, takes=UploadBody, status=202, name="sendRecording")
-    def post(self, given: Given) -> tuple[SceneUpload, list[str]]:
+    def post(self, params: Params) -> tuple[SceneUpload, list[str]]:
         """Send a recording; a worker reads it.
 
         Poll it until its state is read or failed.
         """
-        file, source = given["file"], given["format"]
+        file, source = params["file"], params["format"]
         keep = partial(uploads.keep_upload, name=file.name or "", content=file, source=source)
         return keep_and_send(partial(keep, actor=self.user), enqueue_upload)
 
@@ -269,13 +269,13 @@ class MomentsView(ApiView):
     writers = STAFF
 
     @operation(MomentDocument, takes=MomentBody, status=202, name="showMoment")
-    def post(self, code: uuid.UUID, given: Given) -> tuple[UploadMoment, list[str]]:
+    def post(self, code: uuid.UUID, params: Params) -> tuple[UploadMoment, list[str]]:
         """Have a moment of a recording drawn, or kept as a scene.
 
         The same one twice is one; poll it until it is drawn or kept.
         """
         upload = get_object_or_404(SceneUpload, code=code)
-        ask = partial(uploads.ask_for_moment, upload, **given, actor=self.user)
+        ask = partial(uploads.ask_for_moment, upload, **params, actor=self.user)
         return keep_and_send(ask, enqueue_moment)
 
 
@@ -333,13 +333,13 @@ class SweepsView(ApiView):
     writers = ADMINS
 
     @operation(SweepDocument, takes=SweepBody, status=202, name="startSweep")
-    def post(self, code: uuid.UUID, given: Given) -> tuple[SweepResult, list[str]]:
+    def post(self, code: uuid.UUID, params: Params) -> tuple[SweepResult, list[str]]:
         """Drive one number of a scenario at several values.
 
         Poll it until nothing is under way.
         """
-        asked = read_request(SweepRequest, given)
-        planned = plan_sweep(scenario=_scenario(code), request=asked, actor=self.user)
+        wanted = read_request(SweepRequest, params)
+        planned = plan_sweep(scenario=_scenario(code), request=wanted, actor=self.user)
         sweep, warnings = keep_and_send(lambda: planned, enqueue_sweep)
         return sweep_result(sweep), warnings
 
@@ -381,12 +381,12 @@ class FamilyView(ApiView):
     writers = STAFF
 
     @operation(FamilyDocument, takes=FamilyBody, status=201, name="drawFamily")
-    def post(self, code: uuid.UUID, given: Given) -> tuple[dict[str, list[str]], list[str]]:
+    def post(self, code: uuid.UUID, params: Params) -> tuple[dict[str, list[str]], list[str]]:
         """Add scenarios with numbers drawn from the ranges of one's intent.
 
         A worker draws them.
         """
-        rows, refused = add_family(scenario=_scenario(code), **given, actor=self.user)
+        rows, refused = add_family(scenario=_scenario(code), **params, actor=self.user)
         sent = [keep_and_send(partial(_scenario, row.code), enqueue_scenario) for row in rows]
         family = {
             "scenarios": [row.slug for row in rows],
@@ -432,12 +432,12 @@ class SubmissionsView(FilesView):
     writers = (*ENTRANTS, *STAFF)
 
     @operation(SubmissionDocument, takes=SubmissionBody, status=202, name="sendSubmission")
-    def post(self, given: Given) -> tuple[Submission, list[str]]:
+    def post(self, params: Params) -> tuple[Submission, list[str]]:
         """Send a submission; a worker reads it.
 
         Poll it until its state is checked or failed.
         """
-        file, benchmark = given["file"], find_benchmark(given["benchmark"])
+        file, benchmark = params["file"], find_benchmark(params["benchmark"])
         keep = partial(keep_submission, benchmark, name=file.name or "", content=file)
         return keep_and_send(partial(keep, actor=self.user), enqueue_submission)
 

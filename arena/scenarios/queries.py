@@ -121,15 +121,15 @@ def step_changes(before: dict[str, Any] | None, after: dict[str, Any] | None) ->
         {line["agent"]: line for line in modification_lines(document)}
         for document in (before, after)
     )
-    told = [f"{name} no longer {old[name]['change']}" for name in old if name not in new]
+    sentences = [f"{name} no longer {old[name]['change']}" for name in old if name not in new]
     for name, line in new.items():
         was = old.get(name)
         if was is None or was["change"] != line["change"]:
             kind = f": {line['kind']}" if "kind" in line else ""
-            told.append(f"{name} {line['change']}{kind}")
+            sentences.append(f"{name} {line['change']}{kind}")
         elif was != line and (differences := list(_differences(was, line))):
-            told.append(f"{name}: {', '.join(differences)}")
-    return told
+            sentences.append(f"{name}: {', '.join(differences)}")
+    return sentences
 
 
 def _differences(was: dict[str, Any], line: dict[str, Any]) -> Iterator[str]:
@@ -141,8 +141,8 @@ def _differences(was: dict[str, Any], line: dict[str, Any]) -> Iterator[str]:
         yield f"a {line['kind']}"
     if abs(turned_deg) >= 0.05:
         yield f"turned by {turned_deg:.1f}°"
-    told = {"x_m", "y_m", "kind", "type", "heading_deg", "heading_rad", "lane_id", "moves"}
-    for name in sorted((was.keys() | line.keys()) - told):
+    ignored = {"x_m", "y_m", "kind", "type", "heading_deg", "heading_rad", "lane_id", "moves"}
+    for name in sorted((was.keys() | line.keys()) - ignored):
         if was.get(name) != line.get(name):
             yield f"another {name.removesuffix('_m').removesuffix('_mps').replace('_', ' ')}"
 

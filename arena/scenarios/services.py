@@ -124,14 +124,16 @@ def delete(row: Scenario | BaseScene, *, actor: User | None = None) -> None:
 
 def _refuse_needed(row: Scenario | BaseScene, what: str) -> None:
     if isinstance(row, BaseScene):
-        needed_by = [f"the scenario “{one.slug}”" for one in row.scenarios.order_by("slug")]
+        needed_by = [
+            f"the scenario “{scenario.slug}”" for scenario in row.scenarios.order_by("slug")
+        ]
     else:
         needed_by = [
             *(f"the job “{job.name}”" for job in row.jobs.order_by("pk")),
             *(f"the study “{study.name}”" for study in row.studies.order_by("pk")),
             *(f"its follow-up “{other.slug}”" for other in row.follow_ups.order_by("slug")),
             *(f"its other wording “{other.slug}”" for other in row.paraphrases.order_by("slug")),
-            *(f"the benchmark {one.benchmark}" for one in row.benchmark_items.order_by("pk")),
+            *(f"the benchmark {item.benchmark}" for item in row.benchmark_items.order_by("pk")),
             *(["drives"] if row.simulations.exists() else []),
         ]
     if needed_by:

@@ -61,17 +61,19 @@ def look_at_broker() -> PartState:
 def look_at_workers() -> PartState:
     """Return whether at least one worker is alive and lost work is recovered."""
     try:
-        found = workforce()
+        workers = workforce()
     except DatabaseError as error:
         return PartState("workers", False, "unknown", str(error))
-    if not found.living:
-        since = f"since {found.silent_since:%Y-%m-%d %H:%M:%S} UTC" if found.silent_since else ""
-        return PartState("workers", False, "none", f"no worker is running {since}".strip())
-    if not found.works:
-        return PartState(
-            "workers", False, "stuck", f"lost work is not brought back: {found.fault}"
+    if not workers.living:
+        since = (
+            f"since {workers.silent_since:%Y-%m-%d %H:%M:%S} UTC" if workers.silent_since else ""
         )
-    return PartState("workers", True, "ok", f"{found.living} running")
+        return PartState("workers", False, "none", f"no worker is running {since}".strip())
+    if not workers.works:
+        return PartState(
+            "workers", False, "stuck", f"lost work is not brought back: {workers.fault}"
+        )
+    return PartState("workers", True, "ok", f"{workers.living} running")
 
 
 def look_at_parts() -> tuple[PartState, ...]:
@@ -86,6 +88,6 @@ def look_at_parts() -> tuple[PartState, ...]:
 def opens_metrics(authorization: str | None) -> bool:
     """Return whether a header bears the configured metrics token; False without a token."""
     expected = settings.METRICS_TOKEN
-    scheme, _, given = (authorization or "").partition(" ")
+    scheme, _, credentials = (authorization or "").partition(" ")
     is_bearer = scheme.lower() == "bearer" and bool(expected)
-    return is_bearer and secrets.compare_digest(given.strip().encode(), expected.encode())
+    return is_bearer and secrets.compare_digest(credentials.strip().encode(), expected.encode())

@@ -191,9 +191,9 @@ class Supervisor:
             if self.is_stopping:
                 return
             self.check()
-            known = {child.program.arguments for child in self.children}
+            running = {child.program.arguments for child in self.children}
             for program in () if turn % TURNS else missing():
-                if program.arguments not in known:
+                if program.arguments not in running:
                     self.children.append(Child(program, self._say))
             time.sleep(POLL_S)
 

@@ -126,7 +126,7 @@ class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
             clear_untrusted_proxy_headers=False,
             ident=None,
         )
-        listeners = [found for found in self._map.values() if hasattr(found, "channel_class")]
+        listeners = [entry for entry in self._map.values() if hasattr(entry, "channel_class")]
         for listener in listeners:
             listener.channel_class = Connection
         while self.alive and self.ppid == os.getppid():
@@ -136,7 +136,9 @@ class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
             listener.socket.close()
             self._map.pop(listener._fileno, None)
         limit = time.monotonic() + self.cfg.graceful_timeout
-        while time.monotonic() < limit and not all(one.is_idle for one in self._connections()):
+        while time.monotonic() < limit and not all(
+            connection.is_idle for connection in self._connections()
+        ):
             self._turn()
         server.task_dispatcher.shutdown(timeout=1)
 
@@ -149,4 +151,4 @@ class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
                 connection.will_close = True
 
     def _connections(self) -> list[Connection]:
-        return [found for found in list(self._map.values()) if isinstance(found, Connection)]
+        return [entry for entry in list(self._map.values()) if isinstance(entry, Connection)]

@@ -94,8 +94,8 @@ def is_sure(request: HttpRequest) -> bool:
 
 def is_typed(request: HttpRequest, name: str) -> bool:
     """Return whether the answer is yes and the name was typed, as it stands or as a slug."""
-    given = " ".join(request.POST.get(TYPED, "").split()).casefold()
-    return is_sure(request) and given in {" ".join(name.split()).casefold(), slugify(name)} - {""}
+    typed = " ".join(request.POST.get(TYPED, "").split()).casefold()
+    return is_sure(request) and typed in {" ".join(name.split()).casefold(), slugify(name)} - {""}
 
 
 def wants_to_change(request: HttpRequest) -> bool:

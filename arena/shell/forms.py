@@ -103,27 +103,27 @@ class LinesField(forms.CharField):
         return str(super().clean(value)).splitlines()
 
 
-def form_field(asked: Input) -> forms.Field:
+def form_field(declared: Input) -> forms.Field:
     """Return the field of a form; an empty number is 0 where one need not be given.
 
     The choices of a field of names are the caller's.
     """
-    given: dict[str, Any] = {"label": asked.title, "help_text": asked.help}
-    given["required"] = asked.is_required
-    if not asked.is_required:
-        given["initial"] = asked.default
-    bounds = {"min_value": asked.least, "max_value": asked.most}
+    options: dict[str, Any] = {"label": declared.title, "help_text": declared.help}
+    options["required"] = declared.is_required
+    if not declared.is_required:
+        options["initial"] = declared.default
+    bounds = {"min_value": declared.least, "max_value": declared.most}
     look = {"class": "input"}
-    choices = [("", "–")] * (asked.default is None) + list(asked.choices.items())
+    choices = [("", "–")] * (declared.default is None) + list(declared.choices.items())
     kinds: dict[InputKind, tuple[type[forms.Field], dict[str, Any]]] = {
         InputKind.TEXT: (
             forms.CharField,
-            {"max_length": asked.most, "widget": forms.TextInput(attrs=look)},
+            {"max_length": declared.most, "widget": forms.TextInput(attrs=look)},
         ),
         InputKind.WHOLE: (
             forms.IntegerField,
             bounds
-            | {"required": asked.default is not None, "widget": forms.NumberInput(attrs=look)},
+            | {"required": declared.default is not None, "widget": forms.NumberInput(attrs=look)},
         ),
         InputKind.NUMBER: (
             forms.FloatField,
@@ -131,7 +131,7 @@ def form_field(asked: Input) -> forms.Field:
         ),
         InputKind.DECIMAL: (
             forms.DecimalField,
-            bounds | {"max_digits": 16, "decimal_places": 9, "required": asked.is_required},
+            bounds | {"max_digits": 16, "decimal_places": 9, "required": declared.is_required},
         ),
         InputKind.SWITCH: (forms.BooleanField, {"required": False}),
         InputKind.CHOICE: (
@@ -141,8 +141,8 @@ def form_field(asked: Input) -> forms.Field:
         InputKind.LINES: (LinesField, {"initial": "", "max_length": LONGEST_LINES}),
         InputKind.NAMES: (forms.MultipleChoiceField, {}),
     }
-    field, more = kinds[asked.kind]
-    return field(**given | more)
+    field, more = kinds[declared.kind]
+    return field(**options | more)
 
 
 class RequestForm(forms.Form):
@@ -156,8 +156,8 @@ class RequestForm(forms.Form):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        missing = [one for one in self.inputs if one.name not in self.fields]
-        self.fields |= {one.name: form_field(one) for one in missing}
+        missing = [field for field in self.inputs if field.name not in self.fields]
+        self.fields |= {field.name: form_field(field) for field in missing}
 
 
 class CapsForm(RequestForm):

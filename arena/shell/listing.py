@@ -15,10 +15,8 @@ Row = TypeVar("Row", bound=Model)
 
 def page_asked(request: HttpRequest, name: str = "page") -> int:
     """Return the number of a page, 1 where the address names none that there can be."""
-    given = request.GET.get(name, "1")
-    return (
-        int(given) if given.isascii() and given.isdigit() and len(given) < 9 and int(given) else 1
-    )
+    text = request.GET.get(name, "1")
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 and int(text) else 1
 
 
 def search_asked(request: HttpRequest) -> str:
@@ -28,8 +26,8 @@ def search_asked(request: HttpRequest) -> str:
 
 def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:
     """Return the chosen value of a filter; empty for an unknown one."""
-    given = request.GET.get(name, "")
-    return given if given in allowed else ""
+    value = request.GET.get(name, "")
+    return value if value in allowed else ""
 
 
 def read_page(request: HttpRequest, rows: QuerySet[Row], *, size: int) -> Page[Row]:

@@ -87,9 +87,9 @@ def add_contestants(actor: User | None = None) -> None:
 
 def add_experts(actor: User | None = None) -> None:
     """Add the experts that the machine votes for."""
-    known = set(User.objects.values_list("username", flat=True))
+    usernames = set(User.objects.values_list("username", flat=True))
     for username in SIMULATED_EXPERTS:
-        if username not in known:
+        if username not in usernames:
             create_person(
                 username=username, password=None, role="expert", is_simulated=True, actor=actor
             )
@@ -121,9 +121,9 @@ def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Stud
         ran = set(job.contestants.values_list("slug", flat=True))
         contestants = RATED if set(RATED) <= ran else sorted(ran)
     add_experts(actor)
-    asked = study_asked(SIMULATED_STUDY, scenarios, contestants)
-    asked |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
-    plan = StudyPlan.read(asked | {"votes_per_expert": SIMULATED_VOTES_EACH})
+    values = study_asked(SIMULATED_STUDY, scenarios, contestants)
+    values |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
+    plan = StudyPlan.read(values | {"votes_per_expert": SIMULATED_VOTES_EACH})
     study = open_study(plan, actor=actor)
     simulate_votes(study=study, seed=SEED)
     study = close_study(study=study, actor=actor)

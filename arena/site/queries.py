@@ -115,8 +115,8 @@ def first_steps() -> list[Step]:
         Study.objects.filter(state=Study.State.CLOSED).count(),
     ]
     return [
-        Step(name=name, title=title, text=text, mine=mine, found=found)
-        for (name, mine, title, text), found in zip(_STEPS, is_there, strict=True)
+        Step(name=name, title=title, text=text, mine=mine, found=is_done)
+        for (name, mine, title, text), is_done in zip(_STEPS, is_there, strict=True)
     ]
 
 

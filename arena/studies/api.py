@@ -9,7 +9,7 @@ from rest_framework.response import Response
 
 from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
-from arena.api.views import ApiView, Given, PageQuery, operation, page_serializer
+from arena.api.views import ApiView, PageQuery, Params, operation, page_serializer
 from arena.models import Study
 from arena.shell.accounts import top_role
 from arena.studies.queries import StudyProgress, count_progress, list_studies
@@ -85,7 +85,7 @@ class StudiesView(ApiView):
     readers, writers = (*STAFF, *EXPERTS), ADMINS
 
     @operation(page_serializer(StudyDocument), query=StudyQuery, name="listStudies")
-    def get(self, given: Given) -> Response:
+    def get(self, params: Params) -> Response:
         """Studies, the youngest first.
 
         An expert gets their own with their own progress, staff all with everybody's.
@@ -93,18 +93,18 @@ class StudiesView(ApiView):
         expert = None if top_role(self.user) in STAFF else self.user
         return self.answer_page(
             list_studies(expert),
-            given,
+            params,
             StudyDocument,
             lines=lambda page: count_progress(page, expert),
         )
 
     @operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
-    def post(self, given: Given) -> StudyProgress:
+    def post(self, params: Params) -> StudyProgress:
         """Plan a study and open it.
 
         Its experts can vote at once.
         """
-        return _progress(open_study(StudyPlan.read(given), actor=self.user))
+        return _progress(open_study(StudyPlan.read(params), actor=self.user))
 
 
 class StudyView(ApiView):

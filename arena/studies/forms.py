@@ -31,7 +31,7 @@ class StudyForm(ChoiceForm):
     ) -> None:
         super().__init__(*args, **kwargs)
         self.fields |= {
-            one.name: form_field(one) for one in PLAN_INPUTS if one.name not in self.fields
+            field.name: form_field(field) for field in PLAN_INPUTS if field.name not in self.fields
         }
         self.accounts = experts
         self.all_jobs = jobs
@@ -46,7 +46,7 @@ class StudyForm(ChoiceForm):
     def rules(self) -> list[forms.BoundField]:
         """Return the fields under *Advanced*, switches last; for the template."""
         kinds = (InputKind.TEXT, InputKind.NAMES)
-        names = [one.name for one in PLAN_INPUTS if one.kind not in kinds]
+        names = [field.name for field in PLAN_INPUTS if field.kind not in kinds]
         names.remove("votes_per_expert")
         return [self[name] for name in sorted(names, key=lambda name: name in SWITCHES)]
 
@@ -91,9 +91,9 @@ class StudyForm(ChoiceForm):
     def study_plan(self) -> StudyPlan:
         """Return the plan of a valid form; an empty number is 0."""
         entered: dict[str, Any] = {
-            one.name: 0.0 if value is None else value
-            for one in PLAN_INPUTS
-            if (value := self.cleaned_data[one.name]) != ""
+            field.name: 0.0 if value is None else value
+            for field in PLAN_INPUTS
+            if (value := self.cleaned_data[field.name]) != ""
         }
         if len(entered["experts"]) < 2:
             entered["overlap"] = 0.0  # a single expert shares nothing with anybody

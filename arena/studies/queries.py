@@ -96,7 +96,7 @@ def count_progress(studies: Iterable[Study], expert: User | None = None) -> list
     current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
     totals = dict(matchups.order_by().values_list("study").annotate(n=Count("pk")))
     answers = current.exclude(of_skipped_pair()).values_list("matchup__study", "question")
-    voted = {(study, asked): n for study, asked, n in answers.annotate(n=Count("pk"))}
+    voted = {(study, question): n for study, question, n in answers.annotate(n=Count("pk"))}
     skips = current.filter(outcome=Vote.Outcome.SKIP).values_list("matchup__study")
     skipped = dict(skips.annotate(n=Count("pk")))
     return [

@@ -20,8 +20,8 @@ register = template.Library()
 @register.simple_tag(takes_context=True)
 def votes_url(context: Context, **search: Any) -> str:
     """The address of the votes of the shown rating that are looked for so."""
-    given = {name: str(value) for name, value in search.items() if value}
-    query = {"rating": str(context["snapshot"].code), **VoteSearch(**given).as_query()}
+    values = {name: str(value) for name, value in search.items() if value}
+    query = {"rating": str(context["snapshot"].code), **VoteSearch(**values).as_query()}
     return f"{reverse('results-votes', args=[context['study'].code])}?{urlencode(query)}"
 
 

@@ -84,8 +84,8 @@ def forms(names: str) -> list[str]:
 @register.filter
 def counted(number: int, forms: str) -> str:
     """Fill in the singular or the plural, as in `3|counted:"{} vote | {} votes"`."""
-    one, many = forms.split(" | ")
-    return (one if number == 1 else many).format(number)
+    singular, many = forms.split(" | ")
+    return (singular if number == 1 else many).format(number)
 
 
 @register.filter

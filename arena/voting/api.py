@@ -20,7 +20,7 @@ from arena.api.fields import (
     TextField,
     WholeNumberField,
 )
-from arena.api.views import ApiView, FileView, Given, file_operation, operation
+from arena.api.views import ApiView, FileView, Params, file_operation, operation
 from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Vote
 from arena.people.services import keep_voting
 from arena.voting.queries.ballots import require_open, upcoming
@@ -150,14 +150,14 @@ class MatchupsView(ApiView):
     is_never_cached = True
 
     @operation(MatchupDocument(many=True), query=MatchupsQuery, name="listMatchups")
-    def get(self, given: Given) -> Response:
+    def get(self, params: Params) -> Response:
         """The next pairs of the expert who asks.
 
         An empty list when all is done.
         """
-        study = get_object_or_404(self.user.studies, code=given["study"])
+        study = get_object_or_404(self.user.studies, code=params["study"])
         require_open(study)
-        matchups = upcoming(study=study, expert=self.user, n=given["n"])
+        matchups = upcoming(study=study, expert=self.user, n=params["n"])
         return Response([as_shown(matchup) for matchup in matchups])
 
 
@@ -168,13 +168,13 @@ class VotesView(ApiView):
     is_never_cached = True
 
     @operation(ReceivedDocument, takes=VoteBody, name="vote")
-    def post(self, given: Given) -> Response:
+    def post(self, params: Params) -> Response:
         """Vote.
 
         The same key counts once, however often it arrives.
         """
-        n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
-        received = receive_vote(expert=self.user, decision=Decision(outcome=outcome, **given))
+        n, outcome = params.pop("n"), OUTCOMES[params.pop("outcome")]
+        received = receive_vote(expert=self.user, decision=Decision(outcome=outcome, **params))
         progress = received.progress
         coming = upcoming(study=received.study, expert=self.user, n=n)
         return Response(
@@ -193,13 +193,13 @@ class ReportsView(ApiView):
     writers = EXPERTS
 
     @operation(SavedDocument, takes=ReportBody, name="report")
-    def post(self, given: Given) -> dict[str, bool]:
+    def post(self, params: Params) -> dict[str, bool]:
         """Report that something is wrong with a pair.
 
         The same key counts once, however often it arrives.
         """
-        side = SIDES[given.pop("side")]
-        report(expert=self.user, complaint=Complaint(side=side, **given))
+        side = SIDES[params.pop("side")]
+        report(expert=self.user, complaint=Complaint(side=side, **params))
         return {"saved": True}
 
 
@@ -209,12 +209,12 @@ class PreferencesView(ApiView):
     permission_classes = (IsAuthenticated,)
 
     @operation(PreferencesDocument, takes=PreferencesBody, name="keepPreferences")
-    def post(self, given: Given) -> Any:
+    def post(self, params: Params) -> Any:
         """Keep voting preferences.
 
         Answers with all of them.
         """
-        keep_voting(self.user, given)
+        keep_voting(self.user, params)
         return voting_switches(self.user)
 
 

@@ -87,8 +87,10 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if request.method == "POST":
         return _practise(request, study)
     pairs = practice_pairs(study, expert)
-    asked = request.GET.get("pair", "")
-    answered = next((pair for pair in pairs if str(pair.position) == asked and pair.answer), None)
+    position = request.GET.get("pair", "")
+    answered = next(
+        (pair for pair in pairs if str(pair.position) == position and pair.answer), None
+    )
     pair = answered or next((pair for pair in pairs if not pair.answer), None)
     if study.state != Study.State.OPEN or pair is None:
         return redirect("vote", code=code)
@@ -103,16 +105,16 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _practise(request: HttpRequest, study: Study) -> HttpResponse:
-    expert, given = get_user(request), request.POST
+    expert, form = get_user(request), request.POST
     page = reverse("vote-practice", args=[study.code])
     # Practice asks which picture is right; neither is as wrong as equal.
-    answer = "equal" if given.get("outcome") == "both_miss" else given.get("outcome")
+    answer = "equal" if form.get("outcome") == "both_miss" else form.get("outcome")
     try:
-        if "skip" in given:
+        if "skip" in form:
             skip_practice(study=study, expert=expert)
             return redirect("vote", code=study.code)
         pair = answer_practice(
-            study=study, expert=expert, position=given.get("pair"), answer=answer
+            study=study, expert=expert, position=form.get("pair"), answer=answer
         )
     except StudyNotOpen:
         return redirect("vote", code=study.code)  # which says that the study is closed

@@ -56,7 +56,9 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "original": _("The scene before the edit"),
     }
     shown = [*pairs, changed["shown"]] if changed else pairs
-    on_them = own_votes(study, expert).filter(matchup__code__in=[one["matchup"] for one in shown])
+    on_them = own_votes(study, expert).filter(
+        matchup__code__in=[pair["matchup"] for pair in shown]
+    )
     last = {vote.pk: vote for vote in (*context["last"], *on_them.reverse())}
     return context | {
         "shown": changed["shown"] if changed else pairs[0],

@@ -120,7 +120,7 @@ def _align(before: Scene, after: Scene, view: SourceView) -> tuple[list[TrafficA
     """The changed scene's agents in the frame of the source, and notes on either ego."""
     notes = []
     agents, frame = list(after.agents), after.origin.frame
-    origins = [one for one in (before.origin, view.origin) if one.frame == frame]
+    origins = [origin for origin in (before.origin, view.origin) if origin.frame == frame]
     if origins:
         seen = origins[0].pose.pose_to_local(after.origin.pose)
         away_m = float(np.hypot(seen.x_m, seen.y_m))
@@ -189,11 +189,11 @@ def _pair(view: SourceView, agents: list[TrafficAgent]) -> tuple[dict[str, str],
     return pairs, [f"{', '.join(unsure)}: {text}"] if unsure else []
 
 
-def _is_like(one: TrafficAgent, other: TrafficAgent) -> bool:
+def _is_like(first: TrafficAgent, other: TrafficAgent) -> bool:
     """Return whether class and box are those of one agent."""
-    sizes_m = (one.length_m - other.length_m, one.width_m - other.width_m)
+    sizes_m = (first.length_m - other.length_m, first.width_m - other.width_m)
     is_same_size = max(map(abs, sizes_m)) <= SAME_BOX_M
-    return is_same_size and CLASS_OF[one.type] is CLASS_OF[other.type]
+    return is_same_size and CLASS_OF[first.type] is CLASS_OF[other.type]
 
 
 def _match(
@@ -204,10 +204,10 @@ def _match(
 
     if not left or not rest:
         return
-    apart_m = np.hypot(*_difference(left, rest, lambda one: (one.x_m, one.y_m)))
-    sizes_m = np.abs(_difference(left, rest, lambda one: (one.length_m, one.width_m)))
-    classes = np.array([CLASS_OF[one.type] for one in left])[:, None] == np.array(
-        [CLASS_OF[one.type] for one in rest]
+    apart_m = np.hypot(*_difference(left, rest, lambda agent: (agent.x_m, agent.y_m)))
+    sizes_m = np.abs(_difference(left, rest, lambda agent: (agent.length_m, agent.width_m)))
+    classes = np.array([CLASS_OF[agent.type] for agent in left])[:, None] == np.array(
+        [CLASS_OF[agent.type] for agent in rest]
     )
     fits = (apart_m <= reach_m) & (sizes_m <= SAME_BOX_M).all(axis=0) & classes
     cost = np.where(fits, apart_m, 1e6)
@@ -224,7 +224,7 @@ def _difference(
     values: Callable[[TrafficAgent], tuple[float, float]],
 ) -> FloatArray:
     """Return the difference of two values of each agent, (2, S, C)."""
-    ours, theirs = (np.array([values(one) for one in some]) for some in (left, rest))
+    ours, theirs = (np.array([values(agent) for agent in some]) for some in (left, rest))
     return np.asarray((ours[:, None] - theirs[None]).transpose(2, 0, 1))
 
 
@@ -255,8 +255,8 @@ def _merge_state(
     return replace(source, **changes, lane_id=agent.lane_id)  # type: ignore[arg-type]
 
 
-def _apart_m(one: tuple[float, float] | None, other: tuple[float, float] | None) -> float:
-    return float(np.hypot(*np.subtract(one, other))) if one and other else 0.0
+def _apart_m(first: tuple[float, float] | None, other: tuple[float, float] | None) -> float:
+    return float(np.hypot(*np.subtract(first, other))) if first and other else 0.0
 
 
 def _free_ids(taken: set[str]) -> Iterator[str]:
@@ -267,9 +267,9 @@ def _on_lanes(
     before: Scene, agents: list[TrafficAgent], keeps_lanes: bool
 ) -> tuple[TrafficAgent, ...]:
     """The agents with the source's lanes under them; lanes that they name already may stay."""
-    known = {lane.id for lane in before.lanes} | {way.id for way in before.connectors}
+    lane_ids = {lane.id for lane in before.lanes} | {way.id for way in before.connectors}
     placed = place_on_lanes(replace(before, agents=tuple(agents))).agents if agents else ()
     return tuple(
-        agent if keeps_lanes and (agent.lane_id is None or agent.lane_id in known) else found
-        for agent, found in zip(agents, placed, strict=True)
+        agent if keeps_lanes and (agent.lane_id is None or agent.lane_id in lane_ids) else fit
+        for agent, fit in zip(agents, placed, strict=True)
     )

@@ -79,9 +79,9 @@ class _Manifest:
     tasks: Annotated[tuple[_TaskLine, ...], Field(min_length=1, max_length=MOST_TASKS)]
 
 
-def _manifest_problems(given: _Manifest) -> Iterator[tuple[str, str]]:
-    names = [task.name for task in given.tasks]
-    for place, task in enumerate(given.tasks):
+def _manifest_problems(manifest: _Manifest) -> Iterator[tuple[str, str]]:
+    names = [task.name for task in manifest.tasks]
+    for place, task in enumerate(manifest.tasks):
         if task.name in names[:place]:
             yield path("tasks", place, "name"), f"{task.name!r} is there twice"
         if task.paraphrase_of and task.paraphrase_of not in names:
@@ -117,7 +117,9 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
     named: dict[str, dict[str, tuple[str, ...]]] = {}
     for task in benchmark.tasks:
         documents = _task_documents(task)
-        files |= {_file_name(kind, task.name): _text(one) for kind, one in documents.items()}
+        files |= {
+            _file_name(kind, task.name): _text(document) for kind, document in documents.items()
+        }
         named[task.name] = {kind: (_file_name(kind, task.name),) for kind in documents}
     losses: list[dict[str, Any]] = []
     cells = [replace(task_cell(task), made_on=benchmark.made_on) for task in benchmark.tasks]
@@ -126,7 +128,7 @@ def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
         files |= {f"{form}/{name}": content for name, content in written.files.items()}
         refused = {loss.cell for loss in written.refused}
         for name, own in _share_out(written.files, [*named.keys() - refused]).items():
-            named[name][form] = tuple(f"{form}/{one}" for one in own)
+            named[name][form] = tuple(f"{form}/{file}" for file in own)
         for is_refused, those in ((False, written.losses), (True, written.refused)):
             kind = {"format": form, "is_refused": is_refused}
             losses += [kind | asdict(loss) for loss in those]
@@ -158,9 +160,9 @@ def read_folder(folder: Path) -> BenchmarkSet:
         made_on=manifest.made_on,
         tasks=tasks,
     )
-    found = checksum(benchmark)
-    if found != manifest.checksum:
-        text = f"{manifest.checksum!r} is not that of the folder, {found!r}: get it once more"
+    digest = checksum(benchmark)
+    if digest != manifest.checksum:
+        text = f"{manifest.checksum!r} is not that of the folder, {digest!r}: get it once more"
         raise InvalidDocument(WHAT, [(f"{MANIFEST}: checksum", text)])
     return benchmark
 
@@ -168,12 +170,12 @@ def read_folder(folder: Path) -> BenchmarkSet:
 def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
     at = f"{MANIFEST}: tasks {line.name!r}"
     needed = {SCENE} | ({REFERENCE} if line.split is Split.PRACTICE else set())
-    given = {kind for kind in OWN_PARTS if kind in line.files}
-    if given - {RECORDING} != needed:
+    kinds = {kind for kind in OWN_PARTS if kind in line.files}
+    if kinds - {RECORDING} != needed:
         text = f"of a {line.split} task expected {', '.join(sorted(needed))}, and a recording"
         raise InvalidDocument(WHAT, [(f"{at}: files", f"{text} if there is one")])
     documents: dict[str, Any] = {}
-    for kind in given:
+    for kind in kinds:
         name = _file_name(kind, line.name)
         if line.files[kind] != (name,):
             raise InvalidDocument(WHAT, [(f"{at}: files.{kind}", f"expected {name!r} alone")])
@@ -209,9 +211,9 @@ def _read(folder: Path, name: str, parse: Callable[[object], Read]) -> Read:
     try:
         return parse(read_json(file, what=WHAT))
     except InvalidDocument as fault:
-        found = [(place.removeprefix(file.name), text) for place, text in fault.problems]
+        problems = [(place.removeprefix(file.name), text) for place, text in fault.problems]
         raise InvalidDocument(
-            WHAT, [(f"{name}: {place}" if place else name, text) for place, text in found]
+            WHAT, [(f"{name}: {place}" if place else name, text) for place, text in problems]
         ) from None
 
 
@@ -250,10 +252,10 @@ def _make_manifest(benchmark: BenchmarkSet) -> _Manifest:
     )
 
 
-def _describe_task(one: BenchmarkTask | _TaskLine) -> dict[str, Any]:
+def _describe_task(task: BenchmarkTask | _TaskLine) -> dict[str, Any]:
     """Return the fields that a task shares with its line in `benchmark.json`."""
     names = ("name", "instruction", "type", "language", "split", "stratum", "keeps_traffic")
-    return {name: getattr(one, name) for name in (*names, "paraphrase_of")}
+    return {name: getattr(task, name) for name in (*names, "paraphrase_of")}
 
 
 def task_cell(task: BenchmarkTask) -> Cell:

@@ -31,13 +31,15 @@ def report_from_document(document: object) -> SubmissionReport:
 
 def count_statuses(report: SubmissionReport) -> dict[EntryStatus, int]:
     """Return how many entries have each status, those with none included."""
-    found = Counter(entry.status for entry in report.entries)
-    return {status: found[status] for status in EntryStatus}
+    counts = Counter(entry.status for entry in report.entries)
+    return {status: counts[status] for status in EntryStatus}
 
 
 def summarise_practice(report: SubmissionReport) -> Summary:
     """Return the displacement over all entries of the practice split."""
-    return summarise([one.displacement for one in report.entries if one.displacement is not None])
+    return summarise(
+        [entry.displacement for entry in report.entries if entry.displacement is not None]
+    )
 
 
 def describe_report(report: SubmissionReport) -> Iterator[str]:
@@ -69,15 +71,17 @@ def _label(entry: SubmittedEntry) -> str:
     return entry.task if entry.sample == 1 else f"{entry.task}--{entry.sample}"
 
 
-def _describe_displacement(found: Displacement | None) -> str:
-    if found is None:
+def _describe_displacement(distance: Displacement | None) -> str:
+    if distance is None:
         return ""
-    mean = "" if found.mean_m is None else f"{found.mean_m!r} m, "
-    counts = f"{mean}{len(found.missing)} missing, {len(found.surplus)} surplus"
-    return counts + _describe_over_time(found.over_time)
+    mean = "" if distance.mean_m is None else f"{distance.mean_m!r} m, "
+    counts = f"{mean}{len(distance.missing)} missing, {len(distance.surplus)} surplus"
+    return counts + _describe_over_time(distance.over_time)
 
 
-def _describe_over_time(found: OverTime | None) -> str:
-    if found is None:
+def _describe_over_time(over_time: OverTime | None) -> str:
+    if over_time is None:
         return ""
-    return f", moving: {found.at_t0_m!r} m at t0, {found.final_m!r} m after {HORIZON_S:g} s"
+    return (
+        f", moving: {over_time.at_t0_m!r} m at t0, {over_time.final_m!r} m after {HORIZON_S:g} s"
+    )

@@ -47,21 +47,23 @@ def show_source(task: BenchmarkTask, format_name: str) -> ShownSource:
     if suffix is None:
         return ShownSource(view=plain)
     written = writer_named(format_name)([task_cell(task)]).files
-    blocks = [one for name, one in written.items() if name.endswith(f"{task.name}{suffix}")]
+    blocks = [file for name, file in written.items() if name.endswith(f"{task.name}{suffix}")]
     if not blocks:  # the scene can't be said in the format
         return ShownSource(view=plain)
     with tempfile.TemporaryDirectory(prefix="arena-source-") as folder:
         file = Path(folder) / f"{task.name}{suffix}"
         file.write_bytes(blocks[0])
-        found = find_reader(format_name).read(file, item=None, frame=None, name=scene.name)
+        reading = find_reader(format_name).read(file, item=None, frame=None, name=scene.name)
     ids = {agent.id: agent.id for agent in scene.agents}
     if format_name == COMMONROAD:
         ids = names_in(blocks[0].decode())
-    names = file_names(format_name, found.names)
-    shown = {ids[names[one.id]]: one for one in found.scene.agents if names[one.id] in ids}
-    known = {agent.id: shown[agent.id] for agent in scene.agents if agent.id in shown}
-    view = SourceView(agents=known, origin=found.scene.origin)
-    return ShownSource(view=view, ids=ids, notes=found.notes)
+    names = file_names(format_name, reading.names)
+    shown = {
+        ids[names[agent.id]]: agent for agent in reading.scene.agents if names[agent.id] in ids
+    }
+    named_agents = {agent.id: shown[agent.id] for agent in scene.agents if agent.id in shown}
+    view = SourceView(agents=named_agents, origin=reading.scene.origin)
+    return ShownSource(view=view, ids=ids, notes=reading.notes)
 
 
 def file_names(format_name: str, names: Mapping[str, str]) -> Mapping[str, str]:
@@ -80,6 +82,6 @@ def identify(shown: ShownSource, content: FileContent) -> SourceView:
     ids = content.own_names or shown.ids
     names = file_names(content.format, content.names or {})
     named = {agent: ids[name] for agent, name in names.items() if name in ids}
-    known = {agent: name for agent, name in named.items() if name in shown.view.agents}
-    is_certain = bool(content.own_names) or (content.format == SCENARIONET and bool(known))
-    return replace(shown.view, names=known, is_certain=is_certain)
+    known_names = {agent: name for agent, name in named.items() if name in shown.view.agents}
+    is_certain = bool(content.own_names) or (content.format == SCENARIONET and bool(known_names))
+    return replace(shown.view, names=known_names, is_certain=is_certain)

@@ -105,7 +105,7 @@ def _sort_files(
     return dict(by_key), strangers
 
 
-def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileContent]:
+def _read_files(root: Path, names: Sequence[str], progress: Path) -> dict[str, FileContent]:
     """Return each file's content; a process reads in order, the next one goes on after it.
 
     Raises:
@@ -115,15 +115,15 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
     deaths = agents = 0
     while rest := names[len(found) :]:
         problem = "was not read"
-        request = {"what": "read", "root": str(root), "files": list(rest), "told": str(told)}
-        told.write_bytes(b"")
+        request = {"what": "read", "root": str(root), "files": list(rest), "told": str(progress)}
+        progress.write_bytes(b"")
         try:
             sandbox.run(submitted_file.__name__, request, name=rest[0])
         except InvalidDocument as fault:
             problem = "; ".join(text for _, text in fault.problems)
         except RuntimeError as fault:  # a fault of ours, which must not cost the other files
             problem = f"makes its reader fail: {str(fault).splitlines()[-1][:200]}"
-        lines = told.read_bytes().split(b"\n")[:-1]
+        lines = progress.read_bytes().split(b"\n")[:-1]
         contents = [_content_in(line) for line in lines]
         agents += sum(map(_count_agents, contents))
         if agents > MOST_TOGETHER:
@@ -140,9 +140,12 @@ def _read_files(root: Path, names: Sequence[str], told: Path) -> dict[str, FileC
 
 
 def _remarks_on(strangers: Sequence[str]) -> tuple[str, ...]:
-    said = [f"{name} belongs to no task and sample: not read." for name in strangers]
-    more = len(said) - MOST_REMARKS
-    return (*said[:MOST_REMARKS], *([f"{more} others belong to none either."] if more > 0 else []))
+    remarks = [f"{name} belongs to no task and sample: not read." for name in strangers]
+    more = len(remarks) - MOST_REMARKS
+    return (
+        *remarks[:MOST_REMARKS],
+        *([f"{more} others belong to none either."] if more > 0 else []),
+    )
 
 
 def _count_agents(content: FileContent) -> int:
@@ -170,8 +173,8 @@ class _Checker:
         if task.split is not Split.PRACTICE or task.reference is None:
             return entry
         ground = Ground.of(task.scene, lambda: task.replayed)
-        found = displacement(entry.modification, task.reference, ground)
-        return replace(entry, displacement=found)
+        distance = displacement(entry.modification, task.reference, ground)
+        return replace(entry, displacement=distance)
 
     def _read(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
         entry = SubmittedEntry(
@@ -206,8 +209,8 @@ class _Checker:
     def _change(
         self, task: BenchmarkTask, content: FileContent
     ) -> tuple[Modification, tuple[str, ...]]:
-        given = content.modification or Modification()
-        agents = given.changed if content.scene is None else content.scene.agents
+        modification = content.modification or Modification()
+        agents = modification.changed if content.scene is None else content.scene.agents
         most = MOST_CHANGED + len(task.scene.agents)
         if len(agents) > most:
             raise InvalidDocument(
@@ -215,9 +218,9 @@ class _Checker:
             )
         if content.scene is None:
             if content.format == lctgen.NAME:
-                placed = place_on_lanes(replace(task.scene, agents=given.added))
-                given = replace(given, added=placed.agents)
-            return given, content.notes
+                placed = place_on_lanes(replace(task.scene, agents=modification.added))
+                modification = replace(modification, added=placed.agents)
+            return modification, content.notes
         if content.format == "json":
             return find_difference(task.scene, content.scene)
         key = task.name, content.format

@@ -107,24 +107,24 @@ def _read_vehicles(document: object) -> FileContent:
 
 
 def _read_scene(reader: Reader, path: Path) -> FileContent:
-    found = reader.read(path, item=None, frame=None, name="submitted")
+    reading = reader.read(path, item=None, frame=None, name="submitted")
     own_names: Mapping[str, str] = {}
     if reader.name == "commonroad":
         with path.open("rb") as file:
             own_names = names_in(file.read(_HEAD_BYTES).decode(errors="replace"))
-    kept = replace(found.scene, lanes=(), connectors=(), areas=())
-    notes = found.notes if found.recording is None else (*found.notes, ONLY_T0)
+    scene = replace(reading.scene, lanes=(), connectors=(), areas=())
+    notes = reading.notes if reading.recording is None else (*reading.notes, ONLY_T0)
     return FileContent(
-        format=reader.name, scene=kept, notes=notes, names=found.names, own_names=own_names
+        format=reader.name, scene=scene, notes=notes, names=reading.names, own_names=own_names
     )
 
 
 def _tell(path: Path) -> dict[str, Any]:
     """Return a file's content as plain JSON, which can be read again."""
     try:
-        found = read_file(path)
-        notes = tuple(escape_controls(note) for note in found.notes)
-        document: dict[str, Any] = CONTENT.dump(replace(found, notes=notes))
+        content = read_file(path)
+        notes = tuple(escape_controls(note) for note in content.notes)
+        document: dict[str, Any] = CONTENT.dump(replace(content, notes=notes))
         CONTENT.from_parts(document)
         return document
     except InvalidDocument as fault:
@@ -139,12 +139,14 @@ def _open(path: Path, folder: Path) -> dict[str, Any]:
     if not path.is_dir():
         root = folder
         unpack_zip(path, folder, bounds=BOUNDS)
-    within = [one for one in root.iterdir() if one.is_dir() and (one / CARD_FILE).is_file()]
+    within = [
+        folder for folder in root.iterdir() if folder.is_dir() and (folder / CARD_FILE).is_file()
+    ]
     if not (root / CARD_FILE).is_file():
         if len(within) != 1:
             raise InvalidDocument("submission", [(CARD_FILE, "is missing")])
         (root,) = within
-    names = [one.name for one in root.iterdir() if not one.name.startswith(".")]
+    names = [entry.name for entry in root.iterdir() if not entry.name.startswith(".")]
     if len(names) > BOUNDS.entries:
         text = f"{len(names)} files; at most {BOUNDS.entries} are taken"
         raise InvalidDocument("submission", [("", text)])
@@ -158,10 +160,10 @@ def _open(path: Path, folder: Path) -> dict[str, Any]:
 
 def _read(request: dict[str, Any]) -> None:
     os.chdir(request["root"])  # names without a place on this machine, as they stand in reasons
-    with Path(request["told"]).open("w") as told:
+    with Path(request["told"]).open("w") as progress:
         for name in request["files"]:
-            told.write(json.dumps(_tell(Path(name)), allow_nan=False) + "\n")
-            told.flush()
+            progress.write(json.dumps(_tell(Path(name)), allow_nan=False) + "\n")
+            progress.flush()
             if time.process_time() > ENOUGH_S:
                 return
 

@@ -81,9 +81,9 @@ class BenchmarkSet:
     tasks: tuple[BenchmarkTask, ...]
 
 
-def _read_date(given: object) -> object:
-    if isinstance(given, str):
-        return date.fromisoformat(given)
+def _read_date(text: object) -> object:
+    if isinstance(text, str):
+        return date.fromisoformat(text)
     raise ValueError("Input should be a date such as 2026-11-20")
 
 

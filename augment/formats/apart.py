@@ -69,13 +69,13 @@ class UntrustedInput:
         Raises:
             UnknownName, InvalidDocument: As above.
         """
-        source, found = self._ask("read", item=item, frame=frame, name=name)
-        recording = found["recording"]
+        source, document = self._ask("read", item=item, frame=frame, name=name)
+        recording = document["recording"]
         return source, Reading(
-            scene=codec.scene_from_document(found["scene"]),
+            scene=codec.scene_from_document(document["scene"]),
             recording=None if recording is None else codec.recording_from_document(recording),
-            notes=_TEXTS.validate_python(found["notes"]),
-            moment=_MOMENT.validate_python(found["moment"]),
+            notes=_TEXTS.validate_python(document["notes"]),
+            moment=_MOMENT.validate_python(document["moment"]),
         )
 
     def vehicles(self, tokens: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
@@ -95,8 +95,8 @@ class UntrustedInput:
         with tempfile.TemporaryDirectory(prefix="arena-reading-") as folder:
             request = {"what": what, "path": str(path), "format": self.format, "folder": folder}
             more_still = {"reach_m": self.reach_m, "more": more}
-            source, found = sandbox.run(__name__, request | more_still, name=path.name)
-        return find_reader(source).name, found
+            source, document = sandbox.run(__name__, request | more_still, name=path.name)
+        return find_reader(source).name, document
 
 
 # The other side: what runs in the process
@@ -127,14 +127,14 @@ def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> 
         return [asdict(moment) for moment in islice(moments, more["most"])]
     if what == "vehicles":
         return vehicles_at(path, more["tokens"])
-    found = reader.read(path, **more)
+    reading = reader.read(path, **more)
     return {
-        "scene": codec.scene_to_document(found.scene),
+        "scene": codec.scene_to_document(reading.scene),
         "recording": None
-        if found.recording is None
-        else codec.recording_to_document(found.recording),
-        "notes": found.notes,
-        "moment": asdict(found.moment),
+        if reading.recording is None
+        else codec.recording_to_document(reading.recording),
+        "notes": reading.notes,
+        "moment": asdict(reading.moment),
     }
 
 
@@ -171,9 +171,9 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
     try:
         with zipfile.ZipFile(path) as packed:
             entries = [
-                one
-                for one in packed.infolist()
-                if not one.is_dir() and not _ADDED.search(one.filename)
+                member
+                for member in packed.infolist()
+                if not member.is_dir() and not _ADDED.search(member.filename)
             ]
             _check_entries(entries, bounds)
             for entry in entries:

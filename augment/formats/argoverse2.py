@@ -238,8 +238,8 @@ def _select_known(
     """The rows of kinds that are known."""
     is_odd = ~table[column].isin(list(types))
     doubts.doubt_unknown("kinds of objects", types, table[column][is_odd].unique(), column)
-    known: pd.DataFrame = table[~is_odd].reset_index(drop=True)
-    return known
+    usable: pd.DataFrame = table[~is_odd].reset_index(drop=True)
+    return usable
 
 
 _ARROW_FAULTS = (ValueError, TypeError, KeyError, IndexError, OSError, OverflowError)
@@ -327,25 +327,29 @@ def _read_map(folder: Path) -> RoadMap:
         for area in read_parts(_Drivable, "drivable_areas")
     ]
     for crossing in read_parts(_Crossing, "pedestrian_crossings"):
-        one, other = _array(crossing.edge1), _array(crossing.edge2)
-        is_same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
-        areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if is_same_way else other])))
+        first, other = _array(crossing.edge1), _array(crossing.edge2)
+        is_same_way = float(np.dot(first[-1] - first[0], other[-1] - other[0])) > 0.0
+        areas.append(
+            (AreaKind.CROSSWALK, np.vstack([first, other[::-1] if is_same_way else other]))
+        )
     lanes = read_parts(_Segment, "lane_segments")
-    driven = [one for one in lanes if one.lane_type != "BIKE"]
+    driven = [lane for lane in lanes if lane.lane_type != "BIKE"]
     return RoadMap(
         place=f"{file.name}: lane_segments",
         segments=tuple(
             Segment(
-                name=one.id,
-                crosses=one.is_intersection,
-                left=_array(one.left_lane_boundary),
-                right=_array(one.right_lane_boundary),
-                successors=one.successors,
-                predecessors=one.predecessors,
-                left_neighbors=() if one.left_neighbor_id is None else (one.left_neighbor_id,),
-                right_neighbors=() if one.right_neighbor_id is None else (one.right_neighbor_id,),
+                name=lane.id,
+                crosses=lane.is_intersection,
+                left=_array(lane.left_lane_boundary),
+                right=_array(lane.right_lane_boundary),
+                successors=lane.successors,
+                predecessors=lane.predecessors,
+                left_neighbors=() if lane.left_neighbor_id is None else (lane.left_neighbor_id,),
+                right_neighbors=()
+                if lane.right_neighbor_id is None
+                else (lane.right_neighbor_id,),
             )
-            for one in driven
+            for lane in driven
         ),
         areas=tuple(areas),
         left_out={"bicycle lanes": len(lanes) - len(driven)},

@@ -104,7 +104,9 @@ def _rows(document: object) -> FloatArray:
     tracks = parts.get("tracks")
     if not isinstance(tracks, Mapping) or not tracks:
         raise fault_at("", "expected LCTGen's `agent` or `tracks`")
-    rows = np.vstack([_first_state(one, f"tracks[{n}]") for n, one in enumerate(tracks.values())])
+    rows = np.vstack(
+        [_first_state(track, f"tracks[{n}]") for n, track in enumerate(tracks.values())]
+    )
     if not rows[0, -1]:
         raise fault_at("tracks", "the first is the ego, and is not there at t0")
     return np.asarray(rows[rows[:, -1] > 0.0, :_COLUMNS])

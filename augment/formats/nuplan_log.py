@@ -65,7 +65,7 @@ class NuPlan(reading.LogReader):
             place = base.execute("SELECT location, map_version, logfile FROM log").fetchone()
             if place is None:
                 raise fault_at("log", "has no row")
-            location, version, logfile = (str(one or "")[:200] for one in place)
+            location, version, logfile = (str(cell or "")[:200] for cell in place)
             token = _token(base, item)
             doubts = Doubts()
             times_s, ego, tracks = _motion(base, token, doubts)
@@ -120,11 +120,11 @@ def _find_map(path: Path, *names: str) -> Path:
             raise fault_at("log", f"{name[:40]!r} is no name of a map")
     cities = [name for name in names if name.strip(".")]
     for folder in path.resolve().parents:
-        found = {file for city in cities for file in (folder / "maps" / city).glob("*/map.gpkg")}
-        if len(found) > 1:
+        maps = {file for city in cities for file in (folder / "maps" / city).glob("*/map.gpkg")}
+        if len(maps) > 1:
             raise fault_at(str(folder / "maps"), "has several maps of this city")
-        if found:
-            return found.pop()
+        if maps:
+            return maps.pop()
     text = f"has no map of {names[0]} beside or above it: maps/{names[0]}/*/map.gpkg"
     raise fault_at(str(path), text)
 
@@ -196,10 +196,10 @@ def _numbers(
         table[name] = values.where(values.abs() <= foreign.FURTHEST)
     whole = table[needed.split()].notna().all(axis=1)
     doubts.assume("A row with a gap or an odd number was left out", (~whole).sum())
-    kept: pd.DataFrame = table[whole].reset_index(drop=True)
-    gaps = kept[further.split()].isna().any(axis=1).sum()
+    complete: pd.DataFrame = table[whole].reset_index(drop=True)
+    gaps = complete[further.split()].isna().any(axis=1).sum()
     doubts.assume("A velocity that is not given is that of the motion, a size the usual", gaps)
-    return kept
+    return complete
 
 
 def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) -> "pd.DataFrame":
@@ -218,7 +218,9 @@ def _boxes(base: sqlite3.Connection, frames: Sequence[bytes], doubts: Doubts) ->
     step_of = {frame: step for step, frame in enumerate(frames)}
     return boxes.assign(
         step=boxes["frame"].map(step_of),
-        track=[one.hex() if isinstance(one, bytes) else str(one) for one in boxes["token"]],
+        track=[
+            token.hex() if isinstance(token, bytes) else str(token) for token in boxes["token"]
+        ],
         kind=boxes["token"].map(kinds),
         speed_mps=np.hypot(boxes["vx"], boxes["vy"]),
     )

@@ -90,11 +90,11 @@ def _read_aggregate(file: Path) -> list[NuplanDrive]:
             for name, value in row.items()
             if name not in _OF_AGGREGATOR
         }
-        found = {"is_interplan": _OF_INTERPLAN in parts, "score": parts.pop("score")}
+        row_values = {"is_interplan": _OF_INTERPLAN in parts, "score": parts.pop("score")}
         place = f"{file.name}: row {number}"
-        if found["score"] is None:
+        if row_values["score"] is None:
             raise InvalidDocument(WHAT, [(f"{place}: score", "is missing")])
-        drives.append(_drive(place, row["scenario"], row, reason="", parts=parts, **found))
+        drives.append(_drive(place, row["scenario"], row, reason="", parts=parts, **row_values))
     return drives
 
 

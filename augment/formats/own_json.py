@@ -55,7 +55,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     }
     if cell.recording is not None:
         documents["recording"] = codec.recording_to_document(_recording(cell))
-    return {f"{cell.stem}.{name}.json": _text(one) for name, one in documents.items()}
+    return {f"{cell.stem}.{name}.json": _text(document) for name, document in documents.items()}
 
 
 def _recording(cell: Cell) -> Recording:

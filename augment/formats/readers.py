@@ -65,17 +65,26 @@ def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Rea
     """
     level = [path]
     while level:
-        found = [
-            (reader, one) for one in sorted(level) for reader in readers if reader.recognises(one)
+        matches = [
+            (reader, candidate)
+            for candidate in sorted(level)
+            for reader in readers
+            if reader.recognises(candidate)
         ]
-        if len(found) == 1:
-            return found[0]
-        if found:
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
             names = [
-                f"{one.relative_to(path.parent)} ({reader.name})" for reader, one in found[:5]
+                f"{candidate.relative_to(path.parent)} ({reader.name})"
+                for reader, candidate in matches[:5]
             ]
-            text = f"holds {len(found)} recordings, one is needed: {', '.join(names)}"
+            text = f"holds {len(matches)} recordings, one is needed: {', '.join(names)}"
             raise InvalidDocument("input", [("", text)])
-        level = [below for one in level if is_deep and one.is_dir() for below in one.iterdir()]
-    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
-    raise InvalidDocument("input", [(str(path), f"looks like none of the formats: {known}")])
+        level = [
+            below
+            for candidate in level
+            if is_deep and candidate.is_dir()
+            for below in candidate.iterdir()
+        ]
+    formats = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
+    raise InvalidDocument("input", [(str(path), f"looks like none of the formats: {formats}")])

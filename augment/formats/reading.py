@@ -223,7 +223,7 @@ class Log:
             InvalidDocument: There is no such lane, or it is shorter.
         """
         lane, _, along = place.rpartition(",")
-        segments = {str(one.name): one for one in self.map_at(frame).segments}
+        segments = {str(segment.name): segment for segment in self.map_at(frame).segments}
         with refuse_shape(f"lane {lane}"):
             line = segment_centreline(foreign.look_up(segments, lane.strip(), "lane"))
         pose = line.pose_at(foreign.read_number(along, "lane", 0.0, line.length_m))
@@ -413,7 +413,10 @@ def place_on_lanes(scene: Scene) -> Scene:
     def place(agent: TrafficAgent, heading_rad: float | None) -> TrafficAgent:
         return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
 
-    agents = [place(one, one.heading_rad if one.type in _HEADED else None) for one in scene.agents]
+    agents = [
+        place(agent, agent.heading_rad if agent.type in _HEADED else None)
+        for agent in scene.agents
+    ]
     return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))
 
 
@@ -463,7 +466,7 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[tuple[Track, ...], dict
                 states=_local(track.states[frame:], origin),
             )
         )
-    return tuple(tracks), {track.agent_id: one[2] for track, one in zip(tracks, met, strict=True)}
+    return tuple(tracks), {track.agent_id: ids[2] for track, ids in zip(tracks, met, strict=True)}
 
 
 def _local(states: FloatArray, origin: Pose) -> FloatArray:

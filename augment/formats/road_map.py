@@ -81,7 +81,7 @@ class RoadMap:
 
 def complete_map(city: RoadMap) -> tuple[RoadMap, list[str]]:
     """Return a map whose segments have widths and intersections, and notes on what it lacks."""
-    segments = {one.name: one for one in city.segments}
+    segments = {segment.name: segment for segment in city.segments}
     city.doubts.assume(
         "Of two lanes with one id the last counts", len(city.segments) - len(segments)
     )
@@ -90,13 +90,13 @@ def complete_map(city: RoadMap) -> tuple[RoadMap, list[str]]:
             segments[name] = replace(segments[name], crosses=True)
     filled, assumed = fill_widths(segments)
     total = len(filled)
-    unlimited = sum(one.speed_limit_mps is None for one in filled)
+    unlimited = sum(segment.speed_limit_mps is None for segment in filled)
     kinds = {kind for kind, _ in city.areas}
     lacking = {
-        NO_CONNECTIVITY: not any(one.successors or one.predecessors for one in filled),
-        NO_INTERSECTIONS: not any(one.crosses for one in filled),
+        NO_CONNECTIVITY: not any(segment.successors or segment.predecessors for segment in filled),
+        NO_INTERSECTIONS: not any(segment.crosses for segment in filled),
         "No traffic lights in this source.": all(
-            one.light is TrafficLight.UNKNOWN for one in filled
+            segment.light is TrafficLight.UNKNOWN for segment in filled
         ),
         "No sidewalks in this source.": AreaKind.WALKWAY not in kinds,
         "No drivable areas in this source: only lanes can be driven on.": (
@@ -150,9 +150,9 @@ def mean_width(line: FloatArray, left: FloatArray, right: FloatArray) -> float |
     """
     halves = [np.hypot(*(edge - line).T) for edge in (left, right)]
     for widths in (halves[0] + halves[1], 2.0 * halves[0], 2.0 * halves[1]):
-        known = widths[np.isfinite(widths)]
-        if len(known) and NARROWEST_M <= float(np.median(known)) <= WIDEST_M:
-            return float(np.median(known))
+        usable = widths[np.isfinite(widths)]
+        if len(usable) and NARROWEST_M <= float(np.median(usable)) <= WIDEST_M:
+            return float(np.median(usable))
     return None
 
 
@@ -172,12 +172,14 @@ def fill_widths(segments: Mapping[Name, Segment]) -> tuple[tuple[Segment, ...], 
                 if width_m is not None:
                     ends[name].append(width_m)
     filled, assumed = [], 0
-    for name, one in segments.items():
-        if one.width_m is None and one.left is None:
-            is_known = one.crosses and bool(ends[name])
+    for name, segment in segments.items():
+        if segment.width_m is None and segment.left is None:
+            is_known = segment.crosses and bool(ends[name])
             assumed += not is_known
-            one = replace(one, width_m=round(fmean(ends[name]), 3) if is_known else USUAL_M)
-        filled.append(one)
+            segment = replace(
+                segment, width_m=round(fmean(ends[name]), 3) if is_known else USUAL_M
+            )
+        filled.append(segment)
     return tuple(filled), assumed
 
 
@@ -199,8 +201,10 @@ LONGEST_WAY = 8
 
 def find_successors(segments: Mapping[Name, Segment]) -> dict[Name, list[Name]]:
     """Return the segments after each one, ascending; a joint counts if either end names it."""
-    joints = {(name, after) for name, one in segments.items() for after in one.successors}
-    joints |= {(before, name) for name, one in segments.items() for before in one.predecessors}
+    joints = {(name, after) for name, segment in segments.items() for after in segment.successors}
+    joints |= {
+        (before, name) for name, segment in segments.items() for before in segment.predecessors
+    }
     inner = [joint for joint in joints if joint[0] in segments and joint[1] in segments]
     following: dict[Name, list[Name]] = {name: [] for name in segments}
     for before, after in sorted(inner):
@@ -236,9 +240,9 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     fork or merge; so does one that leads from a fork to a merge beside such a segment.
     """
     lines = {
-        name: shapely.LineString(one.centerline)
-        for name, one in segments.items()
-        if one.centerline is not None and len(one.centerline) >= 2
+        name: shapely.LineString(segment.centerline)
+        for name, segment in segments.items()
+        if segment.centerline is not None and len(segment.centerline) >= 2
     }
     names = list(lines)
     following = find_successors(segments)
@@ -254,10 +258,14 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     tree = shapely.STRtree([*lines.values()])
     inside: set[Name] = set()
     for first, second in tree.query([lines[name] for name in parting], predicate="crosses").T:
-        one, other = parting[first], names[second]
-        joined = forked[one] & forked[other] or merged[one] & merged[other]
-        if not joined and one not in following[other] and other not in following[one]:
-            inside.add(one)
+        first_name, other = parting[first], names[second]
+        joined = forked[first_name] & forked[other] or merged[first_name] & merged[other]
+        if (
+            not joined
+            and first_name not in following[other]
+            and other not in following[first_name]
+        ):
+            inside.add(first_name)
     forks = {fork for name in inside for fork in forked[name]}
     merges = {merge for name in inside for merge in merged[name]}
     beside = {name for name in names if forked[name] & forks and merged[name] & merges}

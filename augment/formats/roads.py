@@ -145,8 +145,8 @@ def _strip(segment: Segment, ego: Pose, reach_m: float) -> Strip | None:
     Raises:
         ValueError: It has no shape.
     """
-    given = (segment.centerline, segment.left, segment.right)
-    local = [None if line is None else _local(line, ego) for line in given]
+    lines = (segment.centerline, segment.left, segment.right)
+    local = [None if line is None else _local(line, ego) for line in lines]
     if all(points is None or _is_far(points, reach_m) for points in local):
         return None
     if any(points is not None and (np.abs(points) > LARGEST_M).any() for points in local):
@@ -238,15 +238,15 @@ def _lane(
 
     def find_neighbor(beside: Sequence[Name]) -> str | None:
         """The lane beside, along a long one the nearest to its middle; oncoming ones are none."""
-        found = []
+        nearest = []
         for other in beside:
             if other in lane_ids and other != name:
                 line = strips[other].line
                 place = line.project(middle.x_m, middle.y_m)
                 turn_rad = difference(line.heading_at(place.s_m), middle.heading_rad)
                 if abs(turn_rad) < math.pi / 2.0:
-                    found.append((round(place.distance_m, 3), other))
-        return lane_ids[min(found)[1]] if found else None
+                    nearest.append((round(place.distance_m, 3), other))
+        return lane_ids[min(nearest)[1]] if nearest else None
 
     return Lane(
         id=lane_ids[name],
@@ -291,8 +291,8 @@ def _along(chain: Sequence[Strip], before: Strip | None, line: Polyline) -> dict
     """Return the properties shared along a way; the lane before may have its light."""
     limits = [strip.segment.speed_limit_mps for strip in chain]
     lights = [strip.segment.light for strip in (*chain, *([] if before is None else [before]))]
-    shown = [one for one in lights if one not in (TrafficLight.UNKNOWN, TrafficLight.NONE)]
-    dark = [one for one in lights[: len(chain)] if one is TrafficLight.UNKNOWN]
+    shown = [light for light in lights if light not in (TrafficLight.UNKNOWN, TrafficLight.NONE)]
+    dark = [light for light in lights[: len(chain)] if light is TrafficLight.UNKNOWN]
     left = [strip.left for strip in chain if strip.left is not None]
     right = [strip.right for strip in chain if strip.right is not None]
     lengths = [strip.line.length_m for strip in chain]

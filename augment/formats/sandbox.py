@@ -67,13 +67,13 @@ def run(
         RuntimeError: The module has a fault of its own; the text ends with its traceback.
     """
     with (
-        tempfile.TemporaryFile() as asked,
+        tempfile.TemporaryFile() as request_file,
         tempfile.TemporaryFile() as answer,
         tempfile.TemporaryFile() as log,
     ):
-        asked.write(json.dumps(request).encode())
-        asked.seek(0)
-        status = _wait(module, limits, asked, answer, log)
+        request_file.write(json.dumps(request).encode())
+        request_file.seek(0)
+        status = _wait(module, limits, request_file, answer, log)
         if status == 0:
             return _answer_in(answer, name)
         reason = _reason(status, limits)
@@ -107,18 +107,18 @@ def serve(operation: Callable[[dict[str, Any]], object]) -> None:
 
 
 def _wait(
-    module: str, limits: ProcessLimits, asked: IO[bytes], answer: IO[bytes], log: IO[bytes]
+    module: str, limits: ProcessLimits, request_file: IO[bytes], answer: IO[bytes], log: IO[bytes]
 ) -> int:
     """Run the module and return its status, negative for a signal."""
-    given = {key: os.environ[key] for key in _PASSED_ON if key in os.environ}
+    environment = {key: os.environ[key] for key in _PASSED_ON if key in os.environ}
     try:
         done = subprocess.run(
             [sys.executable, "-m", module, json.dumps(asdict(limits))],
-            stdin=asked,
+            stdin=request_file,
             stdout=answer,
             stderr=log,
             cwd=_ROOT,
-            env=given | _SINGLE_THREAD | _FRUGAL,
+            env=environment | _SINGLE_THREAD | _FRUGAL,
             timeout=limits.deadline_s,
             check=False,
         )
@@ -159,7 +159,7 @@ def _answer_in(answer: IO[bytes], name: str) -> Any:
         text = f"holds more than {_ANSWER_BYTES >> 20} MB of scene"
         raise InvalidDocument("file", [(name, text)])
     answer.seek(0)
-    told = json.load(answer)
-    if "answer" in told:
-        return told["answer"]
-    raise InvalidDocument(told["what"], [(path, text) for path, text in told["problems"]])
+    reply = json.load(answer)
+    if "answer" in reply:
+        return reply["answer"]
+    raise InvalidDocument(reply["what"], [(path, text) for path, text in reply["problems"]])

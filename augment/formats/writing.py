@@ -201,19 +201,31 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     own = [other for other in motion.others if other.agent.walk_to_m or other.agent.motion]
-    waiting = [one.agent.id for one in own if one.started_s is None and one.agent.walk_to_m]
+    waiting = [
+        participant.agent.id
+        for participant in own
+        if participant.started_s is None and participant.agent.walk_to_m
+    ]
     text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
     report.lose_of(waiting, text, changes_scene=True)
-    waiting = [one.agent.id for one in own if one.started_s is None and one.agent.motion]
+    waiting = [
+        participant.agent.id
+        for participant in own
+        if participant.started_s is None and participant.agent.motion
+    ]
     text = "has a motion but never sets out: its trigger does not fire"
     report.lose_of(waiting, text, changes_scene=True)
     if can_trigger:
         return
     text = "sets out at a fixed time, not when its trigger fires"
-    names = [one.agent.id for one in own if one.started_s is not None and _waits(one.agent)]
+    names = [
+        participant.agent.id
+        for participant in own
+        if participant.started_s is not None and _waits(participant.agent)
+    ]
     report.lose_of(names, text)
     text = "the walk or motion is written as it goes, without end point, path and trigger"
-    report.lose_of([one.agent.id for one in own], text)
+    report.lose_of([participant.agent.id for participant in own], text)
 
 
 def _waits(agent: entities.TrafficAgent) -> bool:

@@ -386,9 +386,9 @@ def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> 
     for name in _DROPPABLE:
         if name not in sent or named not in ("", name):
             continue
-        given = f"{sent[name]:g}" if isinstance(sent[name], float) else str(sent[name])
+        sent_value = f"{sent[name]:g}" if isinstance(sent[name], float) else str(sent[name])
         is_about_value = says("about_value", text) or re.search(
-            rf"(?<![\w.-]){re.escape(given)}\b", text
+            rf"(?<![\w.-]){re.escape(sent_value)}\b", text
         )
         if (named and error.code in _NOT_TAKEN) or says("unknown_parameter", text, name=name):
             return name

@@ -241,14 +241,14 @@ def request_hash(
         prompt_version: Of the texts that the messages were made from.
         options: What else keeps answers apart: options of who asks, the number of the sample.
     """
-    asked: dict[str, object] = {
+    content: dict[str, object] = {
         "base_url": base_url.rstrip("/"),
         "prompt_version": prompt_version,
         "request": document,
     }
     if options:
-        asked["options"] = dict(options)
-    canonical = json.dumps(asked, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+        content["options"] = dict(options)
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(canonical.encode("ascii")).hexdigest()
 
 

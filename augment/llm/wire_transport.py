@@ -169,7 +169,7 @@ class Transport(AbstractContextManager["Transport"]):
         import httpx2
 
         url = request.url
-        asked = httpcore2.Request(
+        wire_request = httpcore2.Request(
             method=request.method,
             url=httpcore2.URL(
                 scheme=url.raw_scheme, host=url.raw_host, port=url.port, target=url.raw_path
@@ -178,7 +178,7 @@ class Transport(AbstractContextManager["Transport"]):
             content=request.stream,
         )
         try:
-            answer = self._pool.handle_request(asked)
+            answer = self._pool.handle_request(wire_request)
             try:
                 body = _read_body(answer)
             finally:
@@ -282,8 +282,8 @@ class _Network:
 
         def look() -> None:
             try:
-                found = resolve_host(host, resolve=self._resolve, checks=self._checks)
-                addresses.set_result(found)
+                resolved = resolve_host(host, resolve=self._resolve, checks=self._checks)
+                addresses.set_result(resolved)
             except (InvalidDocument, OSError, UnicodeError) as error:
                 addresses.set_exception(error)
 

@@ -52,7 +52,7 @@ class BaseScene(models.Model):
 class Scenario(models.Model):
     """A scene, its type, the user's instruction; its intent and reference if there are any."""
 
-    SETS = tuple(one.value for one in CatalogueSet)
+    SETS = tuple(entry.value for entry in CatalogueSet)
     """The parts of the authored catalogue, by name."""
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
@@ -74,7 +74,7 @@ class Scenario(models.Model):
         help_text="what the instruction asks for, in augment.scene.codec's format",
     )
     intent_origin = models.CharField(
-        max_length=10, choices=[(one.value, one.value) for one in IntentOrigin], blank=True
+        max_length=10, choices=[(entry.value, entry.value) for entry in IntentOrigin], blank=True
     )
     keep_traffic = models.BooleanField(
         default=False, help_text="keep the recorded traffic; interPlan clears it"
@@ -82,13 +82,13 @@ class Scenario(models.Model):
     traffic_density = models.CharField(
         max_length=10,
         default=TrafficDensity.NONE.value,
-        choices=[(one.value, one.value) for one in TrafficDensity],
+        choices=[(entry.value, entry.value) for entry in TrafficDensity],
         help_text="of the traffic spawned in place of the recorded one",
     )
     goal = models.CharField(
         max_length=10,
         blank=True,
-        choices=[(one.value, one.value) for one in GOALS],
+        choices=[(entry.value, entry.value) for entry in GOALS],
         help_text="where the ego's way turns; empty for the recorded or straightest way",
     )
     spawned = models.JSONField(
@@ -106,7 +106,7 @@ class Scenario(models.Model):
         max_length=10,
         blank=True,
         db_index=True,
-        choices=[(one.value, one.value) for one in CatalogueSet],
+        choices=[(entry.value, entry.value) for entry in CatalogueSet],
         help_text="the part of the authored catalogue that it belongs to; empty for all others",
     )
     language = models.CharField(max_length=2, default="en", help_text="of the instruction")
@@ -149,9 +149,9 @@ class Scenario(models.Model):
         constraints = (
             models.CheckConstraint(
                 name="scenario_type_of_ones_own_has_a_label",
-                condition=Q(type__in=[one.value for one in ScenarioType], type_label="")
+                condition=Q(type__in=[entry.value for entry in ScenarioType], type_label="")
                 | (
-                    ~Q(type__in=[one.value for one in ScenarioType])
+                    ~Q(type__in=[entry.value for entry in ScenarioType])
                     & ~Q(type="")
                     & ~Q(type_label="")
                 ),
@@ -202,10 +202,10 @@ class Scenario(models.Model):
     @property
     def wording(self) -> str:
         """The instruction; of a follow-up all that was said up to it, a numbered line each."""
-        said = [*(before.instruction for before in self.followed), self.instruction]
-        if len(said) == 1:
+        wishes = [*(before.instruction for before in self.followed), self.instruction]
+        if len(wishes) == 1:
             return self.instruction
-        return "\n".join(f"{number}. {text}" for number, text in enumerate(said, start=1))
+        return "\n".join(f"{number}. {text}" for number, text in enumerate(wishes, start=1))
 
     def get_type_display(self) -> str:
         """Return the label of its type."""

@@ -159,8 +159,8 @@ def _list_append_only(
 ) -> list[type[AppendOnly]]:
     """Return the append-only models that already have a table."""
     tables = [model for model in models if issubclass(model, AppendOnly)]
-    kept = connection.introspection.table_names() if tables else []
-    return [model for model in tables if model._meta.db_table in kept]
+    existing = connection.introspection.table_names() if tables else []
+    return [model for model in tables if model._meta.db_table in existing]
 
 
 def _for_sqlite(model: type[AppendOnly]) -> list[str]:

@@ -111,8 +111,8 @@ class DisplacementTable:
 def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
     """Return the table of a job, grouped by that and the contestant; one query."""
     measured = of_job(job)
-    every = in_type_order([*ScenarioType, *(one.row.scenario.type for one in measured)])
-    left_out = Counter(one.why_not.value for one in measured if one.why_not is not None)
+    every = in_type_order([*ScenarioType, *(line.row.scenario.type for line in measured)])
+    left_out = Counter(line.why_not.value for line in measured if line.why_not is not None)
     return DisplacementTable(
         job=job.name,
         by=by,
@@ -197,7 +197,7 @@ MATCHES_OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="
 def object_sheet(job: GenerationJob) -> Sheet:
     """Return the displacement of a job with one row an object."""
     name, objects = "displacement-objects", list(list_objects(job))
-    moves = any(one["match"] and one["match"].average_m is not None for one in objects)
+    moves = any(entry["match"] and entry["match"].average_m is not None for entry in objects)
     columns = {**OBJECTS, **MATCHES_OVER_TIME} if moves else OBJECTS
     return make_sheet(objects, columns, name=name, key="objects", number=".4f")
 
@@ -257,10 +257,10 @@ def _name(table: DisplacementTable, group: Group) -> str:
     heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
     summary = group.summary
     counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}
-    said = ", ".join(
+    remark = ", ".join(
         f"{word} {number}" for word, number in counts.items() if number or word == "n"
     )
-    return f"{heading}{name} ({said})"
+    return f"{heading}{name} ({remark})"
 
 
 def _scale(axes: Axes, boxes: Sequence[dict[str, Any]]) -> None:

@@ -153,8 +153,8 @@ def _agreement(
     alpha = None
     if several:  # how often "no", nothing and "yes" was said of each augmentation
         seen = np.array([sum(getattr(label, fault.value) for label in own) for own in several])
-        said = np.column_stack([[len(own) for own in several] - seen, np.zeros_like(seen), seen])
-        alpha = krippendorff_alpha(said.astype(np.int64), DifferenceMetric.NOMINAL)
+        votes = np.column_stack([[len(own) for own in several] - seen, np.zeros_like(seen), seen])
+        alpha = krippendorff_alpha(votes.astype(np.int64), DifferenceMetric.NOMINAL)
     return {
         "fault": fault.value,
         "kappa": cohens_kappa(

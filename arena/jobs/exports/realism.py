@@ -43,7 +43,7 @@ def realism_context(job: GenerationJob) -> dict[str, Any]:
 
 def answer_in_words(table: RealismTable) -> str:
     """Return who is most realistic and where that lies, as a sentence."""
-    best = next((one for one in table.lines if one.subject is Subject.CONTESTANT), None)
+    best = next((line for line in table.lines if line.subject is Subject.CONTESTANT), None)
     if best is None or best.mean is None:
         return "No contestant placed anything that could be judged."
     recorded = "--" if best.recorded is None else f"{best.recorded:.2f}"

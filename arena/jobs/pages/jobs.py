@@ -133,7 +133,7 @@ TABS: dict[str, tuple[str, Callable[[HttpRequest, JobCounts], Context]]] = {
     "money": ("Money", lambda _request, counts: {"unpriced": count_unpriced(counts.job)}),
     "displacement": ("Displacement", _show_displacement),
     "realism": ("Realism", lambda _asked, of: {"realism": realism_context(of.job)}),
-    "driving": ("Driving", lambda asked, of: {"driving": driving_section(asked, of.job)}),
+    "driving": ("Driving", lambda request, of: {"driving": driving_section(request, of.job)}),
     "files": ("Files", _show_files),
 }
 """The parts of a job's page: what they are called, and what their templates show."""

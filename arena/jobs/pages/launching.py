@@ -95,7 +95,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
     @cached_property
     def missing_keys(self) -> set[str]:
         """For the template: variables of the models' keys that the workers do not have."""
-        names = {known.endpoint.key_variable for known in self.models} - {""}
+        names = {model.endpoint.key_variable for model in self.models} - {""}
         return names - workforce().keys
 
     @property
@@ -187,10 +187,10 @@ def _show_estimate(request: HttpRequest, form: LaunchForm) -> HttpResponse:
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     """Launch the job; of one that tries first, one scenario with a memory of the rest."""
-    given = dict(form.cleaned_data)
+    values = dict(form.cleaned_data)
     made = add_cells(form.cells_chosen, actor=get_user(request))
-    given["contestants"] = [*given["contestants"], *made]
-    asked_for = read_request(JobRequest, given)
+    values["contestants"] = [*values["contestants"], *made]
+    asked_for = read_request(JobRequest, values)
     if "try" in request.POST:
         plan = {
             name: str(value) if isinstance(value, Decimal) else value

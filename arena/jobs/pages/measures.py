@@ -70,9 +70,9 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
-    known, way = _ways(request, job)
+    ways, way = _ways(request, job)
     drives = Simulation.objects.filter(driving_scores.drives_of_job(job)).defer("trace")
-    rows = known[way].of(drives)
+    rows = ways[way].of(drives)
     related = rows.select_related("scenario", "augmentation__contestant")
     ordered = related.order_by(
         "scenario__type", "scenario__slug", "augmentation__contestant__name"
@@ -87,7 +87,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one drive, beside the same scene before the change."""
     row = _driven(code)
     before = find_unmodified_drive(row)
-    metrics, old = _metrics(row), {one["name"]: one["value"] for one in _metrics(before)}
+    metrics, old = _metrics(row), {score["name"]: score["value"] for score in _metrics(before)}
     context = {
         "drive": row,
         "before": before,
@@ -109,11 +109,11 @@ def drive_trace(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of the driving part of a job's page."""
-    known, chosen = _ways(request, job)
+    driven, chosen = _ways(request, job)
     score = choice_asked(request, "score", list(SCORES)) or NUPLAN
-    table = driving_scores.scores_of_job(job, options=known[chosen], score=score)
+    table = driving_scores.scores_of_job(job, options=driven[chosen], score=score)
     ways = []
-    for way in known:
+    for way in driven:
         planner = PLANNERS.get(way.planner, way.planner)
         offsets = OFFSETS[way.offsets] if way.planner == PDM_CLOSED else ""
         version = f"version {way.version}" if way.version != Options().version else ""
@@ -131,9 +131,9 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
 
 def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]:
     """Return how the job was driven, the last way first, and which the address asks for."""
-    known = driving_scores.options_driven(job) or [Options()]
-    numbers = [str(number) for number in range(len(known))]
-    return known, int(choice_asked(request, "driven", numbers) or 0)
+    ways = driving_scores.options_driven(job) or [Options()]
+    numbers = [str(number) for number in range(len(ways))]
+    return ways, int(choice_asked(request, "driven", numbers) or 0)
 
 
 def _driven(code: uuid.UUID) -> Simulation:
@@ -150,7 +150,12 @@ def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
 
 # --- Displacement, analyses and files -----------------------------------------------------------
 
-UNMEASURED_FILES = ("faults", "tool-calls", "transcripts", *(f"driving-{one}" for one in SCORES))
+UNMEASURED_FILES = (
+    "faults",
+    "tool-calls",
+    "transcripts",
+    *(f"driving-{score}" for score in SCORES),
+)
 """Files of a job that need no measure of its rows."""
 
 GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
@@ -167,8 +172,8 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
         return redirect("job-tab", code=code, tab="displacement")
     options: dict[str, Any] = {}
     if name.startswith("driving-"):
-        known, way = _ways(request, job)
-        options = {"options": known[way]}
+        ways, way = _ways(request, job)
+        options = {"options": ways[way]}
     stem = f"{slugify(job.name) or 'job'}-{name}"
     return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
 

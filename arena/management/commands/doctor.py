@@ -20,14 +20,14 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Examine and tell."""
-        found = examine()
+        findings = examine()
         if options["json"]:
-            self.stdout.write_data(json.dumps([asdict(finding) for finding in found], indent=1))
+            self.stdout.write_data(json.dumps([asdict(finding) for finding in findings], indent=1))
             self.stdout.write_data("\n")
         else:
-            for finding in found:
+            for finding in findings:
                 self._tell(finding)
-        broken = sum(finding.level is Level.BROKEN for finding in found)
+        broken = sum(finding.level is Level.BROKEN for finding in findings)
         if broken:
             raise CommandError(f"{broken} broken." if broken > 1 else "One part is broken.")
 

@@ -38,10 +38,10 @@ class Command(TerminalCommand):
                 "Imported. Make an account to look at it: manage.py add_person NAME --role admin"
             )
             return
-        found = import_results(tokens=options["tokens"], folders=options["folders"])
-        for line in found.strangers:
+        imported = import_results(tokens=options["tokens"], folders=options["folders"])
+        for line in imported.strangers:
             self.stdout.write(f"Left out: {line}.")
         self.stdout.write(
-            f"{found.kept} results of nuPlan kept, {found.failed} of them failed; "
-            f"{len(found.strangers)} left out."
+            f"{imported.kept} results of nuPlan kept, {imported.failed} of them failed; "
+            f"{len(imported.strangers)} left out."
         )

@@ -26,7 +26,9 @@ class Command(TerminalCommand):
         names = ("endpoint", "model")
         for name in names:
             parser.add_argument(f"--{name}", required=True)
-        add_options(parser, [one for one in to_inputs(JudgeRequest) if one.name not in names])
+        add_options(
+            parser, [field for field in to_inputs(JudgeRequest) if field.name not in names]
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask about one pair after the other; workers may help."""
@@ -40,6 +42,6 @@ class Command(TerminalCommand):
             f"preferences kept {line.kept}, lost {line.lost}, equal {line.equal}, "
             f"unreadable {line.unreadable}, failed {line.failed}."
         )
-        found = judge_agreement(study, run.question).get(line.name)
-        if found is not None:
-            self.stdout.write(f"Agrees with the experts on {share_text(found.share)}.")
+        agreement = judge_agreement(study, run.question).get(line.name)
+        if agreement is not None:
+            self.stdout.write(f"Agrees with the experts on {share_text(agreement.share)}.")

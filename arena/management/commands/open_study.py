@@ -25,19 +25,19 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Open the study and say what was planned."""
-        given = {field.name: options[field.name] for field in PLAN_INPUTS}
-        given |= {
+        values = {field.name: options[field.name] for field in PLAN_INPUTS}
+        values |= {
             "contestants": resolve_contestants(options["contestants"]),
             "scenarios": resolve_scenarios(options["scenarios"]),
             "checks": self._checks(options["checks"]),
         }
-        study = open_study(StudyPlan.read(given))
+        study = open_study(StudyPlan.read(values))
         self._say(study)
 
-    def _checks(self, asked: float | None) -> float:
+    def _checks(self, percent: float | None) -> float:
         """The percentage; without one it depends on what was drawn, and that is said."""
-        if asked is not None:
-            return asked
+        if percent is not None:
+            return percent
         usual = usual_checks()
         if not usual:
             self.stdout.write(

@@ -42,13 +42,15 @@ def agreement_rating(snapshot: Snapshot) -> Snapshot:
 
 def agreement_sheet(snapshot: Snapshot) -> Sheet:
     """Return one row a rater: by question, first on all votes, then by scenario type."""
-    asked = agreement_by_question(snapshot)
+    by_question = agreement_by_question(snapshot)
     facts = {
         "study": snapshot.study.name,
         "rating": str(snapshot.code),
         "simulated": snapshot.includes_simulated,
         "early": snapshot.is_early,
-        "answers": {question: agreement_sentence(lines) for question, lines in asked.items()},
+        "answers": {
+            question: agreement_sentence(lines) for question, lines in by_question.items()
+        },
         "method": METHOD,
     }
     lines = snapshot.results.agreement
@@ -57,16 +59,16 @@ def agreement_sheet(snapshot: Snapshot) -> Sheet:
 
 def agreement_latex(snapshot: Snapshot) -> bytes:
     """Return a table a question, of the lines on all votes."""
-    asked = agreement_by_question(snapshot)
-    return "\n".join(_latex(snapshot, name, lines) for name, lines in asked.items()).encode()
+    by_question = agreement_by_question(snapshot)
+    return "\n".join(_latex(snapshot, name, lines) for name, lines in by_question.items()).encode()
 
 
 def agreement_by_question(snapshot: Snapshot) -> dict[str, list[AgreementLine]]:
     """Return the lines of a rating by what was asked, the primary question first."""
-    asked: dict[str, list[AgreementLine]] = {}
+    by_question: dict[str, list[AgreementLine]] = {}
     for line in snapshot.results.agreement:
-        asked.setdefault(line.question, []).append(line)
-    return asked
+        by_question.setdefault(line.question, []).append(line)
+    return by_question
 
 
 FORMATS = table_formats(agreement_sheet) | formats(latex=agreement_latex)

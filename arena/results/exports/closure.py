@@ -81,12 +81,12 @@ class Closure:
     @property
     def scenarios(self) -> Rows:
         """The same with what its paraphrases say in other words and its follow-ups follow."""
-        found = new = set(self.named_scenarios.values_list("pk", flat=True))
+        pks = new = set(self.named_scenarios.values_list("pk", flat=True))
         while new:
             rows = Scenario.objects.filter(pk__in=new).values_list("paraphrase_of", "follows")
-            new = {pk for row in rows for pk in row if pk is not None} - found
-            found = found | new
-        return Scenario.objects.filter(pk__in=found)
+            new = {pk for row in rows for pk in row if pk is not None} - pks
+            pks = pks | new
+        return Scenario.objects.filter(pk__in=pks)
 
     @property
     def readings(self) -> Rows:
@@ -124,8 +124,8 @@ class Closure:
         Through their keys: a join with the jobs would give one of two jobs twice.
         """
         own = getattr(self.study, name).values("pk")
-        found = model._default_manager.filter(Q(pk__in=own) | Q(jobs__in=self.jobs))
-        return model._default_manager.filter(pk__in=found.values("pk"))
+        rows = model._default_manager.filter(Q(pk__in=own) | Q(jobs__in=self.jobs))
+        return model._default_manager.filter(pk__in=rows.values("pk"))
 
 
 _CHOSEN: dict[type[models.Model], Callable[[Closure], Q]] = {
@@ -188,14 +188,14 @@ def close_over(study: Study) -> Closure:
     while new:
         closure.jobs |= new
         sources = ModelCall.objects.filter(copies__attempt__augmentation__job__in=new)
-        found = set(
+        jobs = set(
             sources.exclude(attempt=None).values_list("attempt__augmentation__job", flat=True)
         )
         rows = Augmentation.objects.filter(job__in=new)
         for column in ("follows", "corrects"):
             tied = rows.exclude(**{column: None})
-            found.update(tied.values_list(f"{column}__job", flat=True))
-        new = found - closure.jobs
+            jobs.update(tied.values_list(f"{column}__job", flat=True))
+        new = jobs - closure.jobs
     # In the order of their names, so that whatever is ordered by name stays as it is.
     # Sorted here: databases order letters each in its own way.
     named = User.objects.filter(pk__in=_people(closure)).values_list("username", "pk")

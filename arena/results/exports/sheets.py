@@ -55,12 +55,12 @@ def find_cells(
         UnknownName: The job has no such scenario, contestant or sample.
     """
     cells = list(list_cells(job).filter(sample=sample))
-    for kind, names, known in (
+    for kind, names, allowed in (
         ("sample of this job", [str(sample)], {str(n + 1) for n in range(job.samples)}),
         ("contestant of this job", contestants, {cell.contestant.slug for cell in cells}),
         ("scenario of this job", scenarios, {cell.scenario.slug for cell in cells}),
     ):
-        check_names(kind, names, sorted(known))
+        check_names(kind, names, sorted(allowed))
     return {(cell.scenario.slug, cell.contestant.slug): cell for cell in cells}
 
 

@@ -171,7 +171,9 @@ class _Folder:
                 line = stored_rows.as_line(row)
                 self.named |= {row[place] for place in places if row[place]}
                 self.media |= {name.decode() for name in _NAMES.findall(line)}
-                self.media |= {f"{ASKED}/{found.decode()}.png" for found in _DIGESTS.findall(line)}
+                self.media |= {
+                    f"{ASKED}/{digest.decode()}.png" for digest in _DIGESTS.findall(line)
+                }
                 written.append(len(line))
                 yield line
 

@@ -43,12 +43,12 @@ def method_text(rating: Snapshot) -> str:
     )
     method = METHOD_TEXTS[rating.method]
     is_usual = rating.study.questions == [Question.INSTRUCTION]
-    asked = "" if is_usual else f", question {rating.question}"
+    question = "" if is_usual else f", question {rating.question}"
     # Nothing is drawn for a closed form; earlier ratings name the seed all the same.
     is_old = rating.state == Snapshot.State.READY and rating.settled_ties is None
     is_drawn = is_old or not is_closed_form(rating)
     seed = f", seed {rating.seed}" if is_drawn else ""
-    return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{asked}"
+    return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{question}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,8 +123,8 @@ class LeaderboardTable:
         """Sentences that no reader may miss, for files."""
         rating = self.snapshot
         marks = {SIMULATED_TABLE: rating.includes_simulated, EARLY_LOOK: rating.is_early}
-        said = [mark for mark, holds in marks.items() if holds]
-        return [*said, *filter(None, [" ".join(self.reasons)]), *self.notes]
+        remarks = [mark for mark, holds in marks.items() if holds]
+        return [*remarks, *filter(None, [" ".join(self.reasons)]), *self.notes]
 
     @property
     def notes(self) -> list[str]:

@@ -34,8 +34,8 @@ def vote_table(snapshot: Snapshot) -> Sheet:
 def list_unrated(study: Study) -> Sheet:
     """Return the votes of a study that nobody rates, repeats and checks too; no skips."""
     last = last_vote_id(study)
-    asked = [Filters(question=question) for question in study.questions]
-    current = [vote for filters in asked for vote in current_votes(study, filters, last)]
+    questions = [Filters(question=question) for question in study.questions]
+    current = [vote for filters in questions for vote in current_votes(study, filters, last)]
     decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
     return _sheet(vote_files.vote_rows(decided, names), vote_columns.VERSION)

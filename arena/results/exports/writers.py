@@ -202,9 +202,9 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
     Raises:
         UnknownName: The rating has no such chart.
     """
-    known = charts(snapshot)
-    check_names("chart of this rating", [name], known)
-    return known[name]
+    chart_functions = charts(snapshot)
+    check_names("chart of this rating", [name], chart_functions)
+    return chart_functions[name]
 
 
 CHARTS = ("pairs", "types", "displacement", "elo-usd")

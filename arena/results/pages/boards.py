@@ -99,7 +99,7 @@ def board_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context["studies"] = studies = board.studies.order_by("opened_at", "pk")
     published = context["tables"][0].document.studies if context["tables"] else ()
     closed = {str(row.code) for row in studies if row.state == Study.State.CLOSED}
-    context["has_news"] = bool(closed - {one.code for one in published})
+    context["has_news"] = bool(closed - {table.code for table in published})
     if board.token:
         address = reverse("shared-board", args=[board.token])
         context["shared_address"] = request.build_absolute_uri(address)
@@ -139,8 +139,8 @@ def start_batch(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     if not form.is_valid():
         tell_errors(request, form)
         return None
-    asked = read_request(BatchRequest, form.cleaned_data)
-    study = open_batch(board, asked, actor=get_user(request))
+    request_of_batch = read_request(BatchRequest, form.cleaned_data)
+    study = open_batch(board, request_of_batch, actor=get_user(request))
     return redirect("study", code=study.code)
 
 
@@ -181,8 +181,8 @@ def _find_board(request: HttpRequest, token: str) -> Board:
 def _context(request: HttpRequest, board: Board) -> dict[str, Any]:
     """The table that the address names, the newest unless it does."""
     tables = list(board.tables.defer("files"))
-    asked = request.GET.get("table")
-    shown = [one for one in tables if asked in (None, str(one.number))]
+    number = request.GET.get("table")
+    shown = [table for table in tables if number in (None, str(table.number))]
     if tables and not shown:
         raise Http404
     remarks = list_remarks(board.benchmark)
@@ -192,8 +192,8 @@ def _context(request: HttpRequest, board: Board) -> dict[str, Any]:
     table = shown[0].document
     drawn = plot(table_rows(table))
     rows = [
-        (one["row"], line, one["mark"])
-        for one, line in zip(drawn["lines"], table.lines, strict=True)
+        (line_drawn["row"], line, line_drawn["mark"])
+        for line_drawn, line in zip(drawn["lines"], table.lines, strict=True)
     ]
     return context | {"table": table, "rows": rows, "ticks": drawn["ticks"]}
 

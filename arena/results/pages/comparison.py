@@ -37,7 +37,7 @@ def comparison_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = OtherStudyForm(request.GET or None, study=study)
     context: dict[str, Any] = {"study": study, "form": form}
     if form.is_valid():
-        rated = [get_snapshot(request, one) for one in (study, form.cleaned_data["other"])]
+        rated = [get_snapshot(request, code) for code in (study, form.cleaned_data["other"])]
         sides = [_side(snapshot) for snapshot in rated]
         slugs = dict.fromkeys(slug for side in sides for slug in side["by_slug"])
         context["sides"] = sides
@@ -50,7 +50,7 @@ def comparison_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _side(snapshot: Snapshot) -> dict[str, Any]:
     """A study's sentence, its axis, and its lines by contestant."""
-    told = describe(snapshot, is_staff=True)
-    drawn = plot(told["table"].rows)
+    description = describe(snapshot, is_staff=True)
+    drawn = plot(description["table"].rows)
     by_slug = {line["row"].slug: line for line in drawn["lines"] if line["row"].votes}
-    return told | {"study": snapshot.study, "ticks": drawn["ticks"], "by_slug": by_slug}
+    return description | {"study": snapshot.study, "ticks": drawn["ticks"], "by_slug": by_slug}

@@ -45,7 +45,7 @@ CAPS = {"cap_usd": "USD at most", "cap_calls": "Calls at most"}
 class JudgeForm(RequestForm):
     """Model, question and caps of a judge run."""
 
-    inputs = tuple(one for one in to_inputs(JudgeRequest) if one.name in CAPS)
+    inputs = tuple(field for field in to_inputs(JudgeRequest) if field.name in CAPS)
     judge = forms.ChoiceField(label="Model")
     question = forms.ChoiceField(label="Question", required=False)
 
@@ -61,9 +61,9 @@ class JudgeForm(RequestForm):
     def read(self) -> JudgeRequest:
         """Return the request of a form that is valid."""
         row = EndpointModel.objects.select_related("endpoint").get(code=self.cleaned_data["judge"])
-        given = {"endpoint": row.endpoint.label, "model": row.model, **self.cleaned_data}
-        given["question"] = self.cleaned_data["question"] or self.asked[0]
-        return read_request(JudgeRequest, given)
+        values = {"endpoint": row.endpoint.label, "model": row.model, **self.cleaned_data}
+        values["question"] = self.cleaned_data["question"] or self.asked[0]
+        return read_request(JudgeRequest, values)
 
 
 @page_for(*STAFF)
@@ -73,12 +73,14 @@ def judges_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     lines = judge_lines(study)
     is_moving = any(line.run.state == MOVING for line in lines)
     # A page that reloads itself measures nothing.
-    asked = [] if is_moving else study.questions
-    agreement = {name: judge_agreement(study, name) for name in asked}
+    questions = [] if is_moving else study.questions
+    agreement = {name: judge_agreement(study, name) for name in questions}
     context = {
         "study": study,
         "lines": _with_agreement(lines, agreement),
-        "answers": [agreement_sentence(list(one.values())) for one in agreement.values() if one],
+        "answers": [
+            agreement_sentence(list(lines.values())) for lines in agreement.values() if lines
+        ],
         "form": JudgeForm(study),
         "imported": is_imported(study),
         **wait_for_workers(waits=is_moving),
@@ -94,14 +96,14 @@ def judge_start(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     if not form.is_valid():
         tell_errors(request, form)
         return None
-    asked = form.read()
-    expected = estimate_study_judge(study, asked)
+    wanted = form.read()
+    expected = estimate_study_judge(study, wanted)
     if wants_to_change(request):
         return None
     if not is_sure(request):
-        return ask(request, _starting(study, asked, expected))
+        return ask(request, _starting(study, wanted, expected))
     with transaction.atomic():
-        run = start_judge(study, asked, get_user(request))
+        run = start_judge(study, wanted, get_user(request))
         send_later(request, enqueue_judge, run.pk)
     messages.success(request, f"{run} is asked about {expected.pairs} pairs.")
     return None
@@ -129,31 +131,34 @@ def _judge(request: HttpRequest, code: uuid.UUID, judge: uuid.UUID) -> JudgeRun:
 
 
 def _with_agreement(
-    lines: Sequence[JudgeLine], found: Mapping[str, Mapping[str, AgreementLine]]
+    lines: Sequence[JudgeLine], agreement: Mapping[str, Mapping[str, AgreementLine]]
 ) -> list[tuple[JudgeLine, str, str]]:
     """Return each judge with its agreement, with and without its own family.
 
     Of several runs alike it is that of the newest with answers; empty where nothing is known.
     """
-    told, shown = [], set()
+    rows, shown = [], set()
     for line in lines:
-        known, key = found.get(line.run.question, {}), (line.run.question, line.name)
+        shares_by_name, key = agreement.get(line.run.question, {}), (line.run.question, line.name)
         names = line.name, line.name + WITHOUT_FAMILY
         is_measured = bool(line.done) and key not in shown
-        shares = [share_text(known[n].share) if is_measured and n in known else "" for n in names]
+        shares = [
+            share_text(shares_by_name[n].share) if is_measured and n in shares_by_name else ""
+            for n in names
+        ]
         shown |= {key} if is_measured else set()
-        told.append((line, shares[0], shares[1]))
-    return told
+        rows.append((line, shares[0], shares[1]))
+    return rows
 
 
-def _starting(study: Study, asked: JudgeRequest, expected: JudgeEstimate) -> Confirmation:
+def _starting(study: Study, wanted: JudgeRequest, expected: JudgeEstimate) -> Confirmation:
     money = "unknown: nobody entered the model’s price"
     if expected.most_usd is not None:
         money = f"at most {expected.most_usd:.2f} USD"
         if expected.usd is not None:
             money = f"about {expected.usd:.4f} USD by its earlier answers, {money}"
     return Confirmation(
-        title=f"Ask {asked.model} about {expected.pairs} pairs?",
+        title=f"Ask {wanted.model} about {expected.pairs} pairs?",
         facts=(
             f"Calls: {expected.calls}, each pair in both orders. Calls that break and are sent "
             "again come on top.",

@@ -21,10 +21,10 @@ class PlacedInterval:
 
 def plot(rows: Sequence[Row]) -> dict[str, Any]:
     """Lines with their marks, None for who has no rating, and the ticks of the axis."""
-    known = [value for row in rows for value in row.interval if value is not None]
-    step = _step(max(known, default=1000.0) - min(known, default=1000.0))
-    first = math.floor(min(known, default=1000.0) / step)
-    last = max(math.ceil(max(known, default=1000.0) / step), first + 1)
+    bounds = [value for row in rows for value in row.interval if value is not None]
+    step = _step(max(bounds, default=1000.0) - min(bounds, default=1000.0))
+    first = math.floor(min(bounds, default=1000.0) / step)
+    last = max(math.ceil(max(bounds, default=1000.0) / step), first + 1)
 
     def place(value: float | None, default: float) -> float:
         at = 100.0 * (value / step - first) / (last - first) if value is not None else default

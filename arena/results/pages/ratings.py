@@ -73,8 +73,8 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         address = reverse("shared-results", args=[link.token])
         context["shared_address"] = request.build_absolute_uri(address)
     if snapshot is not None:
-        told = describe(snapshot, is_staff=is_staff)
-        context |= told | TABS[tab](snapshot, told["table"])
+        description = describe(snapshot, is_staff=is_staff)
+        context |= description | TABS[tab](snapshot, description["table"])
     return render(request, "results/page.html", context)
 
 

@@ -22,9 +22,9 @@ DATA = {form: FORMATS[form] for form in ("csv", "json")}
 def show_shared(request: HttpRequest, token: str) -> HttpResponse:
     """The sentence, the table, how it came about, and links to its data."""
     snapshot = _find_snapshot(request, token)
-    told = describe(snapshot, is_staff=False)
+    description = describe(snapshot, is_staff=False)
     context = {"study": snapshot.study, "snapshot": snapshot, "token": token}
-    context |= told | fill_table(snapshot, told["table"])
+    context |= description | fill_table(snapshot, description["table"])
     return keep_secret(render(request, "results/shared.html", context))
 
 

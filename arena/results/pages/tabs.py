@@ -219,11 +219,11 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         return {"drivings": []}
     ids = list_shown_ids(snapshot.study)
     how = Options().newest_in(Simulation.objects.filter(augmentation__in=ids))
-    found = [
+    scores = [
         scores_of_augmentations(ids, title=snapshot.study.name, options=how, score=score)
         for score in SCORES
     ]
-    return {"drivings": [driving_context(one) for one in found if one.lines]}
+    return {"drivings": [driving_context(score) for score in scores if score.lines]}
 
 
 def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -288,10 +288,10 @@ def _mark(share: Estimate) -> PlacedInterval | None:
     return PlacedInterval(lower=lower, rating=value, upper=upper)
 
 
-def _keyed(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:
+def _keyed(table: LeaderboardTable, values: Mapping[str, Any]) -> list[Context]:
     """Return each contestant's results, with its key in the charts."""
     return [
-        {"key": key, "row": row, "found": found[row.slug]}
+        {"key": key, "row": row, "found": values[row.slug]}
         for key, row in key_rows(table)
-        if row.slug in found
+        if row.slug in values
     ]

@@ -69,9 +69,9 @@ def vote_page(snapshot: Snapshot, search: VoteSearch, number: int) -> Page[Any]:
 
 def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
     """All that are looked for, in the order of their pages."""
-    found = _find_all(snapshot, search)
-    for start in range(0, len(found), CHUNK):
-        yield from _list_votes(found[start : start + CHUNK], snapshot, {})
+    votes = _find_all(snapshot, search)
+    for start in range(0, len(votes), CHUNK):
+        yield from _list_votes(votes[start : start + CHUNK], snapshot, {})
 
 
 def count_settled(snapshot: Snapshot) -> int:
@@ -98,7 +98,7 @@ def _find_all(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str] | 
 
 
 def _list_votes(
-    found: Sequence[tuple[int, str] | RatedVote],
+    entries: Sequence[tuple[int, str] | RatedVote],
     snapshot: Snapshot,
     scores: Mapping[Pair, VoteScore],
 ) -> list[ListedVote]:
@@ -112,8 +112,8 @@ def _list_votes(
         *("matchup__scenario__follows__reference", "matchup__scenario__follows__intent"),
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
-    ties = [one for one in found if isinstance(one, RatedVote)]
-    keys = [one for one in found if not isinstance(one, RatedVote)]
+    ties = [entry for entry in entries if isinstance(entry, RatedVote)]
+    keys = [entry for entry in entries if not isinstance(entry, RatedVote)]
     rows = Vote.objects.select_related(*related).defer(*unread).in_bulk([pk for pk, _ in keys])
     names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
     return [

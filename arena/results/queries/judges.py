@@ -97,22 +97,22 @@ def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
 
     Where contestants ask a model of the judge's own family, it comes once more without them.
     """
-    found: dict[str, Preferences] = {}
+    preferences: dict[str, Preferences] = {}
     runs = study.judges.filter(question=question).select_related("endpoint")
     for run in runs.order_by("-pk"):
         name, rows = judge_name(run), answered_pairs(run)
-        if name in found or not rows:
+        if name in preferences or not rows:
             continue
         own = set(_own_family(study, run))
-        found[name] = _preferences(rows)
+        preferences[name] = _preferences(rows)
         strangers = [
             row
             for row in rows
             if own.isdisjoint((row.left.contestant.slug, row.right.contestant.slug))
         ]
         if own:
-            found[name + WITHOUT_FAMILY] = _preferences(strangers)
-    return found
+            preferences[name + WITHOUT_FAMILY] = _preferences(strangers)
+    return preferences
 
 
 def judge_name(run: JudgeRun) -> str:
@@ -122,10 +122,10 @@ def judge_name(run: JudgeRun) -> str:
 
 def list_models(contestant: Contestant) -> list[str]:
     """Return the models that a contestant asks, in any role, or that its card names."""
-    asked = [contestant.model, *(role["model"] for role in contestant.roles.values())]
+    models = [contestant.model, *(role["model"] for role in contestant.roles.values())]
     if contestant.card is not None:
-        asked += contestant.card["models"]
-    return [model for model in asked if model]
+        models += contestant.card["models"]
+    return [model for model in models if model]
 
 
 def answered_pairs(run: JudgeRun) -> list[PairJudgement]:

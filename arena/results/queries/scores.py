@@ -44,9 +44,9 @@ class Pair(NamedTuple):
     high: int
 
     @classmethod
-    def of(cls, scenario: int, sample: int, one: int, other: int) -> "Pair":
+    def of(cls, scenario: int, sample: int, first: int, other: int) -> "Pair":
         """Return the pair, whoever was shown on the left."""
-        return cls(scenario, sample, min(one, other), max(one, other))
+        return cls(scenario, sample, min(first, other), max(first, other))
 
 
 def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:

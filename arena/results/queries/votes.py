@@ -227,14 +227,14 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
         UnknownName: A filter names a type, a judge, a kind or a question that does not occur.
     """
     votes = current_votes(study, filters, last)
-    given = len(votes)
+    counted = len(votes)
     if not filters.leave_out_settled:
         votes += list_ties_unshown(study, votes, filters)
     _check_names(study, filters, votes)
     left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
     if not is_imported(study):
         everything = _votes_asked(study, filters, last).count()
-        left_out[LeftOut.SUPERSEDED.value] = everything - given
+        left_out[LeftOut.SUPERSEDED.value] = everything - counted
     primary = votes
     if filtered_question(study, filters) != study.questions[0]:
         primary = current_votes(study, replace(filters, question=""), last)
@@ -307,7 +307,7 @@ def list_ties_unshown(
         votes: Its current votes, which say how often a pair is judged, and by whom.
         filters: Which of the ties count.
     """
-    settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
+    settled = [(place, first, other) for place, first, other in study.rules.get("identical", ())]
     if not settled:
         return []
     by_judge: dict[str, list[RatedVote]] = {}
@@ -316,7 +316,7 @@ def list_ties_unshown(
             by_judge.setdefault(vote.judge, []).append(vote)
     types = dict(study.scenarios.values_list("slug", "type"))
     entries = tuple(Entry(**entry) for entry in study.rules["entries"])
-    alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
+    alike = tuple((place, first, other) for place, first, other in study.rules.get("alike", ()))
     challengers = study.rules.get("challengers", ())
     drawn = draw_ties(
         settled,
@@ -421,14 +421,14 @@ def _competitors(study: Study, votes: Iterable[RatedVote]) -> tuple[Competitor, 
 
 def _check_names(study: Study, filters: Filters, votes: Sequence[RatedVote]) -> None:
     judges = {vote.judge for vote in votes}
-    types = {*(one.value for one in ScenarioType), *(vote.type for vote in votes)}
-    for what, names, known in (
+    types = {*(entry.value for entry in ScenarioType), *(vote.type for vote in votes)}
+    for what, names, allowed in (
         ("kind of vote", filters.kinds, list(KINDS)),
         ("question of this study", (filtered_question(study, filters),), study.questions),
         ("scenario type", filters.types, sorted(types)),
         ("expert", filters.experts, sorted(judges)),
     ):
-        check_names(what, names, known)
+        check_names(what, names, allowed)
 
 
 def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:

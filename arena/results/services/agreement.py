@@ -25,8 +25,8 @@ def rater_agreement(snapshot: Snapshot) -> tuple[agreement.AgreementLine, ...]:
         return ()
     metrics, lines = study_raters(study), []
     for question in study.questions:
-        asked = replace(filters, question=question)
-        votes = pair_votes(current_votes(study, asked, snapshot.last_vote))
+        asked_for = replace(filters, question=question)
+        votes = pair_votes(current_votes(study, asked_for, snapshot.last_vote))
         raters = [*metrics, *judge_raters(study, question)]
         lines += [
             replace(line, question=question) for line in agreement.measure_agreement(votes, raters)

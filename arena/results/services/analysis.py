@@ -114,18 +114,18 @@ def pairs(
     planned = planned + settled if planned else planned
     return tuple(
         PairRecord(
-            a=one,
+            a=first,
             b=names[j],
             wins=int(wins[i, j]),
             ties=int(ties[i, j]),
             losses=int(wins[j, i]),
-            both_miss=missed[frozenset((one, names[j]))],
-            planned=planned[frozenset((one, names[j]))] if planned else None,
-            settled=settled[frozenset((one, names[j]))],
+            both_miss=missed[frozenset((first, names[j]))],
+            planned=planned[frozenset((first, names[j]))] if planned else None,
+            settled=settled[frozenset((first, names[j]))],
         )
-        for i, one in enumerate(names)
+        for i, first in enumerate(names)
         for j in range(i + 1, len(names))
-        if wins[i, j] or wins[j, i] or ties[i, j] or planned[frozenset((one, names[j]))]
+        if wins[i, j] or wins[j, i] or ties[i, j] or planned[frozenset((first, names[j]))]
     )
 
 
@@ -162,10 +162,10 @@ def by_type(
         votes: The same.
         board: Their rating.
     """
-    known = in_type_order(name for name in arrays.types if name)
+    types = in_type_order(name for name in arrays.types if name)
     return tuple(
         _rate_type(arrays, name, count_settled_ties(x for x in votes if x.type == name), board)
-        for name in known
+        for name in types
     )
 
 
@@ -212,7 +212,7 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
     for row in of_rows(list_shown_ids(study)):
         if row.displacement is not None:
             by_slug.setdefault(row.row.contestant.slug, []).append(row.displacement)
-    totals = ((slug, summarise(found)) for slug, found in sorted(by_slug.items()))
+    totals = ((slug, summarise(measured)) for slug, measured in sorted(by_slug.items()))
     return tuple(
         DisplacementSummary(
             slug=slug,
@@ -241,11 +241,11 @@ def cost(study: Study, competitors: Sequence[Competitor]) -> tuple[ScenarioCost,
             slug=row.slug,
             model=row.model,
             model_class=classes.get(row.pk, ""),
-            augmentations=found.augmentations,
-            calls=found.calls / found.augmentations,
-            tokens=None if found.tokens is None else found.tokens / found.augmentations,
-            usd=None if found.nano_usd is None else found.nano_usd / found.augmentations / 1e9,
+            augmentations=totals.augmentations,
+            calls=totals.calls / totals.augmentations,
+            tokens=None if totals.tokens is None else totals.tokens / totals.augmentations,
+            usd=None if totals.nano_usd is None else totals.nano_usd / totals.augmentations / 1e9,
         )
         for row in rows
-        if (found := spent.get(row.pk)) is not None
+        if (totals := spent.get(row.pk)) is not None
     )

@@ -50,7 +50,7 @@ def possible_newcomers(board: Board) -> QuerySet[Contestant]:
 
 
 @transaction.atomic
-def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) -> Study:
+def open_batch(board: Board, batch: BatchRequest, *, actor: User | None = None) -> Study:
     """Open the study that compares newcomers with some who are rated, and with each other.
 
     Those who are rated show the answers that they were rated by.
@@ -66,15 +66,15 @@ def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) 
     if table is None:
         raise Conflict("Publish the first table before new contestants are compared with it.")
     possible = list(possible_newcomers(board).values_list("slug", flat=True))
-    check_names("new contestant", asked.newcomers, possible)
+    check_names("new contestant", batch.newcomers, possible)
     rated = [line.slug for line in table.document.lines if line.votes]
     plans = [opened_plan(study) for study in studies]
     study_plan = replace(
         plans[0],
         name=f"{board.name}, batch {board.studies.count()}",
-        contestants=(*asked.newcomers, *spread_over(rated, MOST_OPPONENTS)),
-        experts=asked.experts,
-        votes_per_expert=asked.votes_per_expert,
+        contestants=(*batch.newcomers, *spread_over(rated, MOST_OPPONENTS)),
+        experts=batch.experts,
+        votes_per_expert=batch.votes_per_expert,
         hypotheses=(),
         jobs=tuple(dict.fromkeys(job for plan in plans for job in plan.jobs)),
     )
@@ -82,7 +82,7 @@ def open_batch(board: Board, asked: BatchRequest, *, actor: User | None = None) 
     for plan in plans:
         for slug in plan.contestants:
             jobs_of.setdefault(slug, plan.jobs)
-    study = open_study(study_plan, challengers=asked.newcomers, jobs_of=jobs_of, actor=actor)
+    study = open_study(study_plan, challengers=batch.newcomers, jobs_of=jobs_of, actor=actor)
     board.studies.add(study)
     require_poolable(board, but_open=True)
     log_change(board, "open batch", actor, after={"study": str(study.code)})

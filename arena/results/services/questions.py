@@ -66,16 +66,18 @@ def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
     questions = snapshot.study.questions
     if len(questions) == 1:
         return None
-    found = {snapshot.question: snapshot}
-    for one in list_snapshots(snapshot.study).filter(state=Snapshot.State.READY).defer("results"):
-        if _rates_alike(one) == _rates_alike(snapshot):
-            found.setdefault(one.question, one)
-    ratings = {question: found.get(question) for question in questions}
-    rows = Standing.objects.filter(snapshot__in=found.values())
-    by_rating: dict[int, dict[str, Line]] = {one.pk: {} for one in found.values()}
+    ratings_found = {snapshot.question: snapshot}
+    for rating in (
+        list_snapshots(snapshot.study).filter(state=Snapshot.State.READY).defer("results")
+    ):
+        if _rates_alike(rating) == _rates_alike(snapshot):
+            ratings_found.setdefault(rating.question, rating)
+    ratings = {question: ratings_found.get(question) for question in questions}
+    rows = Standing.objects.filter(snapshot__in=ratings_found.values())
+    by_rating: dict[int, dict[str, Line]] = {rating.pk: {} for rating in ratings_found.values()}
     for row in rows.order_by(F("rating").desc(nulls_last=True), "slug"):
         by_rating[row.snapshot_id][row.slug] = Line(name=row.name, **snapshot_values(row))
-    standings = {key: by_rating[one.pk] if one else {} for key, one in ratings.items()}
+    standings = {key: by_rating[rating.pk] if rating else {} for key, rating in ratings.items()}
     return RatedQuestions(
         ratings=ratings,
         lines=[
@@ -83,9 +85,9 @@ def compare_questions(snapshot: Snapshot) -> RatedQuestions | None:
             for slug, row in by_rating[snapshot.pk].items()
         ],
         links=[
-            _link(pair, found, standings)
+            _link(pair, ratings_found, standings)
             for pair in combinations(questions, 2)
-            if found.keys() >= set(pair)
+            if ratings_found.keys() >= set(pair)
         ],
     )
 
@@ -104,21 +106,21 @@ def _link(
     ratings: Mapping[str, Snapshot],
     standings: Mapping[str, Mapping[str, Line]],
 ) -> TwoQuestions:
-    one, other = pair
+    primary, other = pair
     first, second = (_preferences(ratings[question]) for question in pair)
     both = sorted(first.keys() & second.keys())
     hits = np.array([first[matchup][0] == second[matchup][0] for matchup in both], np.float64)
     clusters = np.array([first[matchup][1:] for matchup in both], np.int64).reshape(-1, 2)
     rated = [
         (row.rating, standings[other][slug].rating)
-        for slug, row in standings[one].items()
+        for slug, row in standings[primary].items()
         if slug in standings[other]
     ]
-    known = [(x, y) for x, y in rated if x is not None and y is not None]
+    pairs = [(x, y) for x, y in rated if x is not None and y is not None]
     return TwoQuestions(
-        one=one,
+        one=primary,
         other=other,
-        spearman=_spearman(known),
+        spearman=_spearman(pairs),
         same=two_way_share(hits, *clusters.T),
         pairs=len(both),
     )
@@ -136,7 +138,7 @@ def _spearman(rated: Sequence[tuple[float, float]]) -> float | None:
         return None
     columns = [np.array(values) for values in zip(*rated, strict=True)]
     # Equal ratings share the mean of their ranks.
-    one, other = ((v[:, None] > v).sum(1) + (v[:, None] == v).sum(1) / 2 for v in columns)
-    if not one.std() or not other.std():
+    ranks, other = ((v[:, None] > v).sum(1) + (v[:, None] == v).sum(1) / 2 for v in columns)
+    if not ranks.std() or not other.std():
         return None
-    return float(np.corrcoef(one, other)[0, 1])
+    return float(np.corrcoef(ranks, other)[0, 1])

@@ -200,7 +200,7 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> ComputedRating
     snapshot.degenerate_rounds = board.degenerate_rounds
     # Whether something in the table is simulated, be it a line without votes.
     snapshot.includes_simulated = any(
-        one.is_simulated for one in votes.competitors + votes.counted
+        entry.is_simulated for entry in votes.competitors + votes.counted
     )
     return ComputedRating(board=board, competitors=votes.competitors)
 

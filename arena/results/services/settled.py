@@ -19,7 +19,7 @@ def remark_on_ties(study: Study, votes: VoteSet, *, left_out: bool) -> str:
     if not settled:
         return ""
     ties = sum(vote.kind == AUTOMATIC for vote in votes.counted)
-    said = (
+    sentence = (
         f"The table says how contestants compare where their pictures differ: {settled} pairs "
         "that nobody can tell apart were not shown and are left out."
         if left_out
@@ -27,23 +27,23 @@ def remark_on_ties(study: Study, votes: VoteSet, *, left_out: bool) -> str:
         f"pairs that nobody can tell apart were not shown and count as {ties} ties, as many a "
         "pair as others have votes on average."
     )
-    return f"{said} {_on_those_shown(study, votes)}".strip()
+    return f"{sentence} {_on_those_shown(study, votes)}".strip()
 
 
 def _on_those_shown(study: Study, votes: VoteSet) -> str:
     """The tie share of alike pairs that experts were shown all the same."""
     shown = {
-        (scenario_at(place), frozenset((one, other)))
-        for place, one, other in study.rules.get("alike_shown", ())
+        (scenario_at(place), frozenset((first, other)))
+        for place, first, other in study.rules.get("alike_shown", ())
     }
-    given = [
+    votes_shown = [
         vote.outcome == Vote.Outcome.EQUAL
         for vote in votes.counted
         if vote.kind == MAIN and (vote.item, frozenset((vote.left, vote.right))) in shown
     ]
-    if not given:
+    if not votes_shown:
         return ""
     return (
-        f"Of {len(given)} votes on {len(shown)} such pairs that were shown all the same, "
-        f"{sum(given)} are ties ({whole_percent(sum(given) / len(given))} %)."
+        f"Of {len(votes_shown)} votes on {len(shown)} such pairs that were shown all the same, "
+        f"{sum(votes_shown)} are ties ({whole_percent(sum(votes_shown) / len(votes_shown))} %)."
     )

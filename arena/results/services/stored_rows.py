@@ -49,12 +49,12 @@ def list_migrations() -> list[str]:
 def find_tables() -> list[type[models.Model]]:
     """Every table that is kept, those between two tables included, by label."""
     tables = apps.get_models(include_auto_created=True)
-    kept = (
+    chosen = (
         model
         for model in tables
         if model._meta.managed and not model._meta.proxy and model_label(model) not in LEFT_OUT
     )
-    return sorted(kept, key=model_label)
+    return sorted(chosen, key=model_label)
 
 
 def model_label(model: type[models.Model]) -> str:
@@ -80,11 +80,11 @@ def frozen_rows() -> Iterator[None]:
         yield
 
 
-def read_values(found: QuerySet[Any]) -> Iterator[list[Any]]:
+def read_values(rows: QuerySet[Any]) -> Iterator[list[Any]]:
     """Each row as plain values, in the order of `stored_columns` and of their keys."""
-    columns = stored_columns(found.model)
+    columns = stored_columns(rows.model)
     names = [field.attname for field in columns]
-    for row in found.order_by("pk").values_list(*names).iterator(chunk_size=AT_ONCE):
+    for row in rows.order_by("pk").values_list(*names).iterator(chunk_size=AT_ONCE):
         yield [_plain(field, value) for field, value in zip(columns, row, strict=True)]
 
 
@@ -178,7 +178,7 @@ def _row(
     return row
 
 
-def _check_column(row: models.Model, field: models.Field[Any, Any], given: Any) -> None:
+def _check_column(row: models.Model, field: models.Field[Any, Any], raw: Any) -> None:
     """Refuse a value that would not be written so, or that the column's rules refuse.
 
     Raises:
@@ -186,8 +186,8 @@ def _check_column(row: models.Model, field: models.Field[Any, Any], given: Any) 
     """
     value = getattr(row, field.attname)
     written = _plain(field, value)
-    if written != given or type(written) is not type(given):
-        raise ValueError(f"{given!r} is no value of this column")
+    if written != raw or type(written) is not type(raw):
+        raise ValueError(f"{raw!r} is no value of this column")
     if isinstance(value, str) and make_storable(value) != value:
         raise ValueError("holds signs that no database takes")
     if isinstance(field, models.JSONField):

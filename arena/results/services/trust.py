@@ -40,14 +40,14 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
     repeats = _repeats(arrays, votes)
-    given = np.flatnonzero([vote.kind != AUTOMATIC for vote in votes.counted])
-    by_people = select_votes(inner, given)
+    by_hand = np.flatnonzero([vote.kind != AUTOMATIC for vote in votes.counted])
+    by_people = select_votes(inner, by_hand)
     return Trust(
         tie_share=float((inner.score == 0.5).mean()) if len(inner) else None,
         agreement=agreement(by_people, rounds=AGREEMENT_ROUNDS, seed=seed),
         side=side_bias(by_people) if len(by_people) else None,
         repeats=repeats if repeats.number else None,
-        raters=_panel(arrays, inner, given, votes, repeats),
+        raters=_panel(arrays, inner, by_hand, votes, repeats),
         strength=_check_strength(inner, votes),
     )
 
@@ -55,19 +55,19 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
 def board_remarks(board: Leaderboard, arrays: VoteArrays, *more_warnings: str) -> BoardRemarks:
     """Return the remarks of a rating; none on pairs if votes have unknown clusters."""
     names = [line.name for line in board.lines]
-    known = {"expert": {*arrays.judges} - {""}, "scenario": {*arrays.items} - {""}}
-    unseen = [kind for kind in known if known[kind] and kind not in board.unit.kinds]
+    clusters = {"expert": {*arrays.judges} - {""}, "scenario": {*arrays.items} - {""}}
+    unseen = [kind for kind in clusters if clusters[kind] and kind not in board.unit.kinds]
     judged = None if unseen else board.judged
     above = None
     if judged is not None:
         above = tuple((names[i], names[j]) for i, j in np.argwhere(judged.above).tolist())
-    ignored = [kind for kind in unseen if len(known[kind]) > 1]
+    ignored = [kind for kind in unseen if len(clusters[kind]) > 1]
     return BoardRemarks(
         reasons=board.reasons,
         warnings=(*board.warnings, *remark_on_ignored(ignored), *more_warnings),
         tie_strength=board.tie_strength,
-        experts=board.experts if known["expert"] else 0,
-        scenarios=board.scenarios if known["scenario"] else 0,
+        experts=board.experts if clusters["expert"] else 0,
+        scenarios=board.scenarios if clusters["scenario"] else 0,
         order=tuple(line.name for line in board.standings),
         parts={line.name: line.part for line in board.lines if line.part >= 0},
         above=None if board.is_few else above,
@@ -80,22 +80,22 @@ def board_remarks(board: Leaderboard, arrays: VoteArrays, *more_warnings: str) -
 
 
 def _check_strength(inner: Comparisons, votes: VoteSet) -> StrengthCheck | None:
-    said = [vote.strength for vote in votes.counted]
-    if not any(said):
+    strengths = [vote.strength for vote in votes.counted]
+    if not any(strengths):
         return None
     check = StrengthCheck(
-        slight=said.count(Vote.Strength.SLIGHTLY.value),
-        clear=said.count(Vote.Strength.CLEARLY.value),
+        slight=strengths.count(Vote.Strength.SLIGHTLY.value),
+        clear=strengths.count(Vote.Strength.CLEARLY.value),
     )
-    is_slight = np.array(said) == Vote.Strength.SLIGHTLY.value
+    is_slight = np.array(strengths) == Vote.Strength.SLIGHTLY.value
     plain, weighed = bradley_terry(inner), bradley_terry(inner, is_slight)
     if plain is None or weighed is None:
         return check
-    before, after = (np.argsort(-one, kind="stable").tolist() for one in (plain, weighed))
+    before, after = (np.argsort(-ratings, kind="stable").tolist() for ratings in (plain, weighed))
     return replace(
         check,
         change=float(np.abs(to_elo(weighed) - to_elo(plain)).max()),
-        order=() if before == after else tuple(inner.names[one] for one in after),
+        order=() if before == after else tuple(inner.names[index] for index in after),
     )
 
 
@@ -115,7 +115,7 @@ def _repeats(arrays: VoteArrays, votes: VoteSet) -> Repeats:
 
 
 def _panel(
-    arrays: VoteArrays, inner: Comparisons, given: IntArray, votes: VoteSet, repeats: Repeats
+    arrays: VoteArrays, inner: Comparisons, chosen: IntArray, votes: VoteSet, repeats: Repeats
 ) -> tuple[PanelRater, ...]:
     """A line an expert, by the votes that people gave (V,)."""
     experts = len(arrays.judges)
@@ -127,7 +127,7 @@ def _panel(
         changes = rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
     panel = []
-    lines = raters(select_votes(inner, given), ms=arrays.ms[given], without=without)
+    lines = raters(select_votes(inner, chosen), ms=arrays.ms[chosen], without=without)
     steadiness = evidence_of_repeats(repeats, {line.expert: line.ties for line in lines})
     for line in lines:
         judge = arrays.judges[line.expert]

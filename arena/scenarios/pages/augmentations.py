@@ -169,7 +169,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "scenario": scenario,
         "choices": choices,
-        "chosen": next((one for one in choices if one.slug == variant), None),
+        "chosen": next((choice for choice in choices if choice.slug == variant), None),
         "role": role,
         "is_native": "native" in request.GET,
         "shown": shown,

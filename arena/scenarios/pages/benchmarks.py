@@ -43,7 +43,8 @@ class BenchmarkForm(RequestForm):
 
     inputs = to_inputs(BenchmarkRequest)
     scenarios = forms.CharField(
-        max_length=60_000, help_text=next(one.help for one in inputs if one.name == "scenarios")
+        max_length=60_000,
+        help_text=next(field.help for field in inputs if field.name == "scenarios"),
     )
 
     def clean_scenarios(self) -> list[str]:
@@ -67,9 +68,9 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
             form.errors.pop(name, None)
         if not form.errors:
             with refusals_in(form, "scenarios"):
-                asked = read_request(BenchmarkRequest, form.cleaned_data, slug="", title="")
-                planned = plan_benchmark(asked)
-                counts = count_tasks((one.split, one.stratum) for one in planned)
+                wanted = read_request(BenchmarkRequest, form.cleaned_data, slug="", title="")
+                planned = plan_benchmark(wanted)
+                counts = count_tasks((task.split, task.stratum) for task in planned)
                 more = {"counts": counts, "total": len(planned)}
     elif form.is_bound and form.is_valid():
         with refusals_in(form, "scenarios"), transaction.atomic():
@@ -92,7 +93,7 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "benchmark": row,
         "items": items,
-        "counts": count_tasks((one.split, one.stratum) for one in items),
+        "counts": count_tasks((item.split, item.stratum) for item in items),
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
         "file": file,
         "remarks": benchmarks.list_remarks(row),

@@ -46,11 +46,14 @@ class ScenarioForm(forms.Form):
     derives = forms.BooleanField(required=False)
     keep_traffic = forms.BooleanField(required=False)
     density = forms.ChoiceField(
-        required=False, choices=[(one.value, one.value) for one in DENSITIES]
+        required=False, choices=[(density.value, density.value) for density in DENSITIES]
     )
     goal = forms.ChoiceField(
         required=False,
-        choices=[("", "as recorded, or straightest"), *((one.value, one.value) for one in GOALS)],
+        choices=[
+            ("", "as recorded, or straightest"),
+            *((goal.value, goal.value) for goal in GOALS),
+        ],
     )
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -63,13 +66,13 @@ class ScenarioForm(forms.Form):
         Raises:
             Conflict: Nothing is said, or the drawing is no JSON.
         """
-        given = self.cleaned_data
+        values = self.cleaned_data
         names = ("instruction", "derives", "keep_traffic", "density", "goal")
-        document = _document(given["modification"]) if given["modification"] else None
-        if document is None and not given["instruction"]:
+        document = _document(values["modification"]) if values["modification"] else None
+        if document is None and not values["instruction"]:
             raise InvalidDocument("scenario", [("instruction", NOTHING)])
-        return {name: given[name] for name in names} | {
-            "type": given["type"] or given["own_type"],
+        return {name: values[name] for name in names} | {
+            "type": values["type"] or values["own_type"],
             "reference": document,
         }
 
@@ -205,9 +208,11 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     draft.reference, sentence = checked.modification, ""
     if sent.get("derives") is True:
         _, sentence = scenes.derive_intent(draft, str(sent.get("type") or ""), "")
-    told = {"sentence": sentence, "statements": editing.intent_statements(draft.intent)}
+    reading = {"sentence": sentence, "statements": editing.intent_statements(draft.intent)}
     parts = ("modification", "problem", "is_against_intent", "presets", "ways")
-    return JsonResponse({"lines": lines} | told | {name: getattr(checked, name) for name in parts})
+    return JsonResponse(
+        {"lines": lines} | reading | {name: getattr(checked, name) for name in parts}
+    )
 
 
 def _editor(
@@ -222,7 +227,7 @@ def _editor(
         "scene": draft.base_scene,
         "editor": editing.editor_document(draft),
         "text": text or "",
-        "types": [(one.value, one.value.replace("_", " ").lower()) for one in editing.PLACED],
+        "types": [(kind.value, kind.value.replace("_", " ").lower()) for kind in editing.PLACED],
         "is_drawn": drawn,
         **wait_for_workers(waits=waits),
         **more,

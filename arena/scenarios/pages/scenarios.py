@@ -44,10 +44,10 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     chosen = queries.set_asked(request.GET.get("set"))
     choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    found = queries.list_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
-    found = found.filter(paraphrase_of=None)
-    found = listing.narrow(found, "slug", "instruction", "base_scene__slug", by=["type"])
-    page = read_page(request, found, size=SCENARIOS_AT_ONCE)
+    scenarios = queries.list_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
+    scenarios = scenarios.filter(paraphrase_of=None)
+    scenarios = listing.narrow(scenarios, "slug", "instruction", "base_scene__slug", by=["type"])
+    page = read_page(request, scenarios, size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
     context = {
         "groups": queries.group_by_type(rows),

@@ -88,8 +88,8 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = AcceptForm(request.POST if is_admin and request.method == "POST" else None)
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
-            asked = read_request(AcceptRequest, form.cleaned_data)
-            contestant, job = accept_submission(row, asked, actor=get_user(request))
+            acceptance = read_request(AcceptRequest, form.cleaned_data)
+            contestant, job = accept_submission(row, acceptance, actor=get_user(request))
             messages.success(request, f"“{contestant.name}” is accepted.")
             if job is None:
                 return redirect("contestant", code=contestant.code)

@@ -52,11 +52,11 @@ class FamilyForm(forms.Form):
 def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the sweeps of a scenario, with the forms of a new one and of a family."""
     scenario = _scenario(code)
-    given = {name: request.GET[name] for name in KEPT if name in request.GET}
+    initial = {name: request.GET[name] for name in KEPT if name in request.GET}
     context = {
         "scenario": scenario,
         "sweeps": [(row, driver_name(row)) for row in scenario.sweeps.select_related("hardest")],
-        "form": SweepForm(scenario, initial=given),
+        "form": SweepForm(scenario, initial=initial),
         "family": FamilyForm(auto_id="family_%s"),
     }
     return render(request, "scenarios/sweeps.html", context)
@@ -71,12 +71,12 @@ def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         acts.tell_errors(request, form)
     else:
         with acts.refusals_told(request):
-            asked = read_request(sweeps.SweepRequest, form.cleaned_data)
-            sweep = sweeps.plan_sweep(scenario=scenario, request=asked, actor=get_user(request))
+            wanted = read_request(sweeps.SweepRequest, form.cleaned_data)
+            sweep = sweeps.plan_sweep(scenario=scenario, request=wanted, actor=get_user(request))
             acts.send_later(request, enqueue_sweep, sweep.pk)
             return redirect("sweep", code=sweep.code)
-    given = urlencode({name: request.POST.get(name, "") for name in KEPT})
-    return redirect(f"{reverse('sweeps', args=[code])}?{given}")
+    query = urlencode({name: request.POST.get(name, "") for name in KEPT})
+    return redirect(f"{reverse('sweeps', args=[code])}?{query}")
 
 
 @act_for(*STAFF, back="sweeps")

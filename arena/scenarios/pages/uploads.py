@@ -28,8 +28,8 @@ SCENES_AT_ONCE = 24
 def scenes_page(request: HttpRequest) -> HttpResponse:
     """Show every scene, the files that were sent, and the form to send others."""
     scenes = BaseScene.objects.defer("document", "recording", "notes")
-    found = scenes.annotate(number=Count("scenarios")).order_by("-created_at", "slug")
-    page = read_page(request, found, size=SCENES_AT_ONCE)
+    rows = scenes.annotate(number=Count("scenarios")).order_by("-created_at", "slug")
+    page = read_page(request, rows, size=SCENES_AT_ONCE)
     shown = [(row, is_drawn(scene_picture(row, SceneView.KEPT))) for row in page.object_list]
     sent = SceneUpload.objects.defer("tracks").select_related("uploaded_by")[:UPLOADS_SHOWN]
     waits = any(row.state in row.UNDER_WAY for row in sent) or not all(has for _, has in shown)
@@ -50,7 +50,7 @@ def scenes_page(request: HttpRequest) -> HttpResponse:
 @act_for(*STAFF, back="scenes")
 def send_file(request: HttpRequest) -> HttpResponse | None:
     """Keep each file as an upload of its own, and leave them to workers."""
-    kept = []
+    rows = []
     for file in request.FILES.getlist("file"):
         with refusals_told(request):
             row = uploads.keep_upload(
@@ -60,20 +60,20 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
                 actor=get_user(request),
             )
             send_later(request, enqueue_upload, row.pk)
-            kept.append(row)
+            rows.append(row)
     if was_too_large(request.META) or not request.FILES:
         most = uploads.most_megabytes()
         raise Conflict(f"Choose files of at most {most} MB together; a zip may be smaller.")
-    return redirect("upload", code=kept[0].code) if len(kept) == 1 else None
+    return redirect("upload", code=rows[0].code) if len(rows) == 1 else None
 
 
 @page_for(*STAFF)
 def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what a file holds and one moment of it; a moment that is kept leads to its scene."""
     row = get_object_or_404(SceneUpload.objects.select_related("uploaded_by"), code=code)
-    asked = read_code(request.GET.get("moment", ""))
+    wanted = read_code(request.GET.get("moment", ""))
     moments = row.moments.select_related("scene")
-    moment = moments.filter(code=asked).first() or moments.first()
+    moment = moments.filter(code=wanted).first() or moments.first()
     if moment is not None and moment.scene is not None and "keep" in request.GET:
         return redirect("scene", code=moment.scene.code)
     waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)

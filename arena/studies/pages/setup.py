@@ -117,13 +117,13 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
 def _keep(request: HttpRequest, draft: StudyDraft | None, form: StudyForm) -> HttpResponse:
     """Save what stands in the form, whether it makes a study or not."""
     with refusals_told(request):
-        kept = drafts.keep_draft(
+        draft_row = drafts.keep_draft(
             entered=form.data, draft=draft, revision=_revision(request), actor=get_user(request)
         )
         if PREVIEW in request.POST:
-            return redirect("study-draft-preview", code=kept.code)
+            return redirect("study-draft-preview", code=draft_row.code)
         messages.success(request, "Saved as a draft: no expert sees it, nothing is planned yet.")
-        return redirect("study-draft", code=kept.code)
+        return redirect("study-draft", code=draft_row.code)
     # Shown with the revision of whoever was faster, so that saving again replaces theirs.
     draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
     return _show(request, draft, form, draft.revision if draft else "", 409)
@@ -165,8 +165,8 @@ def _read_form(posted: QueryDict) -> dict[str, Any]:
 
 
 def _revision(request: HttpRequest) -> int:
-    given = request.POST.get("revision", "")
-    return int(given) if given.isascii() and given.isdigit() and len(given) < 9 else 0
+    text = request.POST.get("revision", "")
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else 0
 
 
 def _initial(draft: StudyDraft | None) -> dict[str, Any]:

@@ -83,9 +83,9 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "export": export,
         **wait_for_workers(waits=export["is_waiting"]),
         "lines": lines,
-        "done": sum(not one.tally.left for one in lines),
-        "without_link": sum(one.waits_for_link for one in lines),
-        "shows_links": any(one.may_be_invited or one.invitation for one in lines),
+        "done": sum(not line.tally.left for line in lines),
+        "without_link": sum(line.waits_for_link for line in lines),
+        "shows_links": any(line.may_be_invited or line.invitation for line in lines),
         "contestants": study.contestants.all(),
         "rules": [
             (field.label, field.shown(getattr(study_plan, field.name)))

@@ -21,7 +21,7 @@ SWITCHES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.
 NAMES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.NAMES)
 
 
-def read_entered(given: Mapping[str, Any]) -> Entered:
+def read_entered(values: Mapping[str, Any]) -> Entered:
     """Return every field of the form as it can be stored, those that are not given empty.
 
     A number may be no number yet.
@@ -29,11 +29,11 @@ def read_entered(given: Mapping[str, Any]) -> Entered:
     entered: Entered = {}
     for name in (field.name for field in PLAN_INPUTS):
         if name in SWITCHES:
-            entered[name] = bool(given.get(name, False))
+            entered[name] = bool(values.get(name, False))
         elif name in NAMES:
-            entered[name] = [make_storable(one) for one in dict.fromkeys(given.get(name, ()))]
+            entered[name] = [make_storable(entry) for entry in dict.fromkeys(values.get(name, ()))]
         else:
-            entered[name] = make_storable(str(given.get(name, "")))
+            entered[name] = make_storable(str(values.get(name, "")))
     return entered
 
 
@@ -121,7 +121,7 @@ def rename_in_drafts(known_as: str, name: str) -> None:
     for draft in StudyDraft.objects.select_for_update().order_by("pk"):
         chosen = draft.names_in("experts")
         if known_as in chosen:
-            draft.entered["experts"] = [name if one == known_as else one for one in chosen]
+            draft.entered["experts"] = [name if entry == known_as else entry for entry in chosen]
             draft.save(update_fields=["entered"])
 
 

@@ -129,11 +129,11 @@ def check_seed(seed: int) -> None:
 
 def check_questions(questions: Sequence[str]) -> None:
     """Raise Conflict for what is not one to all of the known questions, each once."""
-    asked = list(questions)
-    if not asked or len(set(asked)) < len(asked) or not set(asked) <= set(Question.values):
+    keys = list(questions)
+    if not keys or len(set(keys)) < len(keys) or not set(keys) <= set(Question.values):
         raise Conflict(
             f"Questions are one or more of {', '.join(Question.values)}, each once and the "
-            f"primary one first, not {', '.join(map(str, asked)) or 'none'}."
+            f"primary one first, not {', '.join(map(str, keys)) or 'none'}."
         )
 
 
@@ -143,18 +143,18 @@ def _contestants(study_plan: StudyPlan) -> list[Contestant]:
 
 
 def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
-    known = {row.slug: row for row in Scenario.objects.only("slug")}
-    chosen = find_named("scenario", study_plan.scenarios, known)
+    by_slug = {row.slug: row for row in Scenario.objects.only("slug")}
+    chosen = find_named("scenario", study_plan.scenarios, by_slug)
     # Locked, so that no picture is drawn anew between its choice and the opening.
     rows = Scenario.objects.filter(pk__in=[row.pk for row in chosen])
     list(rows.select_for_update(no_key=True).order_by("pk").values_list("pk"))
     return chosen
 
 
-def find_named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
+def find_named(kind: str, names: Iterable[str], rows: dict[str, Any]) -> list[Any]:
     """Return the objects of these names, sorted by them; raise UnknownName for an unknown one."""
-    check_names(kind, names, sorted(known))
-    return [known[name] for name in sorted(set(names))]
+    check_names(kind, names, sorted(rows))
+    return [rows[name] for name in sorted(set(names))]
 
 
 def _check_simulated(
@@ -222,7 +222,7 @@ def _frozen(
     hypotheses = read_hypotheses(study_plan.hypotheses, contestants)
     return {
         "planner": PLANNER,
-        **{rule: kept for rule, kept in asdict(rules).items() if rule != "challengers" or kept},
+        **{rule: value for rule, value in asdict(rules).items() if rule != "challengers" or value},
         "scenario_gap_kept": planned.scenario_gap,
         "identical": [list(triple) for triple in planned.identical],
         "alike_shown": [list(pair) for pair in alike_shown],
@@ -288,7 +288,7 @@ def _preregistration(study: Study) -> dict[str, Any]:
         "seed": study.seed,
         "experts": len(rules["experts"]),
         "votes_planned": len(rules["experts"]) * study.votes_per_expert,
-        "rules": {name: kept for name, kept in rules.items() if name not in _ELSEWHERE},
+        "rules": {name: value for name, value in rules.items() if name not in _ELSEWHERE},
         "choices": {name.removeprefix("allow_"): getattr(study, name) for name in SWITCH_COLUMNS},
         "contestants": [_contestant_document(row) for row in contestants],
         "scenarios": list(scenarios),

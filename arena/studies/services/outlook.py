@@ -106,13 +106,13 @@ class Prospect:
     gap: float
 
 
-def estimate_plan(given: Mapping[str, Any]) -> StudyEstimate | None:
+def estimate_plan(values: Mapping[str, Any]) -> StudyEstimate | None:
     """Return the estimate from the values of a StudyPlan; None if one is missing."""
-    counted = {name: len(given.get(name, ())) for name in ("contestants", "experts", "scenarios")}
-    numbers = {name: given.get(name) or 0 for name in QUANTITIES}
+    counted = {name: len(values.get(name, ())) for name in ("contestants", "experts", "scenarios")}
+    numbers = {name: values.get(name) or 0 for name in QUANTITIES}
     if not all(counted.values()) or not numbers["votes_per_expert"]:
         return None
-    questions = len(given.get("questions") or one_question())
+    questions = len(values.get("questions") or one_question())
     return StudyEstimate(**counted, **numbers, questions=questions)
 
 
@@ -126,7 +126,7 @@ def compare_votes(estimate: StudyEstimate) -> list[tuple[StudyEstimate, Prospect
     most, wanted = estimate.most_votes, estimate.votes_per_expert
     numbers = {min(max(round(wanted * times), 1), most) for times in COMPARED} | {wanted}
     estimates = [replace(estimate, votes_per_expert=number) for number in sorted(numbers)]
-    return [(one, prospect(one)) for one in estimates]
+    return [(plan_estimate, prospect(plan_estimate)) for plan_estimate in estimates]
 
 
 def prospect(estimate: StudyEstimate) -> Prospect:

@@ -91,8 +91,8 @@ def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[H
 def frozen_hypotheses(study: Study) -> tuple[Hypothesis, ...]:
     """Return the hypotheses that were frozen at the opening."""
     return tuple(
-        Hypothesis(text=kept["text"], above=kept["above"] and tuple(kept["above"]))
-        for kept in study.rules.get("hypotheses", ())
+        Hypothesis(text=stored["text"], above=stored["above"] and tuple(stored["above"]))
+        for stored in study.rules.get("hypotheses", ())
     )
 
 
@@ -239,13 +239,13 @@ class StudyPlan:
     allow_simulated: bool = _switch("Simulated may take part", "Every page and file then says so.")
 
     @classmethod
-    def read(cls, given: Mapping[str, Any]) -> Self:
+    def read(cls, entered: Mapping[str, Any]) -> Self:
         """Make a plan of what a door has parsed: lists, and words for choices."""
         values: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value
-            for name, value in given.items()
+            for name, value in entered.items()
         }
-        return cls(**values | {"samples": SampleRule(given.get("samples", SampleRule.ONE))})
+        return cls(**values | {"samples": SampleRule(entered.get("samples", SampleRule.ONE))})
 
     @property
     def shares(self) -> dict[str, Any]:
@@ -259,9 +259,10 @@ QUANTITIES = ("votes_per_expert", "repeats", "checks", "overlap")
 SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
 """What the frozen rules call a percentage; they keep it as a share."""
 SWITCH_COLUMNS = tuple(
-    one.name
-    for one in PLAN_INPUTS
-    if one.kind is InputKind.SWITCH and one.name in {column.name for column in Study._meta.fields}
+    field.name
+    for field in PLAN_INPUTS
+    if field.kind is InputKind.SWITCH
+    and field.name in {column.name for column in Study._meta.fields}
 )
 """Switches that a study keeps in a column of its own."""
 
@@ -328,7 +329,7 @@ def opened_plan(study: Study) -> StudyPlan:
         experts=tuple(rules.get("experts", ())),
         votes_per_expert=study.votes_per_expert,
         seed=study.seed,
-        hypotheses=tuple(one.text for one in frozen_hypotheses(study)),
+        hypotheses=tuple(hypothesis.text for hypothesis in frozen_hypotheses(study)),
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
         questions=tuple(study.questions),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),

@@ -39,14 +39,16 @@ _PLAIN = (
 
 def frozen_rules(study: Study) -> PlanRules:
     """Return the rules as they were at opening; planning by them gives the study's matchups."""
-    kept = study.rules
+    rules_stored = study.rules
     return PlanRules(
-        entries=tuple(Entry(**entry) for entry in kept["entries"]),
-        experts=tuple(kept["experts"]),
-        checks=tuple(Check(**check) for check in kept.get("checks", ())),
-        alike=tuple((place, one, other) for place, one, other in kept.get("alike", ())),
-        challengers=tuple(kept.get("challengers", ())),
-        **{name: kept[name] for name in _PLAIN if name in kept},
+        entries=tuple(Entry(**entry) for entry in rules_stored["entries"]),
+        experts=tuple(rules_stored["experts"]),
+        checks=tuple(Check(**check) for check in rules_stored.get("checks", ())),
+        alike=tuple(
+            (place, first, other) for place, first, other in rules_stored.get("alike", ())
+        ),
+        challengers=tuple(rules_stored.get("challengers", ())),
+        **{name: rules_stored[name] for name in _PLAIN if name in rules_stored},
     )
 
 
@@ -128,40 +130,50 @@ def store(
         NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
-    known = frames_shown(study, {scenario_at(one.scenario) for one in planned}) if batch else {}
-    scenarios = _scenarios(planned, cells, reads_scenes=not known)
-    frames = find_frames(planned, cells, scenarios, known)
+    frames_before = (
+        frames_shown(study, {scenario_at(pair.scenario) for pair in planned}) if batch else {}
+    )
+    scenarios = _scenarios(planned, cells, reads_scenes=not frames_before)
+    frames = find_frames(planned, cells, scenarios, frames_before)
     changes = legends_of_changes(
-        {cell.pk: frames[one.scenario].view for one in planned for cell in shown_sides(one, cells)}
+        {
+            cell.pk: frames[pair.scenario].view
+            for pair in planned
+            for cell in shown_sides(pair, cells)
+        }
     )
     rows = [
         Matchup(
             study=study,
-            expert=by_name[one.expert],
-            position=one.position,
-            scenario=scenarios[scenario_at(one.scenario)],
+            expert=by_name[planned_pair.expert],
+            position=planned_pair.position,
+            scenario=scenarios[scenario_at(planned_pair.scenario)],
             left=left,
             right=right,
             left_image=left.image,
             right_image=right.image,
             original_image=frame.original_image,
             view={**frame.view, LEGEND: {"scene": frame.legend, "pair": pair}},
-            kind=one.kind,
+            kind=planned_pair.kind,
             batch=batch,
         )
-        for one in planned
-        for frame, (left, right) in [(frames[one.scenario], shown_sides(one, cells))]
+        for planned_pair in planned
+        for frame, (left, right) in [
+            (frames[planned_pair.scenario], shown_sides(planned_pair, cells))
+        ]
         for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
     Matchup.objects.bulk_create(firsts, batch_size=500)
-    again = [(row, one) for row, one in zip(rows, planned, strict=True) if one.repeats is not None]
+    again = [
+        (row, pair) for row, pair in zip(rows, planned, strict=True) if pair.repeats is not None
+    ]
     mains = study.matchups.filter(
         expert__in={row.expert_id for row, _ in again}, kind=Matchup.Kind.MAIN
     )
     keys = {(expert, at): pk for expert, at, pk in mains.values_list("expert", "position", "pk")}
-    for row, one in again:
-        row.repeat_of_id = keys[row.expert_id, one.repeats or 0]
+    for row, planned_pair in again:
+        row.repeat_of_id = keys[row.expert_id, planned_pair.repeats or 0]
     Matchup.objects.bulk_create([row for row, _ in again], batch_size=500)
 
 
@@ -169,7 +181,7 @@ def _scenarios(
     planned: Sequence[PlannedMatchup], cells: Cells, *, reads_scenes: bool
 ) -> dict[str, Scenario]:
     """Return scenarios by slug, with their scenes where views are worked out from them."""
-    named = {one.scenario for one in planned}
+    named = {pair.scenario for pair in planned}
     keys = {cell.scenario_id for (place, _), cell in cells.items() if place in named}
     rows = Scenario.objects.filter(pk__in=keys)
     if reads_scenes:
@@ -209,10 +221,10 @@ class Planning:
         return quota + sum(self.rules.count_extras(quota))
 
     def follow(
-        self, username: str, known: Sequence[PlannedMatchup], units: Sequence[GridUnit]
+        self, username: str, planned: Sequence[PlannedMatchup], units: Sequence[GridUnit]
     ) -> list[PlannedMatchup]:
         """Return an expert's next showings."""
-        return follow_on(self.rules, self.grid, username, known, units, self.rng)
+        return follow_on(self.rules, self.grid, username, planned, units, self.rng)
 
     def store(self, planned: Sequence[PlannedMatchup], experts: Iterable[User]) -> None:
         """Store what was planned."""

@@ -60,15 +60,17 @@ def hand_over(
     giver = expert_named(study, username)
     takers = _find_takers(study, username, to)
     names = [taker.username for taker in takers]
-    planning, known = Planning.begin(study), list_planned(study)
+    planning, dealt_before = Planning.begin(study), list_planned(study)
     rows = lock_undecided(study, giver)
     positions = {row.position for row in rows}
-    open_pairs = [one for one in known[username] if one.position in positions]
+    open_pairs = [pair for pair in dealt_before[username] if pair.position in positions]
     units = main_units(planning.grid, open_pairs)
     if not units:
         raise NothingToPlan(f"{username} has nothing left to hand over.")
-    dealt = deal(planning.grid, known, names, units, planning.rng)
-    planned = [one for name in names for one in planning.follow(name, known[name], dealt[name])]
+    dealt = deal(planning.grid, dealt_before, names, units, planning.rng)
+    planned = [
+        pair for name in names for pair in planning.follow(name, dealt_before[name], dealt[name])
+    ]
     Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
     planning.store(planned, takers)
     study.experts.add(*takers)
@@ -321,5 +323,5 @@ def _rename_in_plans(known_as: str, name: str) -> None:
     for study in Study.objects.select_for_update().order_by("pk"):
         experts = study.rules.get("experts", [])
         if known_as in experts:
-            study.rules["experts"] = [name if one == known_as else one for one in experts]
+            study.rules["experts"] = [name if entry == known_as else entry for entry in experts]
             study.save(update_fields=["rules"])

@@ -118,10 +118,10 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     if study.state != Study.State.OPEN:
         return []
     waits = RawSQL(_WAITS, (study.questions[-1],), output_field=BooleanField())
-    found = _PAIRS.filter(waits, study=study, expert=expert)[:n]
-    for matchup in found:
+    matchups = _PAIRS.filter(waits, study=study, expert=expert)[:n]
+    for matchup in matchups:
         matchup.asked = study.questions[matchup.answered]
-    return list(found)
+    return list(matchups)
 
 
 # Written out: thousands of votes ask this, and building it anew cost as much as asking it.

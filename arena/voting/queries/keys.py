@@ -43,5 +43,5 @@ SWITCHES: dict[str, bool] = {
 def voting_switches(user: User) -> dict[str, bool]:
     """Return every one of SWITCHES as the person has set it."""
     person = Person.objects.filter(user=user).only("preferences").first()
-    kept = person.preferences.get("voting", {}) if person else {}
-    return {name: bool(kept.get(name, usual)) for name, usual in SWITCHES.items()}
+    switches = person.preferences.get("voting", {}) if person else {}
+    return {name: bool(switches.get(name, usual)) for name, usual in SWITCHES.items()}

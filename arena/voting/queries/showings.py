@@ -57,8 +57,8 @@ def original_beside(augmentation: Augmentation) -> str:
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:
     """Return the view kept with a matchup; those planned before it was kept have that of then."""
-    kept = VIEW_OF_OLD if matchup.view is None else matchup.view
-    return {name: value for name, value in kept.items() if name != LEGEND}
+    view = VIEW_OF_OLD if matchup.view is None else matchup.view
+    return {name: value for name, value in view.items() if name != LEGEND}
 
 
 def as_shown(matchup: Matchup) -> dict[str, Any]:

@@ -147,17 +147,17 @@ def _store(expert: User, decision: Decision, *, is_paced: bool) -> VoteResult:
 @transaction.atomic
 def _write(expert: User, decision: Decision, is_paced: bool) -> VoteResult:
     matchup = hold_matchup(expert=expert, code=decision.matchup)
-    asked = matchup.study.questions
-    decision = replace(decision, question=decision.question or asked[0])
-    known = list(Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk)).order_by())
-    vote = next((vote for vote in known if vote.key == decision.key), None)
+    questions = matchup.study.questions
+    decision = replace(decision, question=decision.question or questions[0])
+    stored = list(Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk)).order_by())
+    vote = next((vote for vote in stored if vote.key == decision.key), None)
     is_new = vote is None
     if vote is not None:
         _check_replay(vote, matchup, decision)
     else:
         require_open(matchup.study)
-        _check_turn(decision, asked, {vote.question for vote in known})
-        own = [vote for vote in known if vote.question == decision.question]
+        _check_turn(decision, questions, {vote.question for vote in stored})
+        own = [vote for vote in stored if vote.question == decision.question]
         vote = _insert(matchup, expert, decision, _find_superseded(own, decision.supersedes))
     # Read after the lock, so that a study closed while we waited is seen as closed.
     since = timezone.now() - PACE_WINDOW
@@ -191,14 +191,14 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
     return vote
 
 
-def _find_superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
+def _find_superseded(stored: list[Vote], supersedes: UUID | None) -> Vote | None:
     """The vote that the new one replaces, None for a first vote."""
-    if not known:
+    if not stored:
         if supersedes is not None:
             raise Conflict("There is no vote yet that this one could supersede.")
         return None
-    superseded = {vote.supersedes_id for vote in known}
-    current = next(vote for vote in known if vote.pk not in superseded)
+    superseded = {vote.supersedes_id for vote in stored}
+    current = next(vote for vote in stored if vote.pk not in superseded)
     if supersedes != current.key:
         raise AlreadyDecided(current.outcome)
     return current
@@ -214,14 +214,14 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
         raise AlreadyDecided(vote.outcome)
 
 
-def _check_turn(decision: Decision, asked: Sequence[str], answered: Collection[str]) -> None:
+def _check_turn(decision: Decision, questions: Sequence[str], answered: Collection[str]) -> None:
     """Raise InvalidVote for a question that the study does not ask, or not yet."""
     question = decision.question
-    if question not in asked:
-        raise InvalidVote({"question": f"This study asks: {', '.join(asked)}."})
-    if decision.outcome == Vote.Outcome.SKIP and question != asked[0]:
-        raise InvalidVote({"question": f"A skip is of the whole pair: of {asked[0]}."})
-    for earlier in asked[: asked.index(question)]:
+    if question not in questions:
+        raise InvalidVote({"question": f"This study asks: {', '.join(questions)}."})
+    if decision.outcome == Vote.Outcome.SKIP and question != questions[0]:
+        raise InvalidVote({"question": f"A skip is of the whole pair: of {questions[0]}."})
+    for earlier in questions[: questions.index(question)]:
         if earlier not in answered:
             raise InvalidVote({"question": f"The study asks first: {earlier}."})
 

@@ -122,9 +122,9 @@ def require_checks(checks: Collection[Check], *, wanted: int) -> None:
 
 def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
     """Return the rules with those attention checks that still have both of their pictures."""
-    kept = tuple(
+    checks = tuple(
         check
         for check in rules.checks
         if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
     )
-    return replace(rules, checks=kept)
+    return replace(rules, checks=checks)

@@ -38,9 +38,9 @@ class Complaint:
 
     def __post_init__(self) -> None:
         faults = {}
-        for name, known in (("reason", Report.Reason.values), ("side", Report.Side.values)):
-            if getattr(self, name) not in known:
-                faults[name] = f"One of these is needed: {', '.join(known)}."
+        for name, allowed in (("reason", Report.Reason.values), ("side", Report.Side.values)):
+            if getattr(self, name) not in allowed:
+                faults[name] = f"One of these is needed: {', '.join(allowed)}."
         if len(self.comment) > LONGEST_COMMENT:
             faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
         if faults:

@@ -46,7 +46,10 @@ Frames = dict[tuple[str, str], ScenarioFrame]
 
 
 def find_frames(
-    planned: Sequence[PlannedMatchup], cells: Cells, scenarios: dict[str, Scenario], known: Frames
+    planned: Sequence[PlannedMatchup],
+    cells: Cells,
+    scenarios: dict[str, Scenario],
+    frames_before: Frames,
 ) -> dict[str, ScenarioFrame]:
     """Return frames by place; both sides of every pair are drawn in one window.
 
@@ -54,19 +57,19 @@ def find_frames(
         planned: What is to be shown.
         cells: The pictures.
         scenarios: By slug.
-        known: What the study shows already, which is not worked out from the scene again.
+        frames_before: What the study shows already, which is not worked out from the scene again.
 
     Raises:
         NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
             nobody knows any more where metres lie in them.
     """
     shown: dict[str, dict[str, Augmentation]] = {}
-    for one in planned:
-        for cell in shown_sides(one, cells):
-            shown.setdefault(one.scenario, {})[camera_key(cell.image)] = cell
+    for pair in planned:
+        for cell in shown_sides(pair, cells):
+            shown.setdefault(pair.scenario, {})[camera_key(cell.image)] = cell
     if mixed := [scenario_at(place) for place, windows in shown.items() if len(windows) > 1]:
         raise _other_windows(sorted(mixed))
-    frames, by_place = dict(known), {}
+    frames, by_place = dict(frames_before), {}
     for place, windows in shown.items():
         ((window, cell),) = windows.items()
         slug = scenario_at(place)
@@ -129,9 +132,9 @@ def _other_windows(scenarios: list[str]) -> NothingToPlan:
     )
 
 
-def shown_sides(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+def shown_sides(pair: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
     """Return the augmentations on the left and on the right."""
-    return cells[one.scenario, one.left], cells[one.scenario, one.right]
+    return cells[pair.scenario, pair.left], cells[pair.scenario, pair.right]
 
 
 class SampleRule(StrEnum):
@@ -286,8 +289,8 @@ def replay_settings(cells: Cells) -> dict[str, Any]:
     for *way, picture in drives.values_list(*names, "augmentation"):
         driven[tuple(way)].add(picture)
     whole = {
-        way: sorted(slug for slug, shown in pictures.items() if shown <= known)
-        for way, known in driven.items()
+        way: sorted(slug for slug, shown in pictures.items() if shown <= ways)
+        for way, ways in driven.items()
     }
     usual: Way = astuple(Options())
     best = max(whole, key=lambda way: (len(whole[way]), way == usual, way), default=usual)

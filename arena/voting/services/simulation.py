@@ -73,5 +73,5 @@ def _judge(advantage_m: float, rng: np.random.Generator) -> str:
 
 def _error_m(augmentation: Augmentation) -> float:
     """Return the size of a change's error in metres; 0 if unknown."""
-    found = of_augmentation(augmentation).displacement
-    return 0.0 if found is None else found.error_m
+    measured = of_augmentation(augmentation).displacement
+    return 0.0 if measured is None else measured.error_m

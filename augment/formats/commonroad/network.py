@@ -99,7 +99,9 @@ def read_network(root: Element, step: int) -> RoadMap:
     doubts, left_out = Doubts(), Counter[str]()
 
     def read_by_id(tag: str, read: Callable[..., Value], *more: Any) -> dict[int, Value]:
-        rows = ((one, f"{tag} {one.get('id')}", doubts, *more) for one in root.findall(tag))
+        rows = (
+            (element, f"{tag} {element.get('id')}", doubts, *more) for element in root.findall(tag)
+        )
         parts = doubts.read_all(f"{tag}s", _with_id, ((row[0], read, row) for row in rows))
         twice = len(parts) - len(dict(parts))
         doubts.assume(f"Of two {tag}s with one id the last counts", twice)
@@ -108,14 +110,16 @@ def read_network(root: Element, step: int) -> RoadMap:
     limits = read_by_id("trafficSign", _limit, left_out)
     lights = read_by_id("trafficLight", _light, step)
     driven, areas = dict[Name, Lanelet](), []
-    for name, one in read_by_id("lanelet", _lanelet, limits).items():
-        for kind in sorted(one.kinds & AREA_OF.keys())[:1]:
-            areas.append((AREA_OF[kind], one.outline))
-        left_out.update(LEFT_OUT[kind] for kind in one.kinds & LEFT_OUT.keys())
-        if not one.kinds & (AREA_OF.keys() | LEFT_OUT.keys()):
-            driven[name] = one
-    segments = {name: one.segment for name, one in driven.items()}
-    inside = dict.fromkeys(name for name, one in driven.items() if "intersection" in one.kinds)
+    for name, lanelet in read_by_id("lanelet", _lanelet, limits).items():
+        for kind in sorted(lanelet.kinds & AREA_OF.keys())[:1]:
+            areas.append((AREA_OF[kind], lanelet.outline))
+        left_out.update(LEFT_OUT[kind] for kind in lanelet.kinds & LEFT_OUT.keys())
+        if not lanelet.kinds & (AREA_OF.keys() | LEFT_OUT.keys()):
+            driven[name] = lanelet
+    segments = {name: lanelet.segment for name, lanelet in driven.items()}
+    inside = dict.fromkeys(
+        name for name, lanelet in driven.items() if "intersection" in lanelet.kinds
+    )
     inside |= _find_inside(root, segments, doubts)
     inside = inside or dict.fromkeys(crossing_segments(segments))
     shown = _show_lights(driven, inside, lights, doubts)
@@ -199,22 +203,22 @@ def _show_lights(
 
     Of several lanelets in a row with one light, the last leads into the intersection.
     """
-    following = find_successors({name: one.segment for name, one in lanelets.items()})
+    following = find_successors({name: lanelet.segment for name, lanelet in lanelets.items()})
     governing = {name: {*lanelets[name].lights} for name in lanelets if name in inside}
-    for name, one in lanelets.items():
-        for after in following[name] if one.lights and name not in inside else ():
-            if after in inside or not one.lights & lanelets[after].lights:
-                governing[after] = governing.get(after, set()) | one.lights
+    for name, lanelet in lanelets.items():
+        for after in following[name] if lanelet.lights and name not in inside else ():
+            if after in inside or not lanelet.lights & lanelets[after].lights:
+                governing[after] = governing.get(after, set()) | lanelet.lights
     shown, used = dict[Name, TrafficLight](), set[int]()
     for name, numbers in governing.items():
         turn = inside.setdefault(name) or lanelets[name].turn
         turn = TurnType.LEFT if turn is TurnType.U_TURN else turn
-        holding = sorted(one for one in numbers if turn in lights.get(one, _DARK)[1])
+        holding = sorted(number for number in numbers if turn in lights.get(number, _DARK)[1])
         used.update(holding)
         if holding:
             # One that shines goes before a dark one, one for this way alone before one for all.
-            colours = [lights.get(one, _DARK) for one in holding]
-            shown[name] = min(colours, key=lambda one: (one[0] is _DARK[0], len(one[1])))[0]
+            colours = [lights.get(number, _DARK) for number in holding]
+            shown[name] = min(colours, key=lambda light: (light[0] is _DARK[0], len(light[1])))[0]
     idle, lost = len(lights.keys() - used), len(used - lights.keys())
     doubts.assume("A traffic light governs no lane that cars drive on", idle)
     doubts.assume("A light that is named and not there is of unknown state", lost)
@@ -225,7 +229,9 @@ def _show_lights(
 
 
 def _references(parent: Element, path: str, doubts: Doubts) -> tuple[int, ...]:
-    rows = ((one.get("ref", ""), f"{parent.tag}.{path}") for one in parent.findall(path))
+    rows = (
+        (reference.get("ref", ""), f"{parent.tag}.{path}") for reference in parent.findall(path)
+    )
     return tuple(doubts.read_all("references", foreign.read_whole, rows))
 
 
@@ -236,21 +242,21 @@ def _lanelet(
     if left is None or right is None:
         raise fault_at(place, "needs a leftBound and a rightBound")
     edges = read_points(left, place), read_points(right, place)
-    own = ((one.text or "", place) for one in element.findall("speedLimit"))
-    known = doubts.read_all("speed limits", foreign.read_speed, own)
+    own = ((limit.text or "", place) for limit in element.findall("speedLimit"))
+    speed_limits = doubts.read_all("speed limits", foreign.read_speed, own)
     signs = _references(element, "trafficSignRef", doubts)
     doubts.assume("A sign that is named is not there", len({*signs} - limits.keys()))
-    known += [limit for sign in signs if (limit := limits.get(sign)) is not None]
+    speed_limits += [limit for sign in signs if (limit := limits.get(sign)) is not None]
     kinds = {(kind.text or "").strip() for kind in element.findall("laneletType")}
     doubts.doubt_unknown("types of lanelets", _TYPES, sorted(kinds), place)
-    users = [(one.tag, (one.text or "").strip()) for one in element if one.tag[:4] == "user"]
+    users = [(user.tag, (user.text or "").strip()) for user in element if user.tag[:4] == "user"]
     doubts.doubt_unknown("users of lanelets", _USERS, [user for _, user in users], place)
     if all(_USERS.get(user) for _, user in users):
         kinds |= {_USERS[user] for _, user in users}
     is_both = any(_USERS.get(user) == "" and tag != "userOneWay" for tag, user in users)
     doubts.assume("A lanelet that cars use both ways is one of its own direction", is_both)
     beside = (*element.findall("adjacentLeft"), *element.findall("adjacentRight"))
-    ways = [one.get("drivingDir") for one in beside]
+    ways = [lanelet.get("drivingDir") for lanelet in beside]
     doubts.doubt_unknown("neighbours of lanelets", _WAYS, ways, place)
     # The format pairs the points of the bounds; the middle of each pair is on the centreline.
     is_paired = len(edges[0]) == len(edges[1])
@@ -263,14 +269,16 @@ def _lanelet(
         predecessors=_references(element, "predecessor", doubts),
         left_neighbors=_references(element, "adjacentLeft[@drivingDir='same']", doubts),
         right_neighbors=_references(element, "adjacentRight[@drivingDir='same']", doubts),
-        speed_limit_mps=min(known, default=None),
+        speed_limit_mps=min(speed_limits, default=None),
     )
     with refuse_shape(place):
         turn = classify_turn(segment_centreline(segment))
     paths = "trafficLightRef", "stopLine/trafficLightRef"
     lights = [number for path in paths for number in _references(element, path, doubts)]
     # One whose number can't be read is dark, and not none.
-    lights += [-1] * (len([one for path in paths for one in element.findall(path)]) > len(lights))
+    lights += [-1] * (
+        len([light for path in paths for light in element.findall(path)]) > len(lights)
+    )
     outline = np.vstack([edges[0], edges[1][::-1]])
     return Lanelet(segment=segment, turn=turn, kinds=kinds, lights={*lights}, outline=outline)
 
@@ -286,6 +294,9 @@ def _find_inside(
         for word, turn in _TURNS.items():
             for begin in ("successors", "outgoing"):
                 named |= dict.fromkeys(_references(incoming, f"{begin}{word}", doubts), turn)
-    bare = [one.find("incoming/incomingLanelet") is None for one in root.findall("intersection")]
+    bare = [
+        intersection.find("incoming/incomingLanelet") is None
+        for intersection in root.findall("intersection")
+    ]
     doubts.assume("An intersection without incoming lanelets tells nothing", sum(bare))
     return {name: turn for name, turn in named.items() if name in lanelets}

@@ -98,27 +98,39 @@ class CommonRoad(LogReader):
         root, step_s = _root(path)
         doubts, left_out = Doubts(), Counter[str]()
         states = StateReader(root=root, step_s=step_s, doubts=doubts)
-        things = ((one, states, left_out) for one in root if one.tag.lower().endswith("obstacle"))
+        things = (
+            (element, states, left_out)
+            for element in root
+            if element.tag.lower().endswith("obstacle")
+        )
         obstacles = doubts.read_all("objects", _obstacle, things)
         starts = ((element, states) for element in root.findall("planningProblem"))
         problems = doubts.read_all("planning problems", _problem, starts)
-        vehicles = [one for one in obstacles if one.type is AgentType.VEHICLE and not one.stands]
-        egos = {str(one.id): one for one in (*problems, *obstacles) if one.kind in DRIVERS}
+        vehicles = [
+            obstacle
+            for obstacle in obstacles
+            if obstacle.type is AgentType.VEHICLE and not obstacle.stands
+        ]
+        egos = {
+            str(driver.id): driver for driver in (*problems, *obstacles) if driver.kind in DRIVERS
+        }
         chosen = problems or vehicles or [_NOBODY]
         if item is not None:
             chosen = [foreign.look_up(egos, item, "item")]
         notes = [*note_left_out("objects", left_out), *doubts.notes]
         if step_s > LONGEST_GAP_S:
             notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
-        steps = 1 + max(max(one.steps) for one in (*obstacles, *chosen))
+        steps = 1 + max(max(participant.steps) for participant in (*obstacles, *chosen))
         benchmark = root.get("benchmarkID", path.stem)[:80]
-        offer = ", ".join(f"{one.id} ({one.kind})" for one in [*egos.values()][:MOST_OFFERED])
+        offer = ", ".join(
+            f"{driver.id} ({driver.kind})" for driver in [*egos.values()][:MOST_OFFERED]
+        )
         for ego in chosen:
             yield Log(
                 times_s=np.arange(steps, dtype=np.float64) * step_s,
                 ego=ego.track(steps).states,
                 ego_size_m=ego.size_m,
-                tracks=[one.track(steps) for one in obstacles if one is not ego],
+                tracks=[obstacle.track(steps) for obstacle in obstacles if obstacle is not ego],
                 map_at=lambda frame: read_network(root, frame),
                 world=f"CommonRoad scenario frame of {benchmark}",
                 title=f"CommonRoad scenario {benchmark}, ego {ego.id}",

@@ -81,7 +81,7 @@ class StateReader:
             raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
         x_m, y_m = self._center(element.find("position"), f"{place}.position")
         names = ("orientation", "velocity", "velocityY")
-        heading_rad, speed_mps, aside_mps = (self._value(element, one, place) for one in names)
+        heading_rad, speed_mps, aside_mps = (self._value(element, field, place) for field in names)
         if np.isnan(heading_rad) and np.isfinite(aside_mps):
             # Of a point mass these are the parts along x and y of the file's frame.
             if speed_mps or aside_mps:
@@ -151,9 +151,11 @@ def read_box(shape: Element, place: str, doubts: Doubts) -> tuple[float, float, 
         InvalidDocument: There is no shape, or it breaks the format.
     """
     shapes = [*shape]
-    while any(one.tag in ("shapeGroup", "shape") for one in shapes):
-        shapes = [part for one in shapes for part in (one if "shape" in one.tag else [one])]
-    covered = shapely.GeometryCollection([cover(one, place) for one in shapes])
+    while any(shape.tag in ("shapeGroup", "shape") for shape in shapes):
+        shapes = [
+            part for shape in shapes for part in (shape if "shape" in shape.tag else [shape])
+        ]
+    covered = shapely.GeometryCollection([cover(shape, place) for shape in shapes])
     if not shapes or covered.is_empty:
         raise fault_at(place, "needs a shape")
     if len(shapes) > 1 or shapes[0].tag not in ("rectangle", "circle"):

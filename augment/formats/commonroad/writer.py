@@ -146,7 +146,7 @@ def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
         ids[way.id]  # lanelets have the first numbers
     for way in ways:
         bounds = zip(("leftBound", "rightBound"), _pair_bounds(way), strict=True)
-        edges = [_tag(name, *(_point("point", one) for one in line)) for name, line in bounds]
+        edges = [_tag(name, *(_point("point", point) for point in line)) for name, line in bounds]
         yield _tag("lanelet", *edges, *_of_way(way, graph, ids), id=ids[way.id])
     for limit in sorted({way.speed_limit_mps for way in ways if way.speed_limit_mps is not None}):
         sign = _tag("trafficSignID", SPEED_SIGN), _tag("additionalValue", float(limit))
@@ -240,8 +240,8 @@ def _is_static(movement: Movement) -> bool:
 
 
 def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
-    others = sorted(cell.motion.others, key=lambda one: not _is_static(one))
-    later = [one.agent.id for one in others if writing.appears_later(one)]
+    others = sorted(cell.motion.others, key=lambda participant: not _is_static(participant))
+    later = [participant.agent.id for participant in others if writing.appears_later(participant)]
     text = "is left out: it appears after t0, and all obstacles are there from t0 on"
     report.lose_of(later, text, changes_scene=True)
     for movement in others:
@@ -302,19 +302,29 @@ def _report(cell: Cell, report: LossReport) -> None:
     )
     report.lose("names become numbers; a comment in the file has both")
     report.lose_types(_BECOMES)
-    things = [one.agent for one in others if one.agent.type in _STATIC and not _is_static(one)]
-    report.lose_of([one.id for one in things], "moves, so it becomes one of unknown type")
-    names = [one.id for one in things if writing.keeps_heading(one)]
+    things = [
+        participant.agent
+        for participant in others
+        if participant.agent.type in _STATIC and not _is_static(participant)
+    ]
+    report.lose_of([agent.id for agent in things], "moves, so it becomes one of unknown type")
+    names = [agent.id for agent in things if writing.keeps_heading(agent)]
     report.lose_of(names, "moves without turning; its speed is written as if along its heading")
-    names = [one.agent.id for one in others if writing.has_gaps(one) and not _is_static(one)]
+    names = [
+        participant.agent.id
+        for participant in others
+        if writing.has_gaps(participant) and not _is_static(participant)
+    ]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
     connectors = scene.connectors
-    turned = [one.id for one in connectors if one.turn_type is TurnType.U_TURN]
+    turned = [connector.id for connector in connectors if connector.turn_type is TurnType.U_TURN]
     report.lose_of(turned, "a U-turn becomes a turn to the left")
-    entered = [one.id for one in connectors if one.from_lane is None]
+    entered = [connector.id for connector in connectors if connector.from_lane is None]
     report.lose_of(entered, "its turn type is not said: no lane leads into it")
-    dark = [one.id for one in connectors if one.traffic_light is TrafficLight.UNKNOWN]
+    dark = [
+        connector.id for connector in connectors if connector.traffic_light is TrafficLight.UNKNOWN
+    ]
     report.lose_of(dark, "a light of unknown state becomes one that is off")
-    if any(one.traffic_light is not TrafficLight.NONE for one in connectors):
+    if any(connector.traffic_light is not TrafficLight.NONE for connector in connectors):
         report.lose("lights stay as they are at t0; how they go on is not known")
     report.lose("on which side people drive and where the ego is in the world is not said")

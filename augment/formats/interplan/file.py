@@ -158,7 +158,10 @@ def parse_file(document: object) -> File:
         file = File.model_validate(document)
     except ValidationError as fault:
         raise InvalidDocument(WHAT, list_problems(fault)) from None
-    if not any(one.special_scenario for one in file.modification_details_dictionary.values()):
+    if not any(
+        modification.special_scenario
+        for modification in file.modification_details_dictionary.values()
+    ):
         raise InvalidDocument(WHAT, [("", "holds no special scenario")])
     return file
 
@@ -277,7 +280,9 @@ def surround(
         roadblocks = details.roadblock_locations_to_spawn_agents or []
     extras = []
     for values in (row[:3] for row in details.extra_agents_to_spawn or []):
-        if not all(isinstance(one, (int, float)) and math.isfinite(one) for one in values):
+        if not all(
+            isinstance(number, (int, float)) and math.isfinite(number) for number in values
+        ):
             problem = f"{values!r} must be x, y and a speed in metres and metres per second"
             raise InvalidDocument(WHAT, [("extra_agents_to_spawn", problem)])
         extras.append((*_to_local(scene, values[0], values[1]), float(values[2])))
@@ -337,7 +342,7 @@ def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
 
 _CONFIG_PARTS: Final = re.compile(r"[dgo][a-z]|a\d|s\d{1,2}")
 _DENSITIES = {None: TrafficDensity.NONE} | {
-    one[0]: one for one in TrafficDensity if one is not TrafficDensity.NONE
+    density[0]: density for density in TrafficDensity if density is not TrafficDensity.NONE
 }
 _TURNS = {None: None, "l": TurnType.LEFT, "r": TurnType.RIGHT, "s": TurnType.STRAIGHT}
 
@@ -348,13 +353,13 @@ def parse_suffix(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
     return _DENSITIES[parts.get("d")], _TURNS[parts.get("g")]
 
 
-def format_suffix(options: SceneOptions, given: str = "") -> str:
+def format_suffix(options: SceneOptions, suffix: str = "") -> str:
     """Return the suffix of a scenario's options; as given where that says the same already."""
-    if parse_suffix(given) == (options.density, options.goal):
-        return given
+    if parse_suffix(suffix) == (options.density, options.goal):
+        return suffix
     density = "" if options.density is TrafficDensity.NONE else f"d{options.density[0]}"
     goal = "" if options.goal is None else f"g{options.goal[0]}"
-    others = [part for part in _CONFIG_PARTS.findall(given) if part[0] not in "dg"]
+    others = [part for part in _CONFIG_PARTS.findall(suffix) if part[0] not in "dg"]
     return "".join([density, goal, *others])
 
 

@@ -43,17 +43,17 @@ def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
         scenarios: Those whose base token is nuPlan's; without any there are no files.
     """
     by_contestant: defaultdict[str, list[NuplanScenario]] = defaultdict(list)
-    for one in scenarios:
-        by_contestant[one.contestant].append(one)
+    for run in scenarios:
+        by_contestant[run.contestant].append(run)
     if not by_contestant:
         return {}
     files, commands, table = {}, "", io.StringIO()
     rows = csv.writer(table, lineterminator="\n")
     rows.writerow(_COLUMNS)
-    for slug, found in sorted(by_contestant.items()):
-        files[f"scenario_filter/arena-{slug}.yaml"] = _filter(found)
-        commands += f'run arena-{slug} "$@"   # {len(found)} scenarios\n'
-        rows.writerows([getattr(one, column) for column in _COLUMNS] for one in found)
+    for slug, runs in sorted(by_contestant.items()):
+        files[f"scenario_filter/arena-{slug}.yaml"] = _filter(runs)
+        commands += f'run arena-{slug} "$@"   # {len(runs)} scenarios\n'
+        rows.writerows([getattr(run, column) for column in _COLUMNS] for run in runs)
     return files | {SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
 
 
@@ -70,13 +70,13 @@ def read_tokens(content: bytes) -> dict[str, str]:
     if not rows or tuple(rows[0]) != _COLUMNS or len(rows) > MOST_TOKENS + 1:
         problem = f"needs the columns {', '.join(_COLUMNS)} and at most {MOST_TOKENS:,} lines"
         raise InvalidDocument(TOKENS, [("line 1", problem)])
-    found: dict[str, str] = {}
+    scenarios: dict[str, str] = {}
     for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(_COLUMNS) or row[0] in found:
+        if len(row) != len(_COLUMNS) or row[0] in scenarios:
             problem = f"needs {len(_COLUMNS)} values and a scenario that no other line has"
             raise InvalidDocument(TOKENS, [(f"line {number}", problem)])
-        found[row[0]] = row[1]
-    return found
+        scenarios[row[0]] = row[1]
+    return scenarios
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def _filter(scenarios: list[NuplanScenario]) -> bytes:
         "_convert_": "all",
         "defaults": [f"/{MODIFICATIONS.removesuffix('.yaml')}@modifications"],
         "scenario_types": None,
-        "scenario_tokens": [one.scenario for one in scenarios],
+        "scenario_tokens": [run.scenario for run in scenarios],
         **dict.fromkeys(open_limits),
         **dict.fromkeys(("expand_scenarios", "remove_invalid_goals", "shuffle"), False),
     }

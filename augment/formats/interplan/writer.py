@@ -62,7 +62,7 @@ def write(cells: Sequence[Cell]) -> Output:
             losses.append(Loss(cell=cell.name, text=text, changes_scene=True))
         else:
             entries.append(_Entry(cell, cell.type))
-    made_up = {one.token for one in entries if one.cell.source is None}
+    made_up = {entry.token for entry in entries if entry.cell.source is None}
     comments = [f"{_MADE_UP} {', '.join(sorted(made_up))}"] if made_up else []
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
     runs: list[NuplanScenario] = []
@@ -74,12 +74,14 @@ def write(cells: Sequence[Cell]) -> Output:
         if entry.token not in made_up:
             runs.append(entry.run_as(name))
         comments += [f"  lost: {loss.text}" for loss in entry.report.losses]
-    given = {one.token: one.source for one in reversed(entries) if one.source.index is not None}
+    sources = {
+        entry.token: entry.source for entry in reversed(entries) if entry.source.index is not None
+    }
     documents = {
-        token: (special, given[token].details if token in given else {})
+        token: (special, sources[token].details if token in sources else {})
         for token, special in by_token.items()
     }
-    file = next((source.file for source in given.values() if source.file), None)
+    file = next((source.file for source in sources.values() if source.file), None)
     text = interplan.yaml_text(documents, comments, file)
     return Output(files={MODIFICATIONS: text.encode()} | run_files(runs), losses=tuple(losses))
 
@@ -99,7 +101,7 @@ def _list_numbers(entries: Sequence["_Entry"]) -> list[str]:
     made = []
     for entry, number in zip(entries, numbers, strict=True):
         used = taken[entry.token]
-        free = (str(one) for one in range(interplan.MOST_ENTRIES) if str(one) not in used)
+        free = (str(number) for number in range(interplan.MOST_ENTRIES) if str(number) not in used)
         index = number or next(free, None)
         if index is None:
             raise Conflict(
@@ -144,12 +146,12 @@ class _Entry:
 
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
-        given = dict(self.source.entry)
-        config = interplan.format_suffix(self.cell.scene.options, given.pop("config", None) or "")
+        entry = dict(self.source.entry)
+        config = interplan.format_suffix(self.cell.scene.options, entry.pop("config", None) or "")
         head = {"type": self.kind.value} | ({"config": config} if config else {})
         self._lose_unknown()
         if self.is_unchanged:
-            return head | {key: value for key, value in given.items() if key != "type"}
+            return head | {key: value for key, value in entry.items() if key != "type"}
         change, by_key = self.cell.modification, defaultdict[str, list[TrafficAgent]](list)
         for agent in change.added:
             by_key[_find_key(agent, self.cell.scene)].append(agent)
@@ -172,11 +174,11 @@ class _Entry:
         objects = {key: lists for key, lists in rows.items() if lists}
         there = self._read({"type": self.kind.value, **objects}).added
         here = [agent for key in interplan.OBJECTS for agent in by_key[key]]
-        for agent, found in zip(here, there, strict=True):
-            for text, changes_scene in _changes(agent, found):
+        for agent, counterpart in zip(here, there, strict=True):
+            for text, changes_scene in _changes(agent, counterpart):
                 self._lose(f"{agent.id} {text}", changes_scene=changes_scene)
         rest = {
-            key: value for key, value in given.items() if key not in ("type", *interplan.OBJECTS)
+            key: value for key, value in entry.items() if key not in ("type", *interplan.OBJECTS)
         }
         return {**head, **objects, **rest}
 
@@ -236,21 +238,27 @@ def _find_key(agent: TrafficAgent, scene: Scene) -> str:
     }.get(agent.type, "")
 
 
-def _changes(agent: TrafficAgent, found: TrafficAgent) -> Iterator[tuple[str, bool]]:
+def _changes(agent: TrafficAgent, counterpart: TrafficAgent) -> Iterator[tuple[str, bool]]:
     """Yield the values that come back changed, and whether they change the scene."""
-    if agent.type is not found.type:
-        yield f"is {agent.length_m:g} m long and becomes a {found.type}", True
-    sizes = (agent.length_m, agent.width_m), (found.length_m, found.width_m)
+    if agent.type is not counterpart.type:
+        yield f"is {agent.length_m:g} m long and becomes a {counterpart.type}", True
+    sizes = (agent.length_m, agent.width_m), (counterpart.length_m, counterpart.width_m)
     box = f"has a box of {agent.length_m:g} x {agent.width_m:g} m"
-    if found.type is not AgentType.VEHICLE and np.abs(np.subtract(*sizes)).max() > _SAME_SIZE_M:
-        yield f"{box}, which becomes {found.length_m:g} x {found.width_m:g} m", False
-    turned_deg = math.degrees(abs(difference(agent.heading_rad, found.heading_rad)))
+    if (
+        counterpart.type is not AgentType.VEHICLE
+        and np.abs(np.subtract(*sizes)).max() > _SAME_SIZE_M
+    ):
+        yield f"{box}, which becomes {counterpart.length_m:g} x {counterpart.width_m:g} m", False
+    turned_deg = math.degrees(abs(difference(agent.heading_rad, counterpart.heading_rad)))
     if turned_deg > _SAME_WAY_DEG:
         yield f"looks {turned_deg:.3g} degrees away from where it looks there", False
     if agent.motion is not None:
         yield "has a motion of its own, which interPlan and nuPlan don't know", True
-    if abs(agent.speed_mps - found.speed_mps) > _SAME_PACE_MPS:
-        text = f"moves at {agent.speed_mps:g} m/s, there at {found.speed_mps:g} m/s"
+    if abs(agent.speed_mps - counterpart.speed_mps) > _SAME_PACE_MPS:
+        text = f"moves at {agent.speed_mps:g} m/s, there at {counterpart.speed_mps:g} m/s"
         yield text, agent.walk_to_m is None
-    if agent.walk_to_m != found.walk_to_m and None in (agent.walk_to_m, found.walk_to_m):
+    if agent.walk_to_m != counterpart.walk_to_m and None in (
+        agent.walk_to_m,
+        counterpart.walk_to_m,
+    ):
         yield "walks there" if agent.walk_to_m is None else "has a walk; there it stands", True

@@ -41,11 +41,11 @@ def write_map(cell: Cell, report: LossReport) -> bytes:
     if not writing.list_ways(scene):
         raise writing.CannotExpress("OpenDRIVE needs at least one road, and there is no lane")
     roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.list_ways(scene), start=1)}
-    connecting = [one for one in scene.connectors if _is_connecting(one, roads)]
+    connecting = [connector for connector in scene.connectors if _is_connecting(connector, roads)]
     groups = dict(enumerate(writing.group_connectors(connecting), start=_FIRST_JUNCTION))
     links = _Links(roads)
     report.lose_of(
-        links.join_lanes(scene, {one.id for one in connecting}),
+        links.join_lanes(scene, {connector.id for connector in connecting}),
         "not joined: a gap, a bend, or a fork without connectors, which OpenDRIVE has no link for",
     )
     for number, group in groups.items():
@@ -118,12 +118,12 @@ def _offsets(edge: Polyline, points: FloatArray, tangents: FloatArray) -> FloatA
     return np.array(offsets, dtype=np.float64)
 
 
-def _is_connecting(one: LaneConnector, roads: Mapping[str, _Road]) -> bool:
+def _is_connecting(connector: LaneConnector, roads: Mapping[str, _Road]) -> bool:
     """Return whether both its ends are lanes that it really reaches."""
-    before, after = (roads.get(name or "") for name in (one.from_lane, one.to_lane))
+    before, after = (roads.get(name or "") for name in (connector.from_lane, connector.to_lane))
     if before is None or after is None:
         return False
-    return before.leads_to(roads[one.id]) and roads[one.id].leads_to(after)
+    return before.leads_to(roads[connector.id]) and roads[connector.id].leads_to(after)
 
 
 class _Links:
@@ -137,8 +137,8 @@ class _Links:
     def join_lanes(self, scene: Scene, inside: set[str]) -> list[str]:
         """Join roads that follow each other outside of junctions; return what can't be."""
         graph, left_out = LaneGraph(scene), []
-        entered = {one.to_lane for one in scene.connectors if one.id in inside}
-        exited = {one.from_lane for one in scene.connectors if one.id in inside}
+        entered = {connector.to_lane for connector in scene.connectors if connector.id in inside}
+        exited = {connector.from_lane for connector in scene.connectors if connector.id in inside}
         for name, road in self._roads.items():
             for following in graph.successors(name):
                 if name in inside or following in inside:
@@ -159,12 +159,15 @@ class _Links:
 
     def join_junction(self, number: int, members: Sequence[LaneConnector]) -> None:
         """Join the connectors of a junction to their lanes, whose ends they take over."""
-        for one in members:
-            road = self._roads[one.id]
-            before, after = self._roads[str(one.from_lane)], self._roads[str(one.to_lane)]
+        for connector in members:
+            road = self._roads[connector.id]
+            before, after = (
+                self._roads[str(connector.from_lane)],
+                self._roads[str(connector.to_lane)],
+            )
             road.junction = number
             self.after[before.way.id] = self.before[after.way.id] = ("junction", number)
-            self.before[one.id], self.after[one.id] = (
+            self.before[connector.id], self.after[connector.id] = (
                 ("road", before.number),
                 ("road", after.number),
             )
@@ -253,9 +256,13 @@ def _junction(
 
 def _report(scene: Scene, report: LossReport) -> None:
     report.lose("roads are smooth through our points and meet at common ends: edges may lie off")
-    lanes = [one.id for one in scene.lanes if one.left_neighbor or one.right_neighbor]
+    lanes = [lane.id for lane in scene.lanes if lane.left_neighbor or lane.right_neighbor]
     report.lose_of(lanes, "that lanes lie side by side is not said: each is a road of its own")
-    lit = [one.id for one in scene.connectors if one.traffic_light is not TrafficLight.NONE]
+    lit = [
+        connector.id
+        for connector in scene.connectors
+        if connector.traffic_light is not TrafficLight.NONE
+    ]
     report.lose_of(lit, "the map has no lights")
     report.lose_of([area.id for area in scene.areas], "areas are left out of the map")
     connectors = [connector.id for connector in scene.connectors]

@@ -56,13 +56,13 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     files = {road_file: write_map(cell, report)}
     everyone = (motion.ego, *motion.others)
     entities = xosc.Entities()
-    for one in everyone:
-        entities.add_scenario_object(one.agent.id, _entity(xosc, one.agent))
+    for participant in everyone:
+        entities.add_scenario_object(participant.agent.id, _entity(xosc, participant.agent))
     board = xosc.StoryBoard(_init(xosc, everyone), _at(xosc, "end", float(motion.times_s[-1])))
-    for one in everyone:
-        name = one.agent.id
+    for participant in everyone:
+        name = participant.agent.id
         maneuver = xosc.Maneuver(f"{name} maneuver")
-        for event in _events(xosc, cell, one):
+        for event in _events(xosc, cell, participant):
             maneuver.add_event(event)
         if maneuver.events:
             group = xosc.ManeuverGroup(f"{name} group")
@@ -122,12 +122,12 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
     """Yield everybody's place and speed at t0; agents that come later are not there yet."""
     init = xosc.Init()
     now = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0.0)
-    for one in everyone:
-        if writing.appears_later(one):
+    for participant in everyone:
+        if writing.appears_later(participant):
             continue
-        name, state = one.agent.id, one.states[0]
-        init.add_init_action(name, xosc.TeleportAction(_position(xosc, one.agent, state)))
-        if one.agent.type not in _THINGS:
+        name, state = participant.agent.id, participant.states[0]
+        init.add_init_action(name, xosc.TeleportAction(_position(xosc, participant.agent, state)))
+        if participant.agent.type not in _THINGS:
             init.add_init_action(name, xosc.AbsoluteSpeedAction(float(state[3]), now))
     return init
 
@@ -193,12 +193,12 @@ def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None
     if isinstance(start, AtTime):
         return _at(xosc, name, start.after_s)
     apart = triggers.distance_condition(cell, agent, start, started_s, _ahead_m)
-    given = apart.within_m, xosc.Rule.lessOrEqual
+    arguments = apart.within_m, xosc.Rule.lessOrEqual
     kind = xosc.RelativeDistanceType.euclidianDistance
-    condition = xosc.RelativeDistanceCondition(*given, kind, EGO_ID, freespace=False)
+    condition = xosc.RelativeDistanceCondition(*arguments, kind, EGO_ID, freespace=False)
     if apart.place_m is not None:
         place = xosc.WorldPosition(*apart.place_m)
-        condition = xosc.DistanceCondition(*given, place, freespace=False, distance_type=kind)
+        condition = xosc.DistanceCondition(*arguments, place, freespace=False, distance_type=kind)
     edge = xosc.ConditionEdge.none
     return xosc.EntityTrigger(f"{name} trigger", 0.0, edge, condition, apart.who)
 
@@ -256,9 +256,9 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
 
 def _report(cell: Cell, report: LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
-    for one in cell.motion.others:
-        if (agent := triggers.with_motion(one.agent)) is not None:
-            _report_start(cell, report, one, agent)
+    for participant in cell.motion.others:
+        if (agent := triggers.with_motion(participant.agent)) is not None:
+            _report_start(cell, report, participant, agent)
     names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
     obstacles = [kind for kind, name in _THINGS.items() if name == "obstacle"]

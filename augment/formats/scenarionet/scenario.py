@@ -97,12 +97,12 @@ def _log(path: Path, item: str | None) -> Log:
     for name in ("tracks", "map_features", "metadata"):
         foreign.read_as(description.get(name), dict, name)
     metadata, doubts = description["metadata"], Doubts()
-    given = metadata.get("ts", metadata.get("timestep"))
-    if given is None:
+    times = metadata.get("ts", metadata.get("timestep"))
+    if times is None:
         length = description.get("length")
         doubts.assume("Steps without times are taken as 0.1 s apart")
-        given = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
-    times_s = foreign.read_times(given, "metadata.ts")
+        times = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
+    times_s = foreign.read_times(times, "metadata.ts")
     tracks, left_out = dict[str, LoggedTrack](), Counter[str]()
     for key, track in description["tracks"].items():
         with doubts.about("objects"):
@@ -189,7 +189,7 @@ def _column(value: object, steps: int, place: str, needed: int) -> FloatArray:
 # The map
 
 
-def _city(description: dict[str, Any], frame: int, city_name: str, told: str) -> RoadMap:
+def _city(description: dict[str, Any], frame: int, city_name: str, side: str) -> RoadMap:
     """The map with the lights of one step."""
     doubts = Doubts()
     states = description.get("dynamic_map_states")
@@ -220,14 +220,14 @@ def _city(description: dict[str, Any], frame: int, city_name: str, told: str) ->
     segments = doubts.read_all("lanes", _segment, rows)
     # Told by our own writer alone.
     sides = dict.fromkeys(("", "left", "right"))
-    doubts.doubt_unknown("sides of traffic", sides, [told], "metadata.traffic_side")
-    is_left = told == "left" or city_name.lower().startswith(LEFT_HAND)
+    doubts.doubt_unknown("sides of traffic", sides, [side], "metadata.traffic_side")
+    is_left = side == "left" or city_name.lower().startswith(LEFT_HAND)
     return RoadMap(
         place="map_features",
         segments=tuple(segments),
         areas=tuple(areas),
-        side=TrafficSide.LEFT if is_left and told != "right" else TrafficSide.RIGHT,
-        is_side_told=told in ("left", "right"),
+        side=TrafficSide.LEFT if is_left and side != "right" else TrafficSide.RIGHT,
+        is_side_told=side in ("left", "right"),
         left_out=left_out,
         tells_crossings=bool(connectors),
         doubts=doubts,
@@ -299,19 +299,19 @@ def _list(value: object, place: str) -> list[Any]:
 def _names(value: object, place: str) -> tuple[str, ...]:
     """Ids of lanes, given as such or as dictionaries with one."""
     values = _list(value, place)
-    names = [one.get("feature_id") if isinstance(one, dict) else one for one in values]
+    names = [value.get("feature_id") if isinstance(value, dict) else value for value in values]
     return tuple(_name(name, place) for name in names)
 
 
 def _width(lane: dict[str, Any], line: FloatArray, place: str) -> float | None:
     """The median of the widths that the file gives, else the lane's area over its length."""
-    given, polygon = lane.get("width"), lane.get("polygon")
+    row, polygon = lane.get("width"), lane.get("polygon")
     widths = np.empty(0)
-    if given is not None:
-        widths = foreign.read_numbers(given, f"{place}.width", 2).sum(axis=1)
+    if row is not None:
+        widths = foreign.read_numbers(row, f"{place}.width", 2).sum(axis=1)
     if not len(widths) and polygon is not None and len(line) >= 2:
         length_m = max(float(np.hypot(*np.diff(line, axis=0).T).sum()), 1e-6)
         ring = foreign.read_finite(polygon, f"{place}.polygon", 2)
         widths = np.array([shapely.Polygon(ring).area / length_m]) if len(ring) >= 3 else widths
-    known = widths[(widths >= NARROWEST_M) & (widths <= WIDEST_M)]
-    return float(np.median(known)) if len(known) else None
+    usable = widths[(widths >= NARROWEST_M) & (widths <= WIDEST_M)]
+    return float(np.median(usable)) if len(usable) else None

@@ -142,10 +142,12 @@ def _plain(value: Any) -> Any:
     if isinstance(value, _Array):
         return _plain(value.value)
     if isinstance(value, dict):
-        texts = ((str(key) if isinstance(key, tuple) else key, one) for key, one in value.items())
-        return {_plain(key): _plain(one) for key, one in texts}
+        texts = (
+            (str(key) if isinstance(key, tuple) else key, part) for key, part in value.items()
+        )
+        return {_plain(key): _plain(part) for key, part in texts}
     if isinstance(value, list | tuple | set):
-        return [_plain(one) for one in value]
+        return [_plain(part) for part in value]
     if value is None or isinstance(value, str | bytes | int | float | np.ndarray):
         return value
     raise ValueError(f"holds a {type(value).__name__.strip('_')}, which is no plain value")

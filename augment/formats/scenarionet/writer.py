@@ -103,7 +103,10 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "traffic_side": scene.traffic_side.value,
             "provenance": scene.provenance,
         },
-        "tracks": {one.agent.id: _track(one) for one in (motion.ego, *motion.others)},
+        "tracks": {
+            participant.agent.id: _track(participant)
+            for participant in (motion.ego, *motion.others)
+        },
         "dynamic_map_states": {
             connector.id: _light(connector, steps)
             for connector in scene.connectors
@@ -129,9 +132,15 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_types(_BECOMES)
     text = "left out: there is no type for a {} area"
     report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
-    odd = [one.id for one in connectors if one.turn_type is not classify_turn(one.centerline)]
+    odd = [
+        connector.id
+        for connector in connectors
+        if connector.turn_type is not classify_turn(connector.centerline)
+    ]
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
-    dark = [one.id for one in connectors if one.traffic_light is TrafficLight.NONE]
+    dark = [
+        connector.id for connector in connectors if connector.traffic_light is TrafficLight.NONE
+    ]
     report.lose_of(dark, "that it has no light is not said")
     if any(way.left_boundary or way.right_boundary for way in writing.list_ways(scene)):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
@@ -207,7 +216,9 @@ def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
 
 def _road_edges(scene: Scene) -> Iterator[np.ndarray]:
     """The edges of lanes (P, 2) where no other lane or connector lies beside or across them."""
-    sides = [[one.points_m for one in writing.way_edges(way)] for way in writing.list_ways(scene)]
+    sides = [
+        [edge.points_m for edge in writing.way_edges(way)] for way in writing.list_ways(scene)
+    ]
     outlines = [shapely.Polygon(np.vstack([left, right[::-1]])) for left, right in sides]
     covers = shapely.buffer(shapely.make_valid(outlines), _BESIDE_M)
     tree = shapely.STRtree(covers)

@@ -104,9 +104,9 @@ def _log(file: str, number: int, payload: bytes) -> Log:
         ego=ego.states,
         ego_size_m=(ego.length_m, ego.width_m),
         tracks=[
-            one
-            for index, one in tracks.items()
-            if one is not ego and index not in unset and np.isfinite(one.states).any()
+            track
+            for index, track in tracks.items()
+            if track is not ego and index not in unset and np.isfinite(track.states).any()
         ],
         map_at=lambda frame: read_city(scenario, frame),
         world="Waymo Open Motion scenario frame",
@@ -231,12 +231,12 @@ def read_city(scenario: Any, frame: int) -> RoadMap:
                 areas.append((AREA_OF[kind], _points(getattr(feature, kind).points, place)))
     states = [step.lane_states for step in scenario.dynamic_map_states]
     lights = {
-        one.lane: doubts.read(
-            "states of lights", foreign.look_up, LIGHT_OF, one.state, "lane_states"
+        light.lane: doubts.read(
+            "states of lights", foreign.look_up, LIGHT_OF, light.state, "lane_states"
         )
-        for one in (states[frame] if frame < len(states) else ())
+        for light in (states[frame] if frame < len(states) else ())
     }
-    controlled = {one.lane for step in states for one in step}
+    controlled = {light.lane for step in states for light in step}
     idle = len(controlled - {feature.id for feature in scenario.map_features})
     doubts.assume("A traffic light governs no lane that is there", idle)
     rows = ((*lane, edges, lights, controlled, doubts) for lane in lanes.items())
@@ -289,8 +289,8 @@ def _segment(
         width_m=mean_width(line, left, right),
         successors=tuple(lane.exit_lanes),
         predecessors=tuple(lane.entry_lanes),
-        left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
-        right_neighbors=tuple(one.feature_id for one in lane.right_neighbors),
+        left_neighbors=tuple(neighbor.feature_id for neighbor in lane.left_neighbors),
+        right_neighbors=tuple(neighbor.feature_id for neighbor in lane.right_neighbors),
         speed_limit_mps=doubts.read("speed limits", foreign.read_speed, limit, place, MPS_OF_MPH),
         light=lights.get(key) or TrafficLight.UNKNOWN,
     )

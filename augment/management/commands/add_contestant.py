@@ -39,9 +39,9 @@ class Command(TerminalCommand):
                 help=f"who plays the {role}, where the variant has one; default: the model itself",
             )
         add_options(parser.add_argument_group("how it asks"), OPTION_INPUTS)
-        asked = [one for one in to_inputs(EndpointRequest) if one.name in OF_ENDPOINTS]
+        inputs = [field for field in to_inputs(EndpointRequest) if field.name in OF_ENDPOINTS]
         group = parser.add_argument_group("a new endpoint")
-        add_options(group, asked, is_any_required=False)
+        add_options(group, inputs, is_any_required=False)
 
     @transaction.atomic
     def handle(self, *args: Any, **options: Any) -> None:

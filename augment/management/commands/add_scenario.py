@@ -58,16 +58,16 @@ class Command(TerminalCommand):
         if missing:
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
         names = ("scene", "type", "instruction", "slug", "keep_traffic")
-        given = {name: options[name] for name in names}
-        given |= {
+        values = {name: options[name] for name in names}
+        values |= {
             name: options[name] or "" for name in ("density", "goal", "follows", "variant_of")
         }
         for name, what in DOCUMENTS.items():
             if (file := options[name]) is not None:
-                given[name] = read_json(file, what=what)
-                if given[name] is None:
+                values[name] = read_json(file, what=what)
+                if values[name] is None:
                     raise InvalidDocument(what, [(file.name, "holds null")])
-        scenario = add_scenario(NewScenario(**given))
+        scenario = add_scenario(NewScenario(**values))
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
         self.stdout.write(
@@ -75,9 +75,11 @@ class Command(TerminalCommand):
         )
 
     def _add_many(self, options: dict[str, Any]) -> None:
-        given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
-        if given:
-            raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
+        superfluous = [
+            f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]
+        ]
+        if superfluous:
+            raise CommandError(f"--file says all of it; it goes without {', '.join(superfluous)}.")
         file: Path = options["file"]
         try:
             content = file.read_bytes()

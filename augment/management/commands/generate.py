@@ -31,23 +31,23 @@ class Command(TerminalCommand):
 
     def add_arguments(self, parser: CommandParser) -> None:
         """Add the contestants, the scenarios, and whether to wait."""
-        for asked in to_inputs(JobRequest):
-            add_options(parser, [replace(asked, default="") if asked.name == "name" else asked])
+        for field in to_inputs(JobRequest):
+            add_options(parser, [replace(field, default="") if field.name == "name" else field])
         parser.add_argument(
             "--estimate", action="store_true", help="say what it would use, and launch nothing"
         )
-        for name, given in WAITING.items():
-            parser.add_argument(name, **given)
+        for name, arguments in WAITING.items():
+            parser.add_argument(name, **arguments)
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
         ensure_builtin()
-        given = options | {
+        values = options | {
             "name": options["name"] or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC",
             "contestants": resolve_contestants(options["contestants"]),
             "scenarios": resolve_scenarios(options["scenarios"]),
         }
-        request = read_request(JobRequest, given)
+        request = read_request(JobRequest, values)
         if options["estimate"]:
             self._say(estimate(request))
             return

@@ -37,7 +37,7 @@ class Command(TerminalCommand):
         """Load it and say what that changed."""
         folder, sets = options["folder"], [options["set"]]
         if sets == ["all"]:
-            sets = [one for one in CatalogueSet if set_folder(folder, one).is_dir()]
+            sets = [name for name in CatalogueSet if set_folder(folder, name).is_dir()]
         paraphrased = options["paraphrases"]
         report = load_catalogue(folder=folder, sets=sets, with_paraphrases=paraphrased)
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):

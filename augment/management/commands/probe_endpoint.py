@@ -30,8 +30,10 @@ class Command(TerminalCommand):
         """Ask, print a line for each question and fail where nobody answers."""
         endpoint = find_endpoint(options["label"])
         report = probe(model_at(endpoint=endpoint, model=options["model"]))
-        for found in report.findings:
-            self.stdout.write(f"{found.ability:14}{_WORDS[found.has_it]:9}{found.note}".rstrip())
+        for finding in report.findings:
+            self.stdout.write(
+                f"{finding.ability:14}{_WORDS[finding.has_it]:9}{finding.note}".rstrip()
+            )
         cost = "cost unknown" if report.cost_usd is None else f"{report.cost_usd} USD"
         refused = ", ".join(report.refused) or "nothing"
         self.stdout.write(f"{report.calls} calls, {cost}; not taken: {refused}")

@@ -46,7 +46,7 @@ class Command(TerminalCommand):
             if reading.state != IntentReading.State.READ:
                 raise CommandError(f"Nothing was read: {reading.reason}")
             document = reading.document
-            told = (
+            sentence = (
                 "It does not count yet. Hold each statement against the sentence, then accept "
                 f"it:\n  manage.py read_intent {slug} --accept"
             )
@@ -57,7 +57,7 @@ class Command(TerminalCommand):
                 entered = read_json(options["enter"], what="intent")
                 row = enter_intent(scenario=slug, document=entered)
             document = row.intent
-            told = f"This is the intent of {slug} now ({row.intent_origin})."
+            sentence = f"This is the intent of {slug} now ({row.intent_origin})."
         for statement in list_statements(intent_from_document(document)):
             self.stdout.write(f"- {statement}")
-        self.stdout.write(told)
+        self.stdout.write(sentence)

@@ -57,15 +57,15 @@ class Command(TerminalCommand):
 
     def _say(self, result: SweepResult) -> None:
         for line in result.lines:
-            told = [
+            parts = [
                 f"{trial.driver} {100.0 * trial.score:.1f}{'' if trial.is_lawful else ' (fails)'}"
                 for trial in line.tried.trials
             ]
-            told += [drive.reason for drive in line.drives if drive.reason]
-            self.stdout.write(f"{line.row.value:g}: {'; '.join(told) or line.row.reason}")
+            parts += [drive.reason for drive in line.drives if drive.reason]
+            self.stdout.write(f"{line.row.value:g}: {'; '.join(parts) or line.row.reason}")
         self.stdout.write(result.verdict)
-        kept = result.sweep.hardest
+        scenario = result.sweep.hardest
         told_last = "No value is failed by it and solved by another."
         if result.under_way:
             told_last = f"Workers have {result.under_way} of the drives; the sweep's page goes on."
-        self.stdout.write(f"Kept as {kept.slug}." if kept else told_last)
+        self.stdout.write(f"Kept as {scenario.slug}." if scenario else told_last)
