@@ -2,7 +2,7 @@
 
 The rows are written as values, not as a dump of one database, so that a backup of SQLite can be
 restored on PostgreSQL and the other way round. A backup is restored by the release that made it
-(the same migrations), or by one whose further migrations change no table. The file is a zip:
+(the same migrations), or by one whose further migrations are among EARLIER. The file is a zip:
 
 manifest.json          format, when, which migrations, every member with its SHA-256
 rows/LABEL.jsonl       one row a line
@@ -61,8 +61,14 @@ ROWS, MEDIA = "rows/", "media/"
 UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError)
 """What a member says that is broken, locked with a password, or packed in a way of others."""
 CHUNK = 1 << 20
-VALUES_ALONE = frozenset({"augment.0043_fc_plus"})
-"""Migrations that change no table: rows from before are read, and then changed as they do."""
+EARLIER: dict[str, tuple[str, frozenset[str]]] = {
+    "augment.0042_drives_have_a_version": (
+        "raise_waiting",
+        frozenset({"augment.simulation.version"}),
+    ),
+    "augment.0043_fc_plus": ("change_values", frozenset()),
+}
+"""Migrations that rows may lack: what these do to values, and columns that get their default."""
 SMALL = 1 << 24
 """A manifest is far below this; a longer one is none of ours."""
 EXPERTS = "expert"
@@ -342,7 +348,7 @@ def _restore(
     """Take in pictures and rows, or neither."""
     ours, theirs = set(stored_rows.list_migrations()), set(manifest.migrations)
     later = ours - theirs
-    if theirs - ours or later - VALUES_ALONE:
+    if theirs - ours or later - EARLIER.keys():
         lacking = ", ".join(sorted(later)) or "nothing"
         beyond = ", ".join(sorted(theirs - ours)) or "nothing"
         raise ArenaError(
@@ -364,8 +370,9 @@ def _restore(
         with transaction.atomic():
             stored_rows.list_prepared_rows().delete()
             write()
-            for app, name in sorted(migration.split(".") for migration in later):
-                import_module(f"{app}.migrations.{name}").change_values(apps, None)
+            for migration in sorted(later):
+                module = import_module(migration.replace(".", ".migrations."))
+                getattr(module, EARLIER[migration][0])(apps, None)
     except BaseException:
         for name in written:
             default_storage.delete(name)
@@ -393,11 +400,13 @@ def _write_rows(
     check: Callable[[models.Model], None],
 ) -> None:
     """Store the rows and hold them against each other now, not when all is kept already."""
+    later = EARLIER.keys() - manifest.migrations
+    lacking = frozenset[str]().union(*(EARLIER[migration][1] for migration in later))
     for model in tables:
         label = stored_rows.model_label(model)
         try:
             with source[f"{ROWS}{label}.jsonl"]() as lines:
-                number = stored_rows.write_rows(model, lines, check=check)
+                number = stored_rows.write_rows(model, lines, check=check, lacking=lacking)
         except (ValueError, OSError, DatabaseError) as error:
             raise BackupUnreadable(f"{ROWS}{label}.jsonl can't be stored: {error}") from error
         if number != manifest.rows[label]:

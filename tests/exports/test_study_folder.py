@@ -223,23 +223,43 @@ def test_nobody_of_a_folder_rules_and_no_key_is_sent_to_it(study: Study, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("lacking", "variant"), [(["augment.0043_fc_plus"], "fc-plus+tqa"), ([], "fc+tqa")]
+    ("lacking", "variant", "version"),
+    [
+        (["augment.0042_drives_have_a_version", "augment.0043_fc_plus"], "fc-plus+tqa", 2),
+        (["augment.0043_fc_plus"], "fc-plus+tqa", 3),
+        ([], "fc+tqa", 3),
+    ],
 )
-def test_a_folder_of_before_the_papers_function_means_ours_by_fc(
-    study: Study, tmp_path: Path, lacking: list[str], variant: str
+def test_a_folder_of_an_earlier_release_is_read_and_means_our_function_by_fc(
+    study: Study, tmp_path: Path, lacking: list[str], variant: str, version: int
 ) -> None:
     endpoint = Endpoint.objects.create(label="away", base_url="https://away.example/v1")
     pk = study.contestants.all()[0].pk
     asks = {"variant": "fc+tqa", "endpoint": endpoint, "model": "m", "name": "Llama FC+tQA"}
     Contestant.objects.filter(pk=pk).update(kind=Contestant.Kind.LLM, **asks)
+    Simulation.objects.create(
+        scenario=study.scenarios.all()[0],
+        subject=Simulation.Subject.UNMODIFIED,
+        planner="idm",
+        offsets="paper",
+        state=Simulation.State.FAILED,
+        version=3,
+    )
     folder = tmp_path / "out"
     export(study, folder)
     empty()
+    dropped = {"version"} if len(lacking) > 1 else set()
+    craft(
+        folder,
+        "augment.simulation",
+        lambda row: {name: value for name, value in row.items() if name not in dropped},
+    )
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["migrations"] = [one for one in manifest["migrations"] if one not in lacking]
     (folder / "manifest.json").write_text(json.dumps(manifest))
     call_command("import", "study", str(folder))
     assert Contestant.objects.get(pk=pk).variant == variant
+    assert Simulation.objects.get().version == version
     notes = leaderboard_table(Snapshot.objects.get()).warnings
     assert ("Llama FC+tQA asks by FC-plus+tQA, called FC+tQA before" in str(notes)) is bool(
         lacking

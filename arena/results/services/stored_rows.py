@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import date, datetime
 from decimal import Decimal
@@ -99,7 +99,11 @@ def stored_columns(model: type[models.Model]) -> list[models.Field[Any, Any]]:
 
 
 def write_rows(
-    model: type[models.Model], lines: Iterable[bytes], *, check: Callable[[models.Model], None]
+    model: type[models.Model],
+    lines: Iterable[bytes],
+    *,
+    check: Callable[[models.Model], None],
+    lacking: Collection[str] = (),
 ) -> int:
     """Store lines of `as_line`, keys and times included; returns how many.
 
@@ -107,11 +111,14 @@ def write_rows(
         model: Of which table.
         lines: One row each.
         check: Raises one of REFUSALS for a row that must not be stored.
+        lacking: Columns that the lines of an earlier release don't have, by table; they get their
+            default.
 
     Raises:
         ValueError: A line does not fit the table, or was refused; it is named by its number.
     """
-    columns = stored_columns(model)
+    columns, label = stored_columns(model), model_label(model)
+    written = [column for column in columns if f"{label}.{column.name}" not in lacking]
     largest = max(1, connection.ops.bulk_batch_size(columns, [None] * AT_ONCE))
     waiting = enumerate(lines, start=1)
     number = 0
@@ -120,7 +127,7 @@ def write_rows(
         for number, line in batch:
             try:
                 values = json.loads(line, parse_constant=_refuse_constant)
-                rows.append(_row(model, columns, values))
+                rows.append(_row(model, written, values))
                 check(rows[-1])
             except (*REFUSALS, ObjectDoesNotExist, RecursionError) as error:
                 raise ValueError(f"line {number}: {_sentence(error)}") from error
