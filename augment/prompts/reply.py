@@ -33,6 +33,7 @@ from augment.scene.planned_mover import check_motions
 
 MOST_AGENTS = 64
 LONGEST_NOTES = 4000
+NOTHING_TO_PLACE = "it asks for nothing that can be placed"
 FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
 LONGEST_ENTRY = 1000
 MOST_FEEDBACK = 20
@@ -302,12 +303,15 @@ def read_judge(answer: str) -> JudgeAnswer:
 
 
 def read_intent(answer: str) -> Intent:
-    """Return the intent of a reader's answer.
+    """Return the intent of a reader's answer; that nothing can be placed is one too.
 
     Raises:
         ReplyUnreadable: There is no block, or it breaks the schema or contradicts itself.
     """
     document, _ = last_object(answer, frozenset({"requests"}))
+    asks = any(document.get(name) for name in ("requests", "moves", "removals"))
+    if not asks and document.get("beyond"):
+        document = {**document, "unmet": NOTHING_TO_PLACE}
     try:
         return intent_from_parts(document)
     except InvalidDocument as fault:

@@ -74,7 +74,7 @@ class _Call(pydantic.BaseModel):
     lane: Any
     start: str
     distance_m: Annotated[list[_Along], *_Several, _Many]
-    lateral_m: Annotated[list[_Aside], *_Several, _Many] = [0.0]
+    lateral_m: Annotated[list[_Aside | None], *_Several, _Many] = [None]
     object: Annotated[list[_Kind], *_Several, _Many] = [AgentType.VEHICLE]
     speed_mps: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     motion: PlannedMotion | None = None
@@ -125,8 +125,8 @@ class PoseOnLane:
         document: dict[str, object] = {
             "x_m": _round(self.pose.x_m),
             "y_m": _round(self.pose.y_m),
-            "heading_rad": _round(self.pose.heading_rad, 3),
-            "heading_deg": _round(math.degrees(self.pose.heading_rad), 1),
+            "heading_rad": _round_angle(self.pose.heading_rad),
+            "heading_deg": _round(math.degrees(_round_angle(self.pose.heading_rad)), 1),
         }
         for field in fields(self)[1:]:
             value = getattr(self, field.name)
@@ -147,7 +147,7 @@ class PoseTool:
         lane: object,
         start: str,
         distance_m: float,
-        lateral_m: float = 0.0,
+        lateral_m: float | None = None,
         object_type: AgentType = AgentType.VEHICLE,
     ) -> PoseOnLane:
         """Return the pose `distance_m` from the start along the lane, `lateral_m` to its left.
@@ -156,7 +156,8 @@ class PoseTool:
             lane: The short id of a lane, connector or piece, or the control points of a piece.
             start: "lane" for its beginning, or an agent's id for the place beside that agent.
             distance_m: Along the direction of travel, on over connectors; negative goes back.
-            lateral_m: To the left of the direction of travel, negative to the right.
+            lateral_m: To the left of the direction of travel, negative to the right. Without one
+                it is 0, but where an agent stands (`distance_m` 0 from it) its own.
             object_type: Of what is to stand there.
 
         Raises:
@@ -165,6 +166,8 @@ class PoseTool:
         """
         curve, begins_m = self.find_line(lane)
         start_m, start_lateral_m = self._start(curve, begins_m, start)
+        is_own = distance_m == 0.0 and lateral_m is None
+        lateral_m = (start_lateral_m or 0.0) if is_own else lateral_m or 0.0
 
         def pose_at(along_m: float) -> Pose:
             passed, s_m = self._walk(curve, start_m, along_m)
@@ -173,7 +176,10 @@ class PoseTool:
         passed, s_m = self._walk(curve, start_m, distance_m)
         last = passed[-1]
         pose, centre = last.pose_at(s_m, lateral_m), last.pose_at(s_m)
-        taken_by = self._taken_by(pose, object_type)
+        # Who starts from its own place does not stand in its own way.
+        taken_by = [
+            one for one in self._taken_by(pose, object_type) if not (is_own and one == start)
+        ]
         free_m = self._nearest_free_m(pose_at, object_type, distance_m) if taken_by else None
         return PoseOnLane(
             pose=pose,
@@ -213,7 +219,7 @@ class PoseTool:
         if not any(isinstance(arguments.get(name), list) for name in _PLACES):
             return answers[0]
         answers = [
-            {"distance_m": along_m, "lateral_m": aside_m} | answer
+            {"distance_m": along_m, "lateral_m": aside_m or 0.0} | answer
             for (along_m, aside_m, _), answer in zip(places, answers, strict=True)
         ]
         shared = {
@@ -252,7 +258,7 @@ class PoseTool:
         return frozenset(route.lane_ids if route else ())
 
     def _answer_at(
-        self, call: _Call, distance_m: float, lateral_m: float, object_type: AgentType
+        self, call: _Call, distance_m: float, lateral_m: float | None, object_type: AgentType
     ) -> dict[str, object]:
         try:
             place = self.pose_on_lane(call.lane, call.start, distance_m, lateral_m, object_type)
@@ -294,16 +300,21 @@ class PoseTool:
         x_m, y_m, heading_rad, speed_mps = moved.states[step].tolist()
         if math.isnan(x_m):
             return {"after_s": after_s, "error": "it has left the lanes of the map"}
-        ego_m = math.dist((x_m, y_m), motion.ego.states[step, :2].tolist())
+        ego_x_m, ego_y_m = motion.ego.states[step, :2].tolist()
+        ego_m = math.dist((x_m, y_m), (ego_x_m, ego_y_m))
+        route, ahead_m = self._ground.route, None
+        if route is not None:
+            ahead_m = route.locate(x_m, y_m).ahead_m - route.locate(ego_x_m, ego_y_m).ahead_m
         lane_id = self._ground.graph.under(x_m, y_m, heading_rad)
         return {
             "after_s": after_s,
             "x_m": _round(x_m),
             "y_m": _round(y_m),
-            "heading_rad": _round(heading_rad, 3),
+            "heading_rad": _round_angle(heading_rad),
             "speed_mps": _round(speed_mps),
             "lane": lane_id,
             "ego_distance_m": _round(ego_m),
+            "ahead_m": _round(ahead_m),
         }
 
     def find_line(self, lane: object) -> tuple[LaneCurve, float]:
@@ -461,6 +472,12 @@ def _unknown(kind: str, name: object, known: Iterable[str]) -> str:
     """Say that there is no such one, and which there are."""
     listed = ", ".join([*known][:_MOST_LISTED])
     return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."
+
+
+def _round_angle(angle_rad: float) -> float:
+    """Round an angle; half a turn is pi to either side."""
+    rounded = round(angle_rad, 3) + 0.0
+    return -rounded if rounded == -round(math.pi, 3) else rounded
 
 
 def _round(value: float | None, digits: int = 2) -> float | None:

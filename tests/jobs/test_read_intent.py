@@ -56,6 +56,16 @@ def test_what_was_read_waits_and_counts_once_it_is_accepted() -> None:
         accept_reading(scenario="street")
 
 
+def test_a_wish_for_nothing_that_can_be_placed_is_read_so() -> None:
+    made = reading('{"requests": [], "beyond": ["make it look nicer"]}')
+    assert (made.state, made.document and made.document["unmet"]) == (
+        State.READ,
+        "it asks for nothing that can be placed",
+    )
+    ModelCall.objects.all().delete()
+    assert reading('{"requests": []}', '{"requests": []}').state == State.FAILED
+
+
 def test_a_reading_that_is_interrupted_is_left_to_no_worker(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -1,6 +1,7 @@
 """A motion that stands in a prompt's lists is read back from an answer as it was."""
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from augment.prompts.fill import read_text
 from augment.prompts.reply import read_reply
 from augment.prompts.vectors import (
     changes_text,
@@ -127,3 +129,18 @@ def test_every_reference_of_the_moving_set_can_be_answered(slug: str) -> None:
         assert (agent.motion is None) == (meant.motion is None)
         if agent.motion is not None and meant.motion is not None:
             assert motion_parts(agent.motion) == motion_parts(meant.motion)
+
+
+def test_whoever_copies_the_example_motions_has_values_that_no_scenario_has() -> None:
+    rule = read_text("rules.md")
+    single = set(map(float, re.findall(r'"(?:after_s|within_m|change_m)":([\d.]+)', rule)))
+    pairs = {tuple(map(float, one)) for one in re.findall(r"\[\[([\d.]+),([\d.]+)\]\]", rule)}
+    assert (len(single), len(pairs)) == (4, 3)
+    for slug in MOVING_SLUGS:
+        for motion in filter(None, (one.motion for one in entry(slug).reference.changed)):
+            names = ("after_s", "within_m", "change_m")
+            used = {
+                getattr(one, name, None) for one in (motion.start, motion.path) for name in names
+            }
+            assert not used & single
+            assert not pairs & set(motion.speeds)

@@ -308,6 +308,39 @@ def test_where_it_is_later_is_what_its_motion_says(
 
 
 @pytest.mark.parametrize(
+    ("start", "lateral_m", "place_m", "taken_by"),
+    [
+        ("Agent2", None, (30.0, 2.6), None),
+        ("Agent2", 0.0, (30.0, 3.5), ["Agent2"]),
+        ("Agent1", None, (0.0, 0.0), None),
+    ],
+)
+def test_who_is_there_starts_from_its_own_place_and_is_not_in_its_own_way(
+    start: str, lateral_m: float | None, place_m: tuple[float, float], taken_by: list[str] | None
+) -> None:
+    parked = vehicle("Agent2", 30.0, 2.6, 0.0)
+    tool = PoseTool(replace(two_lanes(), agents=(parked,)))
+    lane = "Lane2" if start == "Agent2" else "Lane1"
+    call = {"lane": lane, "start": start, "distance_m": 0, "speed_mps": 4, "after_s": 1}
+    answer = tool.answer(call | ({} if lateral_m is None else {"lateral_m": lateral_m}))
+    assert (answer["x_m"], answer["y_m"]) == place_m
+    assert answer["taken_by"] == taken_by
+    assert isinstance(answer["later"], list)
+    (later,) = answer["later"]
+    assert (later["x_m"], later["y_m"]) == (place_m[0] + 4.0, place_m[1])
+    # Both run straight on, the ego at 8 m/s.
+    assert later["ahead_m"] == place_m[0] + 4.0 - 8.0
+
+
+def test_half_a_turn_is_pi_to_either_side() -> None:
+    answer = STREET.answer({"lane": "Lane2", "start": "Agent2", "distance_m": 0})
+    assert (answer["heading_rad"], answer["heading_deg"]) == (3.142, 180.0)
+    turned = replace(two_lanes().lanes[0], centerline=Polyline([(60.0, 1e-9), (-60.0, 0.0)]))
+    back = PoseTool(replace(two_lanes(), lanes=(replace(turned, id="Lane1"),)))
+    assert back.answer({"lane": "Lane1", "start": "lane", "distance_m": 9})["heading_rad"] == 3.142
+
+
+@pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"after_s": 15.1}, "after_s[0]: Input should be less than or equal to 15"),
