@@ -75,7 +75,7 @@ def work(self: Any, kind: str, pk: int) -> None:
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
-    enqueue(KINDS[kind], KINDS[kind].released_by(pk))
+    enqueue(KINDS[kind], KINDS[kind].find_unblocked(pk))
     if kind == AUGMENTATIONS.name:
         # Others of its last rows see it finished as well; one message is enough.
         ended = Augmentation.objects.filter(job=OuterRef("pk")).order_by("-finished_at", "-pk")
@@ -243,7 +243,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     for kind in KINDS.values():
         try:
             kind.take_back_lost(now=now)
-            kind.tidy(now)
+            kind.cleanup(now)
         except Exception:  # one kind's fault leaves the others their work
             logger.exception("Could not take back lost work of %s.", kind.model.__name__)
     queues = {kind.queue for kind in KINDS.values()}

@@ -93,7 +93,7 @@ def work(seed: int) -> None:
             KIND.perform(pk, worker=str(os.getpid()))
         if not waiting:
             KIND.take_back_lost()
-            KIND.tidy(DATABASE_TIME)
+            KIND.cleanup(DATABASE_TIME)
             time.sleep(PAUSE_S)
 
 

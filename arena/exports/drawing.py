@@ -1,4 +1,4 @@
-"""Shared parts of all charts: the house style, intervals, and files with reproducible bytes."""
+"""Shared parts of all charts: their style, intervals, and files with reproducible bytes."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def draw_once(
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def chart_style() -> Iterator[None]:
     """Apply the settings of matplotlib under which every chart is drawn, one chart at a time.
 
     The settings belong to the whole process, so threads of the web server have to take turns.
@@ -81,7 +81,7 @@ def house_style() -> Iterator[None]:
 
 
 def write_figure(figure: Figure, file_format: str) -> bytes:
-    """Return the bytes of an "svg", "pdf" or "png" file; call it within `house_style`."""
+    """Return the bytes of an "svg", "pdf" or "png" file; call it within `chart_style`."""
     picture = io.BytesIO()
     figure.savefig(picture, format=file_format, dpi=DPI, metadata=NO_METADATA[file_format])
     return picture.getvalue()

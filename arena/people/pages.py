@@ -41,14 +41,7 @@ from arena.shell.access import (
     get_user,
     keep_secret,
 )
-from arena.shell.accounts import (
-    ROLES,
-    TOKEN_ROLES,
-    Language,
-    chosen_language,
-    role_given,
-    top_role,
-)
+from arena.shell.accounts import ROLES, TOKEN_ROLES, Language, find_language, role_given, top_role
 from arena.shell.acts import refusals_in
 from arena.shell.forms import offer
 
@@ -128,7 +121,7 @@ class SignIn(LoginView):
 
 def with_own_language(answer: HttpResponse, user: User) -> HttpResponse:
     """Set this browser's language to what the account chose, if it chose any."""
-    if chosen := chosen_language(user):
+    if chosen := find_language(user):
         keep_language(answer, chosen)
     return answer
 

@@ -87,7 +87,7 @@ def frame_profile(user: User | AnonymousUser) -> Profile | None:
     )
 
 
-def chosen_language(user: User) -> Language | None:
+def find_language(user: User) -> Language | None:
     """Return the language that a person chose; None follows the browser."""
     person: Person | None = getattr(user, "person", None)
     stored = person.preferences.get("language") if person else None

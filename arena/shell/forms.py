@@ -1,4 +1,4 @@
-"""Forms and fields that several rooms share."""
+"""Forms and fields that several subjects share."""
 
 import json
 import uuid

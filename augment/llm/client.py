@@ -27,7 +27,7 @@ def watch_nothing() -> None:
 class ChatClient(Protocol):
     """Answers one request with one reply: one call, no retries of its own."""
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         """The request as this client would send it: without what the model does not take.
 
         Raises:
@@ -107,7 +107,7 @@ class ModelProfile:
     reasoning_effort: str = ""
     max_output_tokens: int | None = None
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         """The request with what this model takes, and nothing else.
 
         Raises:

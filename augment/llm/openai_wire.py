@@ -1,6 +1,6 @@
 """The only door to the network: one OpenAI-compatible endpoint, spoken to with `openai`.
 
-What that package and the many servers make of a fault ends here: the rest of the house sees a
+What that package and the many servers make of a fault ends here: the rest of the product sees a
 Reply or a ModelFault. Retries are made above, where every attempt is recorded. What a server sent
 is read by `augment.llm.answers`.
 """
@@ -91,7 +91,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         self._still_wanted, self._look_every_s = still_wanted, look_every_s
         self._client = _client(base_url, key or _KEYLESS, timeout_s, resolve, proxy_url)
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         """Return the request as it is: the wire knows no model."""
         return request
 

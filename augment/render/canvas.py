@@ -171,7 +171,7 @@ class Canvas:
             write(finished)
         return finished._image
 
-    def _halved(self) -> Image.Image:
+    def _halve(self) -> Image.Image:
         """One pixel for each four, blended, in full colour: for those who pay by the pixel."""
         return self._finished().convert("RGB").reduce(DENSITY)
 
@@ -194,7 +194,7 @@ class Canvas:
 
 def stack_png(above: Canvas, below: Canvas) -> bytes:
     """Return two pictures of one width, one above the other, at half their density."""
-    first, second = above._halved(), below._halved()
+    first, second = above._halve(), below._halve()
     whole = Image.new("RGB", (first.width, first.height + second.height), palette.PAPER)
     whole.paste(first, (0, 0))
     whole.paste(second, (0, first.height))

@@ -120,7 +120,7 @@ class Lease(Generic[Row]):
         if not self.row.update(**ended, **outcome.columns):
             logger.warning("Dropped the result of %s: its lease was taken back.", self)
             return False
-        self.kind.ended(self.pk, outcome.state, reason, now)
+        self.kind.on_finish(self.pk, outcome.state, reason, now)
         return True
 
     @transaction.atomic
@@ -131,11 +131,11 @@ class Lease(Generic[Row]):
         again = {**self.kind.model.GIVEN_BACK, **FREE, "sent_at": None, "lost": 0}
         if not self.row.update(**again):
             return False
-        self.kind.ended(self.pk, end, shorten(make_storable(reason), LONGEST_REASON), now)
+        self.kind.on_finish(self.pk, end, shorten(make_storable(reason), LONGEST_REASON), now)
         return True
 
     @contextmanager
-    def kept_alive(self) -> Iterator[None]:
+    def keep_alive(self) -> Iterator[None]:
         """Send heartbeats until the block is left, or until the lease is lost."""
         with repeating(self._beat, every_s=settings.HEARTBEAT_S, name="heartbeat"):
             yield
@@ -195,14 +195,14 @@ class WorkKind(ABC, Generic[Row]):
         """Return the waiting rows for which messages are sent."""
         return self.waiting()
 
-    def begun(self, pk: int, worker: str, now: Moment) -> object:
+    def on_start(self, pk: int, worker: str, now: Moment) -> object:
         """Note that a worker has taken a row, in the same transaction; returns the note."""
         return None
 
-    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Note how a try ended: with an outcome or a TryEnd; in the same transaction."""
 
-    def over(self, row: Row, outcome: Settlement | None) -> None:
+    def after_commit(self, row: Row, outcome: Settlement | None) -> None:
         """Follow up a try, whose outcome is committed if there is one."""
 
     def outcome_of_loss(self, row: Row) -> Settlement | None:
@@ -214,11 +214,11 @@ class WorkKind(ABC, Generic[Row]):
         lost = f"Lost {row.lost + 1} workers in a row at this one"
         return Settlement(state=FAILED, reason=f"{lost}; look for the cause, then retry.")
 
-    def released_by(self, pk: int) -> list[int]:
+    def find_unblocked(self, pk: int) -> list[int]:
         """Return the waiting rows that could not be taken before that one had its outcome."""
         return []
 
-    def tidy(self, now: Moment) -> None:
+    def cleanup(self, now: Moment) -> None:
         """Clean up what else a lost worker may leave behind."""
 
     # --- What all kinds share ---
@@ -245,7 +245,7 @@ class WorkKind(ABC, Generic[Row]):
         taken = {**self.model.STARTED, "claim": token, "heartbeat_at": now, "finished_at": None}
         if not self.waiting().filter(pk=pk).update(**taken):
             return None
-        return Lease(kind=self, pk=pk, token=token, attempt=self.begun(pk, worker, now))
+        return Lease(kind=self, pk=pk, token=token, attempt=self.on_start(pk, worker, now))
 
     def perform(self, pk: int, *, worker: str = "") -> bool:
         """Take a row and work on it, anew where the database was locked.
@@ -275,7 +275,7 @@ class WorkKind(ABC, Generic[Row]):
         row = self.rows.select_related(*self.related).get(pk=held.pk)
         settled = None
         try:
-            with held.kept_alive():
+            with held.keep_alive():
                 outcome = self.run(row, held)
                 if outcome is not None and wait_out(partial(held.settle, outcome)):
                     settled = outcome
@@ -300,7 +300,7 @@ class WorkKind(ABC, Generic[Row]):
             held.release()
             raise
         finally:
-            wait_out(partial(self.over, row, settled))
+            wait_out(partial(self.after_commit, row, settled))
         return True
 
     def take_back_lost(self, *, now: Moment = DATABASE_TIME) -> list[int]:
@@ -335,7 +335,7 @@ class WorkKind(ABC, Generic[Row]):
         row = self._silent(now).filter(pk=seen.pk, claim=seen.claim)
         if not row.update(**FREE, **changes):
             return False
-        self.ended(seen.pk, TryEnd.LOST, "The worker stopped without a word.", now)
+        self.on_finish(seen.pk, TryEnd.LOST, "The worker stopped without a word.", now)
         logger.warning("Took back %s %d: silent since %s.", self.name, seen.pk, seen.heartbeat_at)
         return outcome is None
 

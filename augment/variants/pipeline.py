@@ -2,7 +2,7 @@
 
 In: a `Recipe`, a `Scene`, an instruction, and who is asked. Out: an `Outcome`; everything else is
 in the transcript. Prompt -> answer -> Modification, and back with a review's findings where the
-recipe has a review. That loop is the only one of the house, bounded by the recipe's rounds. A
+recipe has a review. That loop is the only one of all, bounded by the recipe's rounds. A
 review never takes a result away: where it is unusable, or a later round can't be read, what the
 modifier made before stands, and the notes say so.
 

@@ -41,14 +41,14 @@ class NoteKind(StrEnum):
 class Transcript(Protocol):
     """Told of every attempt before it is sent, and of its end before anybody reads it."""
 
-    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+    def cached_reply(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """Return an earlier answer to this request, recorded as a call that cost nothing.
 
         None where the request is to be sent.
         """
         ...
 
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+    def record_request(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Note that this request is about to be sent; returns the number of the call.
 
         Raises:
@@ -64,7 +64,7 @@ class Transcript(Protocol):
         """
         ...
 
-    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+    def record_reply(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Keep the raw answer to that call, and what shows that it is none to rely on."""
         ...
 
@@ -222,13 +222,13 @@ class Respondents:
         """
         client = self.client_of(role).client
         while True:
-            sent = client.fitted(request)
+            sent = client.fit(request)
             try:
-                return self.transcript.known(role, sent, version) or self._attempt(
+                return self.transcript.cached_reply(role, sent, version) or self._attempt(
                     role, sent, version
                 )
             except errors.ParameterRefused:
-                if client.fitted(request) == sent:
+                if client.fit(request) == sent:
                     raise
             except errors.QuestionInFlight:
                 continue  # the transcript waits for the answer
@@ -237,7 +237,7 @@ class Respondents:
         """Send the request as it is, as often as patience allows."""
         respondent, attempt = self.client_of(role), 1
         while True:
-            number = self.transcript.asked(role, request, version)
+            number = self.transcript.record_request(role, request, version)
             try:
                 sending = partial(self.transcript.sending, number)
                 reply = respondent.client.complete(request, sending=sending)
@@ -256,7 +256,7 @@ class Respondents:
                 attempt += 1
             else:
                 cut = find_cut(request, reply, context_tokens=respondent.context_tokens)
-                self.transcript.answered(number, reply, cut)
+                self.transcript.record_reply(number, reply, cut)
                 if cut is not None:
                     raise cut
                 return reply

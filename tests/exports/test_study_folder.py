@@ -24,7 +24,7 @@ from pytest_django import Settings
 from arena.models import Person, Snapshot, Study
 from arena.results.exports.tables import leaderboard_table
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.stored_rows import as_line, find_filled_tables, stored_columns
+from arena.results.services.stored_rows import as_line, find_filled_tables, list_columns
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
 from augment.services.scenarios.pictures import film_document
@@ -191,7 +191,7 @@ def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
 def craft(folder: Path, label: str, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
     """Change the rows of a table as somebody would who also recomputes the hash."""
     path = folder / f"rows/{label}.jsonl"
-    columns = [column.attname for column in stored_columns(apps.get_model(label))]
+    columns = [column.attname for column in list_columns(apps.get_model(label))]
     lines = path.read_text().splitlines() if path.exists() else []
     rows = [change(dict(zip(columns, json.loads(line), strict=True))) for line in lines]
     path.write_bytes(b"".join(as_line(list(row.values())) for row in rows))

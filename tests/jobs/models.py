@@ -62,7 +62,7 @@ class Model:
         self._waiting = waiting
         self._lock = threading.Lock()
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         return request
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:

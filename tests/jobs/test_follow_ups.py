@@ -106,9 +106,9 @@ def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
     first, second = launched("ann")
     assert (second.follows, second.scenario.wording) == (first, f"1. {WISH}\n2. {NEXT}")
     assert AUGMENTATIONS.take(second.pk) is None  # as long as the first is under way
-    assert AUGMENTATIONS.released_by(first.pk) == []
+    assert AUGMENTATIONS.find_unblocked(first.pk) == []
     run(first)
-    assert AUGMENTATIONS.released_by(first.pk) == [second.pk]
+    assert AUGMENTATIONS.find_unblocked(first.pk) == [second.pk]
     run(second)
     assert (first.state, second.state) == (State.DONE, State.DONE)
     one, two = (body["messages"] for body in server.bodies)

@@ -65,7 +65,7 @@ def test_a_row_that_is_given_back_to_a_cancelled_job_is_cancelled() -> None:
     jobs.cancel(job)
     held.release(now=LATER)
     assert AUGMENTATIONS.take(row.pk, now=LATER) is None
-    AUGMENTATIONS.tidy(LATER)
+    AUGMENTATIONS.cleanup(LATER)
     assert only_row(job).state == State.CANCELLED
 
 

@@ -149,7 +149,7 @@ def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> 
     assert not held.renew()
     outcome = DRIVES.run(last, again)
     assert again.settle(outcome)  # and dies before it concludes
-    DRIVES.tidy(rows.NOON)
+    DRIVES.cleanup(rows.NOON)
     sweep.refresh_from_db()
     assert sweep.hardest is not None
     assert [line.tried.is_passed for line in sweep_result(sweep).lines] == [False, True]

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.django_db
 
 def living(name: str = "here 1") -> Worker:
     presence = Presence(name)
-    presence.recovered()
+    presence.record_recovery()
     return Worker.objects.get(name=name)
 
 

@@ -22,7 +22,7 @@ class ScriptedClient:
         self._answers = list(answers)
         self.requests: list[Request] = []
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         """The request as it is: a script takes everything."""
         return request
 

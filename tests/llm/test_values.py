@@ -223,7 +223,7 @@ SENT = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7)
 
 @pytest.mark.parametrize("parameter", ["temperature", "seed"])
 def test_what_was_refused_is_left_out(parameter: str) -> None:
-    fitted = ModelProfile().without(parameter).fitted(SENT)
+    fitted = ModelProfile().without(parameter).fit(SENT)
     assert fitted == replace(SENT, **{parameter: None})  # type: ignore[arg-type]
     assert parameter not in fitted.to_document()
 
@@ -231,15 +231,15 @@ def test_what_was_refused_is_left_out(parameter: str) -> None:
 def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
     boundless = ModelProfile().without("max_completion_tokens").without("max_tokens")
     with pytest.raises(ModelFault, match="its cost has no bound") as caught:
-        boundless.fitted(SENT)
+        boundless.fit(SENT)
     assert not caught.value.retryable
 
 
 def test_a_blind_model_is_shown_nothing() -> None:
     seen = replace(SENT, messages=(replace(HELLO, images=(b"\x89PNG",)),))
-    assert ModelProfile(vision=True).fitted(seen) == seen
+    assert ModelProfile(vision=True).fit(seen) == seen
     with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
-        ModelProfile(vision=False).fitted(seen)
+        ModelProfile(vision=False).fit(seen)
 
 
 def test_tools_have_the_form_of_the_wire() -> None:

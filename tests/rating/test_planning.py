@@ -13,7 +13,7 @@ from arena.rating.ranking import CAUTION
 from arena.studies.services.outlook import (
     Prospect,
     StudyEstimate,
-    _expected_largest,
+    _expect_largest,
     compare_votes,
     prospect,
 )
@@ -122,7 +122,7 @@ def test_one_pair_of_known_variance_is_found_where_a_normal_value_has_it() -> No
 
 def test_the_largest_of_normal_values_is_the_tabled_one() -> None:
     """Order statistics of Harter 1961."""
-    assert [round(_expected_largest(n), 4) for n in (2, 5, 9)] == [0.5642, 1.1630, 1.4850]
+    assert [round(_expect_largest(n), 4) for n in (2, 5, 9)] == [0.5642, 1.1630, 1.4850]
 
 
 def test_repeats_and_checks_take_time_on_top() -> None:

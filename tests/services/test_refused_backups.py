@@ -18,7 +18,7 @@ from django.core.management import CommandError, call_command
 
 from arena.management.backups import MANIFEST, read_manifest, take_backup, zip_members
 from arena.models import Vote
-from arena.results.services.stored_rows import as_line, stored_columns
+from arena.results.services.stored_rows import as_line, list_columns
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.driving.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS
@@ -104,7 +104,7 @@ def with_rows(found: dict[str, bytes], label: str, content: bytes) -> None:
 
 def changed(found: dict[str, bytes], label: str, **columns: object) -> None:
     """Other values in every row of a table."""
-    names = [column.attname for column in stored_columns(apps.get_model(label))]
+    names = [column.attname for column in list_columns(apps.get_model(label))]
     rows = [json.loads(line) for line in found[f"rows/{label}.jsonl"].splitlines()]
     lines = [
         as_line(list((dict(zip(names, row, strict=True)) | columns).values())) for row in rows

@@ -272,7 +272,7 @@ def test_the_heart_beats_while_the_work_goes_on(settings: Settings) -> None:
         row.refresh_from_db()
         return row.heartbeat_at is not None and row.heartbeat_at > before
 
-    with held.kept_alive():
+    with held.keep_alive():
         wait_until(has_beaten, what="the heart has beaten")
         assert uploads.take_back_lost() == []
 
@@ -284,7 +284,7 @@ def test_the_heart_stops_with_the_lease_and_the_work_is_told(settings: Settings)
     held = taken(uploads, row, timezone.now() - MINUTE)
     held.insist()
     uploads.take_back_lost()
-    with held.kept_alive():
+    with held.keep_alive():
         wait_until(lambda: held._is_lost.is_set(), what="it is given up")
     with pytest.raises(LeaseLost):
         held.insist()

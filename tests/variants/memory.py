@@ -30,17 +30,17 @@ class MemoryTranscript:
     calls: list[RecordedCall] = field(default_factory=list)
     notes: list[RecordedNote] = field(default_factory=list)
 
-    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+    def cached_reply(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         return None
 
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+    def record_request(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         self.calls.append(RecordedCall(len(self.calls) + 1, role, request, prompt_version))
         return len(self.calls)
 
     def sending(self, number: int) -> None:
         pass
 
-    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+    def record_reply(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         self.calls[number - 1].reply = reply
         self.calls[number - 1].fault = fault
 

@@ -28,7 +28,7 @@ class Playing:
     def __init__(self, character: Character) -> None:
         self._character = character
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         return request
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:

@@ -102,7 +102,7 @@ def test_an_answer_beside_the_text_is_told_so(first: Reply, problem: str) -> Non
 
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     class Stops(MemoryTranscript):
-        def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        def record_reply(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
             raise KeyboardInterrupt
 
     client = ScriptedClient(["nothing that could be read"])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from arena.exports.cells import show_name
-from arena.exports.drawing import MARK, draw_once, house_style, name_lines, write_figure
+from arena.exports.drawing import MARK, chart_style, draw_once, name_lines, write_figure
 from arena.exports.formats import (
     Columns,
     Dtype,
@@ -210,7 +210,7 @@ def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
     from matplotlib.figure import Figure
 
     boxes = {place: _stats(group) for place, group in enumerate(table.groups) if group.summary.box}
-    with house_style():
+    with chart_style():
         figure = Figure(figsize=(7.2, 1.4 + 0.3 * len(table.groups)), layout="constrained")
         axes = figure.add_subplot()
         axes.bxp(

@@ -103,7 +103,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         """For the template: the keys that are ticked."""
         return list(self["cells"].value() or ())
 
-    def chosen_rows(self) -> list[Contestant]:
+    def list_chosen_rows(self) -> list[Contestant]:
         """Return whoever is chosen, each once; those of cells may not be stored yet."""
         named = Contestant.objects.filter(slug__in=self.cleaned_data.get("contestants", []))
         rows = [*named.select_related("endpoint"), *self.cells_chosen]
@@ -114,7 +114,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
             self.errors.pop(name, None)
-        contestants = self.chosen_rows()
+        contestants = self.list_chosen_rows()
         if not (contestants and self.cleaned_data.get("scenarios")):
             return None
         return estimate(read_request(JobScope, self.cleaned_data), contestants)

@@ -17,9 +17,9 @@ from arena.exports.drawing import (
     SIMULATED,
     SOFT,
     Interval,
+    chart_style,
     draw_interval,
     draw_once,
-    house_style,
     name_lines,
     write_figure,
 )
@@ -126,7 +126,7 @@ def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
     """Draw ratings as dots with their intervals as bars, best on top; diamonds are simulated."""
     from matplotlib.figure import Figure
 
-    with house_style():
+    with chart_style():
         figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(rows)), layout="constrained")
         axes = figure.add_subplot()
         _draw_intervals(axes, rows, {row.slug: row.interval for row in rows})
@@ -142,7 +142,7 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
 
     across = min(len(parts), 3)
     down = math.ceil(len(parts) / across)
-    with house_style():
+    with chart_style():
         size = (2.4 + 2.1 * across, 0.5 + (0.7 + 0.26 * len(rows)) * down)
         figure = Figure(figsize=size, layout="constrained")
         grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
@@ -175,7 +175,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         scores[a, b], scores[b, a] = won, pair.votes - won
         votes[a, b] = votes[b, a] = pair.votes
     shares = np.divide(scores, votes, out=np.full_like(scores, np.nan), where=votes > 0)
-    with house_style():
+    with chart_style():
         side_in = 0.62 * max(len(rows), 2)
         names_in = 0.6 + 0.08 * max((len(row.model) for row in rows), default=0)
         figure = Figure(figsize=(side_in + names_in, side_in + 0.9), layout="constrained")
@@ -201,7 +201,7 @@ def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
     """Draw points with letters and intervals, and beside them what the letters stand for."""
     from matplotlib.figure import Figure
 
-    with house_style():
+    with chart_style():
         height = max(3.6, 0.2 * (len(plot.points) + 4))
         figure = Figure(figsize=(7.2, height), layout="constrained")
         axes = figure.add_subplot()

@@ -24,7 +24,7 @@ from arena.models import (
     Vote,
     VoteFile,
 )
-from arena.results.services.stored_rows import model_label, read_values, stored_columns
+from arena.results.services.stored_rows import list_columns, model_label, read_values
 from augment.models import (
     Attempt,
     Augmentation,
@@ -105,7 +105,7 @@ class Closure:
         named |= set(Endpoint.objects.filter(label__in=labels).values_list("pk", flat=True))
         return sorted(named)
 
-    def renamed_rules(self) -> dict[str, Any]:
+    def rename_rules(self) -> dict[str, Any]:
         """The rules with the names that accounts get.
 
         Who does not travel, or is nobody any more, gets a number.
@@ -222,7 +222,7 @@ def _people(closure: Closure) -> set[int]:
 def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
     """The rows of one table without names of accounts, machines or addresses of people."""
     model = rows.model
-    columns = stored_columns(model)
+    columns = list_columns(model)
     names = [column.attname for column in columns]
     accounts = [
         column.attname
@@ -236,7 +236,7 @@ def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
         if model is User:
             row["username"] = closure.accounts[row["id"]]
         elif model is Study:
-            row["rules"] = closure.renamed_rules()
+            row["rules"] = closure.rename_rules()
         yield list(row.values())
 
 

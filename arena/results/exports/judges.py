@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from arena.exports.cells import csv_text
-from arena.results.queries.judges import answered_pairs, judge_name
+from arena.results.queries.judges import judge_name, list_answered_pairs
 from augment.models import JudgeRun
 from augment.services.running import exchange
 
@@ -21,7 +21,7 @@ def judge_answers_csv(run: JudgeRun) -> bytes:
 
 
 def _rows(run: JudgeRun) -> Iterator[tuple[object, ...]]:
-    for row in answered_pairs(run):
+    for row in list_answered_pairs(run):
         about = judge_name(run), run.question, row.left.scenario.slug
         became = exchange(row.first, row.second).value
         for order, a, b, answer, reason in (

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from django.core.files.storage import default_storage
 
 from arena.exports.cells import show_name
-from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
+from arena.exports.drawing import INK, SIMULATED, SOFT, chart_style, write_figure
 from augment.errors import check_names
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.running import list_cells
@@ -77,7 +77,7 @@ def sample_sheet(
     shown = {cell.contestant.slug: cell.contestant for cell in cells.values()}
     rows = {cell.scenario.slug: cell.scenario for cell in cells.values()}
     across, down = len(contestants), len(scenarios)
-    with house_style():
+    with chart_style():
         figure = Figure(figsize=(3.2 * across, 0.4 + 2.75 * down), layout="constrained")
         parts = figure.subfigures(down, 1, squeeze=False).flat
         for line, (part, slug) in enumerate(zip(parts, scenarios, strict=True)):

@@ -162,7 +162,7 @@ class _Folder:
 
     def write_rows(self, closure: Closure, rows: Any) -> int:
         """Write the rows of a table and note the pictures that they name; how many there are."""
-        columns = enumerate(stored_rows.stored_columns(rows.model))
+        columns = enumerate(stored_rows.list_columns(rows.model))
         places = [place for place, column in columns if column.attname in PICTURE_COLUMNS]
         written = []
 
@@ -229,7 +229,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
             "name": study.name,
             "code": str(study.code),
             "seed": study.seed,
-            "rules": closure.renamed_rules(),
+            "rules": closure.rename_rules(),
             "opened_at": study.opened_at.isoformat() if study.opened_at else None,
             "closed_at": study.closed_at.isoformat() if study.closed_at else None,
             "allow_simulated": study.allow_simulated,

@@ -100,7 +100,7 @@ def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
     preferences: dict[str, Preferences] = {}
     runs = study.judges.filter(question=question).select_related("endpoint")
     for run in runs.order_by("-pk"):
-        name, rows = judge_name(run), answered_pairs(run)
+        name, rows = judge_name(run), list_answered_pairs(run)
         if name in preferences or not rows:
             continue
         own = set(_own_family(study, run))
@@ -128,7 +128,7 @@ def list_models(contestant: Contestant) -> list[str]:
     return [model for model in models if model]
 
 
-def answered_pairs(run: JudgeRun) -> list[PairJudgement]:
+def list_answered_pairs(run: JudgeRun) -> list[PairJudgement]:
     """Return the pairs with both answers, with their contestants and scenarios."""
     rows: QuerySet[PairJudgement] = run.judgements.filter(state=State.DONE).order_by("pk")
     return list(
@@ -143,7 +143,7 @@ def answered_pairs(run: JudgeRun) -> list[PairJudgement]:
 
 
 def _line(study: Study, run: JudgeRun) -> JudgeLine:
-    rows = answered_pairs(run)
+    rows = list_answered_pairs(run)
     became = Counter(exchange(row.first, row.second) for row in rows)
     single = Counter(answer for row in rows for answer in (row.first, row.second))
     states = run.judgements.order_by().values_list("state").annotate(Count("pk"))

@@ -236,7 +236,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
         everything = _votes_asked(study, filters, last).count()
         left_out[LeftOut.SUPERSEDED.value] = everything - counted
     primary = votes
-    if filtered_question(study, filters) != study.questions[0]:
+    if find_question(study, filters) != study.questions[0]:
         primary = current_votes(study, replace(filters, question=""), last)
     checks = tuple(vote for vote in primary if vote.mark == LeftOut.CHECK)
     references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
@@ -250,7 +250,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     )
 
 
-def filtered_question(study: Study, filters: Filters) -> str:
+def find_question(study: Study, filters: Filters) -> str:
     """The question whose votes are asked for."""
     return filters.question or str(study.questions[0])
 
@@ -339,7 +339,7 @@ def list_ties_unshown(
             outcome=Vote.Outcome.EQUAL.value,
             both_miss=False,
             is_simulated=first.is_simulated,
-            question=filtered_question(study, filters),
+            question=find_question(study, filters),
         )
         is_asked_for = (
             MAIN in filters.kinds
@@ -424,7 +424,7 @@ def _check_names(study: Study, filters: Filters, votes: Sequence[RatedVote]) -> 
     types = {*(entry.value for entry in ScenarioType), *(vote.type for vote in votes)}
     for what, names, allowed in (
         ("kind of vote", filters.kinds, list(KINDS)),
-        ("question of this study", (filtered_question(study, filters),), study.questions),
+        ("question of this study", (find_question(study, filters),), study.questions),
         ("scenario type", filters.types, sorted(types)),
         ("expert", filters.experts, sorted(judges)),
     ):
@@ -439,7 +439,7 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
     if REPEAT not in filters.kinds:
         reasons.append((LeftOut.REPEAT, Q(matchup__kind=REPEAT)))
     reasons.append((LeftOut.SKIP, ~Q(outcome__in=RATED)))
-    if filtered_question(study, filters) != study.questions[0]:
+    if find_question(study, filters) != study.questions[0]:
         reasons.append((LeftOut.SKIP, Q(_skip_of_pair(last))))
     if not study.allow_simulated:
         reasons.append((LeftOut.SIMULATED, Q(is_simulated=True)))
@@ -461,7 +461,7 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
 
 def _votes_asked(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
     rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
-    return rows.filter(question=filtered_question(study, filters))
+    return rows.filter(question=find_question(study, filters))
 
 
 def _skip_of_pair(last: int | None) -> Exists:

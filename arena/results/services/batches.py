@@ -15,7 +15,7 @@ from arena.models import Board, Study
 from arena.rating.board_table import spread_over
 from arena.results.services.boards import require_poolable
 from arena.studies.services.opening import open_study
-from arena.studies.services.plan import opened_plan
+from arena.studies.services.plan import read_opened_plan
 from arena.voting.services.pictures import find_showable
 from augment.errors import Conflict, check_names
 from augment.models import Contestant
@@ -68,7 +68,7 @@ def open_batch(board: Board, batch: BatchRequest, *, actor: User | None = None) 
     possible = list(possible_newcomers(board).values_list("slug", flat=True))
     check_names("new contestant", batch.newcomers, possible)
     rated = [line.slug for line in table.document.lines if line.votes]
-    plans = [opened_plan(study) for study in studies]
+    plans = [read_opened_plan(study) for study in studies]
     study_plan = replace(
         plans[0],
         name=f"{board.name}, batch {board.studies.count()}",

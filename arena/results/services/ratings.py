@@ -136,7 +136,7 @@ class PlannedRatings(WorkKind[Snapshot]):
                 raise LeaseLost
             keep(row, computed)
 
-    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Say in the log why there is no rating."""
         row = self.rows.select_related(*self.related).get(pk=pk)
         if row.state == Snapshot.State.FAILED:
@@ -302,7 +302,7 @@ def _plan(study: Study, choices: Choices) -> Snapshot:
         filters=replace(
             filters,
             authors=author_pairs(study),
-            question=vote_queries.filtered_question(study, filters),
+            question=vote_queries.find_question(study, filters),
         ).as_document(),
         last_vote=vote_queries.last_vote_id(study),
         votes_counted=0,

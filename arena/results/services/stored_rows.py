@@ -81,8 +81,8 @@ def frozen_rows() -> Iterator[None]:
 
 
 def read_values(rows: QuerySet[Any]) -> Iterator[list[Any]]:
-    """Each row as plain values, in the order of `stored_columns` and of their keys."""
-    columns = stored_columns(rows.model)
+    """Each row as plain values, in the order of `list_columns` and of their keys."""
+    columns = list_columns(rows.model)
     names = [field.attname for field in columns]
     for row in rows.order_by("pk").values_list(*names).iterator(chunk_size=AT_ONCE):
         yield [_plain(field, value) for field, value in zip(columns, row, strict=True)]
@@ -93,7 +93,7 @@ def as_line(values: list[Any]) -> bytes:
     return json.dumps(values, ensure_ascii=False, sort_keys=True).encode() + b"\n"
 
 
-def stored_columns(model: type[models.Model]) -> list[models.Field[Any, Any]]:
+def list_columns(model: type[models.Model]) -> list[models.Field[Any, Any]]:
     """The columns that are stored, as Django orders them."""
     return [field for field in model._meta.local_concrete_fields if not field.generated]
 
@@ -117,7 +117,7 @@ def write_rows(
     Raises:
         ValueError: A line does not fit the table, or was refused; it is named by its number.
     """
-    columns, label = stored_columns(model), model_label(model)
+    columns, label = list_columns(model), model_label(model)
     written = [column for column in columns if f"{label}.{column.name}" not in lacking]
     largest = max(1, connection.ops.bulk_batch_size(columns, [None] * AT_ONCE))
     waiting = enumerate(lines, start=1)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arena.exports.drawing import MARK, SOFT, draw_once, house_style, write_figure
+from arena.exports.drawing import MARK, SOFT, chart_style, draw_once, write_figure
 from arena.exports.formats import Columns, Dtype, Sheet, drawings, make_sheet, table_formats
 from augment.services.driving import SweepResult, driver_name
 
@@ -49,7 +49,7 @@ def sweep_chart(result: SweepResult, *, file_format: str) -> bytes:
     """Draw the score over the values, a line a planner; a cross is a drive that fails."""
     from matplotlib.figure import Figure
 
-    with house_style():
+    with chart_style():
         figure = Figure(figsize=(6.8, 3.4), layout="constrained")
         axes = figure.add_subplot()
         for good, bad in result.edges:

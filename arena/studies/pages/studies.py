@@ -41,7 +41,7 @@ from arena.studies.services.files import (
     why_not,
 )
 from arena.studies.services.opening import cancel_study, preregistration_sha256
-from arena.studies.services.plan import PLAN_INPUTS, opened_plan
+from arena.studies.services.plan import PLAN_INPUTS, read_opened_plan
 from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access
 from augment.services import InputKind
@@ -75,7 +75,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     if is_imported(study):
         return redirect("results", code=code)
-    study_plan, (line,) = opened_plan(study), queries.count_progress([study])
+    study_plan, (line,) = read_opened_plan(study), queries.count_progress([study])
     lines, export = queries.expert_lines(study), export_place(study, get_user(request))
     long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {

@@ -10,7 +10,7 @@ from django.db import transaction
 
 from arena.models import Study, StudyDraft
 from arena.studies.services.opening import open_study
-from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, opened_plan
+from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, read_opened_plan
 from augment.errors import Conflict
 from augment.services import InputKind, log_change, make_storable
 
@@ -110,7 +110,7 @@ def draft_like(*, study: Study, actor: User | None = None) -> StudyDraft:
     taken |= {draft.name for draft in StudyDraft.objects.all()}
     names = (study.name[: LONGEST_NAME - 8] + f" ({number})" for number in count(2))
     entered = {
-        name: _as_entered(name, value) for name, value in asdict(opened_plan(study)).items()
+        name: _as_entered(name, value) for name, value in asdict(read_opened_plan(study)).items()
     }
     entered["name"] = next(name for name in names if name not in taken)
     return keep_draft(entered=entered, actor=actor)

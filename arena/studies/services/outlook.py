@@ -135,7 +135,7 @@ def prospect(estimate: StudyEstimate) -> Prospect:
     variance = covariance.diagonal()
     factor = float(t_quantile(degrees))
     # By chance some intervals of a table are wider than expected.
-    by_chance = 1.0 + 0.5 * _expected_largest(estimate.contestants) * math.sqrt(chance)
+    by_chance = 1.0 + 0.5 * _expect_largest(estimate.contestants) * math.sqrt(chance)
     return Prospect(
         half_width=factor * math.sqrt(float(variance.mean())),
         widest=factor * math.sqrt(float(variance.max())) * by_chance,
@@ -195,7 +195,7 @@ def _uneven(estimate: StudyEstimate, per_cluster: float) -> float:
     return (estimate.contestants - 2) * missing / max(per_cluster, 1e-9)
 
 
-def _expected_largest(number: int) -> float:
+def _expect_largest(number: int) -> float:
     """Return the mean of the largest of so many standard normal values."""
     values, step = np.linspace(-9.0, 9.0, 1801, retstep=True)
     return float((1.0 - ndtr(values) ** number - ndtr(-values)).sum() * step)

@@ -316,7 +316,7 @@ PRESETS = {
 }
 
 
-def opened_plan(study: Study) -> StudyPlan:
+def read_opened_plan(study: Study) -> StudyPlan:
     """Return the plan of an opened study, from its frozen fields.
 
     Who joined by a link for everybody, and hidden pairs handed over, are no part of it.

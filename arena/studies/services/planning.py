@@ -24,7 +24,7 @@ from arena.voting.services.pictures import (
     with_picture,
     without_lost_checks,
 )
-from arena.voting.services.shown_pictures import find_frames, frames_shown, shown_sides
+from arena.voting.services.shown_pictures import find_frames, find_sides, frames_shown
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios import legends_of_changes
 
@@ -139,7 +139,7 @@ def store(
         {
             cell.pk: frames[pair.scenario].view
             for pair in planned
-            for cell in shown_sides(pair, cells)
+            for cell in find_sides(pair, cells)
         }
     )
     rows = [
@@ -159,7 +159,7 @@ def store(
         )
         for planned_pair in planned
         for frame, (left, right) in [
-            (frames[planned_pair.scenario], shown_sides(planned_pair, cells))
+            (frames[planned_pair.scenario], find_sides(planned_pair, cells))
         ]
         for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
     ]

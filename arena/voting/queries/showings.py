@@ -72,7 +72,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "a": reverse("matchup-image", args=[matchup.left_token]),
         "b": reverse("matchup-image", args=[matchup.right_token]),
         "original": reverse("matchup-image", args=[original]) if original else None,
-        "unchanged": _unchanged_sides(matchup),
+        "unchanged": _list_unchanged_sides(matchup),
         "is_filmed": bool(film_name(matchup.left_image)),
         **view_shown(matchup),
     }
@@ -81,7 +81,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     return shown
 
 
-def _unchanged_sides(matchup: Matchup) -> list[str]:
+def _list_unchanged_sides(matchup: Matchup) -> list[str]:
     """Return the sides that show the scene as it was; pictures are named by what they show."""
     shown = {"a": matchup.left_image, "b": matchup.right_image}
     return [side for side, image in shown.items() if image and image == matchup.original_image]

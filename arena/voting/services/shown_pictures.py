@@ -65,7 +65,7 @@ def find_frames(
     """
     shown: dict[str, dict[str, Augmentation]] = {}
     for pair in planned:
-        for cell in shown_sides(pair, cells):
+        for cell in find_sides(pair, cells):
             shown.setdefault(pair.scenario, {})[camera_key(cell.image)] = cell
     if mixed := [scenario_at(place) for place, windows in shown.items() if len(windows) > 1]:
         raise _other_windows(sorted(mixed))
@@ -132,7 +132,7 @@ def _other_windows(scenarios: list[str]) -> NothingToPlan:
     )
 
 
-def shown_sides(pair: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+def find_sides(pair: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
     """Return the augmentations on the left and on the right."""
     return cells[pair.scenario, pair.left], cells[pair.scenario, pair.right]
 

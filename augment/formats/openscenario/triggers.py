@@ -55,7 +55,7 @@ def motion_in(agent: TrafficAgent) -> PlannedMotion:
     return agent.motion
 
 
-def unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
+def list_unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
     """Return states (T, 4) of an agent whose motion never starts; NaN past the map."""
     alone = replace(cell.after, agents=(replace(agent, motion=None),))
     name = frozenset([agent.id])
@@ -97,7 +97,7 @@ def distance_condition(
     centres, axles = watched.states[:, :2], _behind(watched.states, back_m)
     if isinstance(start, NearEgo):
         # Once it starts it looks along its path, so what counts is how it stood before.
-        own = unstarted_states(cell, agent)
+        own = list_unstarted_states(cell, agent)
         goals, marks = own[:, :2], _behind(own, ahead_m(agent))
         off_m = back_m + ahead_m(agent)
     else:

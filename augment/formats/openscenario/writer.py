@@ -157,7 +157,7 @@ def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) 
     """Yield the events before and after its motion starts; past the map it is gone."""
     started_s, times_s = movement.started_s, cell.motion.times_s
     if agent.speed_mps > 0.0 and started_s != 0.0:
-        states = triggers.unstarted_states(cell, agent)
+        states = triggers.list_unstarted_states(cell, agent)
         follow = _follow(xosc, agent, times_s, states, is_relative=False)
         yield from _until_gone(
             xosc, agent, states, _event(xosc, f"{agent.id} goes on", follow, 0.0)

@@ -17,7 +17,7 @@ from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.driving.thresholds import conclude, conclude_all
-from augment.services.scenarios.scenes import known_type, load_reference, load_scene
+from augment.services.scenarios.scenes import find_type, load_reference, load_scene
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
@@ -139,7 +139,7 @@ class Drives(WorkKind[Simulation]):
                 drove,
                 expert,
                 kind=kind,
-                scenario_type=known_type(row.scenario.type),
+                scenario_type=find_type(row.scenario.type),
                 modification=setting.modification,
             )
             for kind in ScoreKind
@@ -152,12 +152,12 @@ class Drives(WorkKind[Simulation]):
         }
         return Settlement(state=State.DONE, columns=columns)
 
-    def over(self, row: Simulation, outcome: Settlement | None) -> None:
+    def after_commit(self, row: Simulation, outcome: Settlement | None) -> None:
         """Conclude the sweep of which this was the last drive."""
         if row.swept is not None:
             conclude(row.swept.sweep_id)
 
-    def tidy(self, now: Moment) -> None:
+    def cleanup(self, now: Moment) -> None:
         """Conclude the sweeps whose workers died before they could."""
         conclude_all()
 

@@ -23,7 +23,7 @@ from augment.services.inputs import InputKind, input_field
 from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import (
     add_variant,
-    known_type,
+    find_type,
     load_intent,
     load_scene,
     scenario_seed,
@@ -149,7 +149,7 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
             name=f"{scenario.slug} with {request.number} = {value:g}",
             stem=f"{scenario.slug}--{value:.10g}",
             scene=load_scene(scenario),
-            type=known_type(scenario.type),
+            type=find_type(scenario.type),
             modification=change,
             keeps_traffic=scenario.keep_traffic,
             recording=None if recording is None else codec.recording_from_document(recording),

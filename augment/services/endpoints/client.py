@@ -87,7 +87,7 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         self._treatment = treatment
         self._profiles = {} if treatment is None else treatment.at(endpoint)
 
-    def fitted(self, request: Request) -> Request:
+    def fit(self, request: Request) -> Request:
         """Return the request with what the model is known to take.
 
         Raises:
@@ -96,7 +96,7 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         if request.model not in self._profiles:
             known: ModelProfile = read_profile(endpoint=self._endpoint, model=request.model)
             self._profiles[request.model] = known
-        return self._profiles[request.model].fitted(request)
+        return self._profiles[request.model].fit(request)
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         """Return the endpoint's answer, after waiting for a place.

@@ -215,7 +215,7 @@ class _Prober:
     def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
         """Return the request as it was sent, and its answer; goes without what is refused."""
         while True:
-            request = self.profile.fitted(question.request)
+            request = self.profile.fit(question.request)
             try:
                 with place_at(self._row.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
                     self.calls += 1

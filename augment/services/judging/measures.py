@@ -136,8 +136,8 @@ def _digest(parts: Any) -> str:
 @cache
 def digest_code(*folders: Path) -> str:
     """Return a digest of the code in folders, or in those that measure: a change computes anew."""
-    rooms = folders or tuple(_ROOT / name for name in MEASURING)
-    files = (path for room in rooms for path in sorted(room.rglob("*.py")))
+    packages = folders or tuple(_ROOT / name for name in MEASURING)
+    files = (path for package in packages for path in sorted(package.rglob("*.py")))
     return _digest([[path.name, path.read_text(encoding="utf-8")] for path in files])
 
 

@@ -12,7 +12,7 @@ from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.codec import modification_from_document, recording_from_document
-from augment.services.scenarios.scenes import known_type, load_scene
+from augment.services.scenarios.scenes import find_type, load_scene
 
 FORMATS = tuple(WRITERS)
 
@@ -166,7 +166,7 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         name=name,
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
         scene=load_scene(scenario),
-        type=known_type(scenario.type),
+        type=find_type(scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),

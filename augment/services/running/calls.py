@@ -135,7 +135,7 @@ class CallTranscript(ABC):
         """Return the calls whose answer may serve that request again, once they have one."""
         return ModelCall.objects.filter(request_hash=request_hash, served_from=None)
 
-    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+    def cached_reply(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """Return this request's earlier answer, recorded as a call that cost nothing.
 
         An answer that is on its way to another row is waited for.
@@ -172,9 +172,9 @@ class CallTranscript(ABC):
                 served_from_id=earlier.served_from_id or earlier.pk,
             )
         self._numbers += 1
-        return _stored_reply(earlier)
+        return _read_reply(earlier)
 
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+    def record_request(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Reserve the worst case of a request and store it; returns its number, from 1.
 
         Where calls in flight hold the room that this one needs, waits for them to end.
@@ -217,7 +217,9 @@ class CallTranscript(ABC):
         if not call.update(sent_at=timezone.now()):
             raise errors.LeaseLost
 
-    def answered(self, number: int, reply: Reply, fault: errors.ModelFault | None = None) -> None:
+    def record_reply(
+        self, number: int, reply: Reply, fault: errors.ModelFault | None = None
+    ) -> None:
         """Store the raw answer to that call and what it used.
 
         An answer with a fault is kept and paid for, but never served again.
@@ -382,7 +384,7 @@ def _reply_columns(reply: Reply) -> dict[str, Any]:
     }
 
 
-def _stored_reply(call: ModelCall) -> Reply:
+def _read_reply(call: ModelCall) -> Reply:
     """Return the answer that a call had, as it would come again; it took no time."""
     extras = call.extras or {}
     return Reply(

@@ -104,7 +104,7 @@ class Readings(WorkKind[IntentReading]):
             return Settlement(state=State.FAILED, reason=f"The cap is reached: {spent.limit}")
         return Settlement(state=State.READ, columns={"document": intent_to_document(intent)})
 
-    def over(self, row: IntentReading, outcome: Settlement | None) -> None:
+    def after_commit(self, row: IntentReading, outcome: Settlement | None) -> None:
         """Log who was asked, and whether it was of use."""
         row.refresh_from_db(fields=["state"])
         log_change(

@@ -209,15 +209,15 @@ class Judgements(WorkKind[PairJudgement]):
             return Settlement(state=State.FAILED, reason=reason_sentence(fault))
         return Settlement(state=State.DONE, columns=columns)
 
-    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Settle its calls in flight."""
         budget.settle_unseen(of=Q(judgement=pk), now=now)
 
-    def over(self, row: PairJudgement, outcome: Settlement | None) -> None:
+    def after_commit(self, row: PairJudgement, outcome: Settlement | None) -> None:
         """Finish the run."""
         finish_judges()
 
-    def tidy(self, now: Moment) -> None:
+    def cleanup(self, now: Moment) -> None:
         """Finish the runs that are over."""
         finish_judges(now=now)
 

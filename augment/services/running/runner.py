@@ -90,7 +90,7 @@ class Augmentations(WorkKind[Augmentation]):
         unanswered = self.rows.filter(state__in=Augmentation.UNDER_WAY)
         return super().waiting().exclude(job__in=CLOSED).exclude(follows__in=unanswered)
 
-    def released_by(self, pk: int) -> list[int]:
+    def find_unblocked(self, pk: int) -> list[int]:
         """Return the follow-ups that have waited for this row."""
         return list(self.waiting().filter(follows=pk, sent_at=None).values_list("pk", flat=True))
 
@@ -144,14 +144,14 @@ class Augmentations(WorkKind[Augmentation]):
             reason = str(error)
         return Settlement(state=State.FAILED, reason=reason)
 
-    def begun(self, pk: int, worker: str, now: Moment) -> Attempt:
+    def on_start(self, pk: int, worker: str, now: Moment) -> Attempt:
         """Open the next attempt."""
         tries = Attempt.objects.filter(augmentation_id=pk)
         last = tries.order_by().values("augmentation").annotate(last=Max("number")).values("last")
         number = Coalesce(Subquery(last), 0) + 1
         return tries.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
 
-    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Close the attempt and settle its calls; one that was lost has no time of its end."""
         if end not in SUBMITTED.values():  # what ends with an answer has seen all of its calls end
             budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
@@ -159,7 +159,7 @@ class Augmentations(WorkKind[Augmentation]):
             finished_at=None if end == TryEnd.LOST else now, outcome=end, reason=reason
         )
 
-    def over(self, row: Augmentation, outcome: Settlement | None) -> None:
+    def after_commit(self, row: Augmentation, outcome: Settlement | None) -> None:
         """Draw the others anew where a change needs a wider window; finish the job."""
         try:
             if outcome is not None and outcome.columns.get("modification") is not None:
@@ -173,7 +173,7 @@ class Augmentations(WorkKind[Augmentation]):
             return Settlement(state=State.CANCELLED)
         return super().outcome_of_loss(row)
 
-    def tidy(self, now: Moment) -> None:
+    def cleanup(self, now: Moment) -> None:
         """Cancel what was given back in a cancelled job; finish the jobs that are over."""
         orphans = self.rows.filter(state=State.QUEUED, job__in=CANCELLED)
         change_all(orphans, state=State.CANCELLED, finished_at=now)

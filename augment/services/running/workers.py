@@ -93,12 +93,12 @@ class Presence:
                 row = Worker.objects.create(name=self._name, keys=list_keys(), **times)
                 self._pk = row.pk
 
-    def recovered(self) -> None:
+    def record_recovery(self) -> None:
         """Record that it has recovered what was lost."""
         self.beat()
         self._update(recovered_at=DATABASE_TIME, fault="")
 
-    def failed(self, fault: str) -> None:
+    def record_fault(self, fault: str) -> None:
         """Record why it could not."""
         self.beat()
         self._update(fault=make_storable(fault)[:FAULT_LENGTH] or "unknown")
@@ -115,11 +115,11 @@ def do_round(recover: Callable[[], object], presence: Presence) -> bool:
     """Recover lost work once; a fault of any kind is logged, kept for the pages and returned."""
     try:
         recover()
-        presence.recovered()
+        presence.record_recovery()
     except Exception as error:
         logger.exception("Could not bring lost work back, will try again.")
         fault = str(error) or type(error).__name__
-        survive(lambda: presence.failed(fault), "This could not be stored for the pages")
+        survive(lambda: presence.record_fault(fault), "This could not be stored for the pages")
         return False
     return True
 

@@ -185,7 +185,7 @@ def redraw(scenario: Scenario) -> int:
             original_picture(scenario, camera)
             return redrawn
         drawn = [
-            (row, draw_picture(scenario, _shown_modification(row), camera)) for row in outdated
+            (row, draw_picture(scenario, _find_modification(row), camera)) for row in outdated
         ]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
@@ -206,9 +206,7 @@ def draw_with_ids(row: Augmentation) -> bytes:
         InvalidModification: The modification does not fit the scene.
     """
     scenario = row.scenario
-    return draw_for_review(load_scene(scenario), _shown_modification(row), load_camera(scenario))[
-        0
-    ]
+    return draw_for_review(load_scene(scenario), _find_modification(row), load_camera(scenario))[0]
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -234,7 +232,7 @@ def _keep(picture: str, png: bytes, film: bytes) -> None:
     store_as(picture, png)
 
 
-def _shown_modification(row: Augmentation) -> Modification:
+def _find_modification(row: Augmentation) -> Modification:
     """Return the shown modification: an unreadable answer changes nothing."""
     if not row.is_answer:
         return Modification()

@@ -46,11 +46,11 @@ def type_choices() -> list[tuple[str, str]]:
 
 def type_label(name: str) -> str:
     """Return the label of a type; an unknown type is its own label."""
-    known = known_type(name)
+    known = find_type(name)
     return known.label if known else dict(type_choices()).get(name, name)
 
 
-def known_type(name: str) -> ScenarioType | None:
+def find_type(name: str) -> ScenarioType | None:
     """The one of the five, None for a type of one's own."""
     return ScenarioType(name) if name in list(ScenarioType) else None
 
@@ -61,7 +61,7 @@ def label_for(name: str) -> str:
     Raises:
         InvalidDocument: It is neither one of the five nor a slug.
     """
-    if known_type(name) is not None:
+    if find_type(name) is not None:
         return ""
     for kind in (MotionPreset, Aim):
         if name in list(kind):
@@ -280,7 +280,7 @@ def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str,
             scenario.intent, scenario.intent_origin = None, ""
         return type, instruction
     type = type or classify_change(reference, scene).value
-    sentence, intent = describe_change(known_type(type), reference, scene)
+    sentence, intent = describe_change(find_type(type), reference, scene)
     scenario.intent = None if intent is None else codec.intent_to_document(intent)
     scenario.intent_origin = "" if intent is None else IntentOrigin.DERIVED
     if not instruction.strip():
@@ -489,7 +489,7 @@ def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
 
 
 def _free_slug(base_scene: BaseScene, name: str) -> str:
-    kind = known_type(name)
+    kind = find_type(name)
     stem = (name if kind is None else kind.name).lower().replace("_", "-")
     return _number_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}")
 
