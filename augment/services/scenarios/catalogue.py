@@ -222,7 +222,9 @@ def _store_scenario(
     entry: codec.CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
 ) -> CatalogueStep:
     row, slug = _find_newest(entry.slug), entry.slug
-    follows = _find_newest(entry.follows) if entry.follows else None
+    follows = None
+    if entry.follows:
+        follows = _find_newest(entry.follows) or scene_rows.scenario_named(entry.follows)
     intent = None if entry.intent is None else codec.intent_to_document(entry.intent)
     said: dict[str, Any] = {
         "type": entry.type.value,
@@ -240,6 +242,8 @@ def _store_scenario(
     if original is not None:
         own["origin"] = original.origin
     if row is not None:
+        if row == follows:
+            raise Conflict(f"{row.slug!r} can't follow itself.")
         wanted = own | said | {"base_scene": BaseScene.objects.get(slug=entry.scene)}
         wanted["follows"] = follows
         wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
@@ -255,7 +259,7 @@ def _store_scenario(
         slug=slug,
         **said,
         intent_origin=IntentOrigin.AUTHORED,
-        follows=follows.slug if follows else entry.follows,
+        follows=follows.slug if follows else "",
     )
     added = scene_rows.add_scenario(new, actor=actor)
     Scenario.objects.filter(pk=added.pk).update(**own)
