@@ -150,15 +150,18 @@ class _Fitting:
         asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
         spans_m = list_stations(request.spot, self._place.over(request.spot.via).lanes)
         is_open = wanted.is_range or (request.spot.distance is None and of is None)
+        open_m = 0.0
         if is_open and request.spot.settings:
-            asked_m = _find_inside(spans_m, asked_m)
+            asked_m, open_m = _find_inside(spans_m, asked_m), _FROM_END_M / 2.0
         draw = int(self._rng.integers(2**32))
         arrangements = (
             count_arrangements(request) if isinstance(request, intents.CrashRequest) else 1
         )
         first_problem = ""
         best: tuple[int, _Agents, float] | None = None
-        for shift_m, arrangement in itertools.product(_shifts(wanted), range(arrangements)):
+        for shift_m, arrangement in itertools.product(
+            _shifts(wanted, open_m), range(arrangements)
+        ):
             distance_m = asked_m + math.copysign(shift_m, shift_m * asked_m)
             if is_open and find_off(distance_m, spans_m) > 0.0:
                 continue
@@ -257,13 +260,15 @@ def _number_agents(agents: _Agents, scene: Scene) -> _Agents:
 def _find_inside(spans_m: Sequence[Span], ahead_m: float) -> float:
     """Return the middle of the range of stations nearest ahead, as far as it is near its end."""
     low_m, high_m = min(spans_m, key=lambda span_m: find_off(max(ahead_m, 0.0), [span_m]))
-    low_m, high_m = max(low_m, high_m - _FROM_END_M), min(high_m, low_m + _FROM_END_M)
-    return (low_m + high_m) / 2.0
+    from_m = low_m if math.isinf(high_m) else max(low_m, high_m - _FROM_END_M)
+    to_m = high_m if math.isinf(low_m) else min(high_m, low_m + _FROM_END_M)
+    return (from_m + to_m) / 2.0
 
 
-def _shifts(wanted: intents.Length) -> list[float]:
-    """Return 0, then further and further to either side."""
+def _shifts(wanted: intents.Length, open_m: float) -> list[float]:
+    """Return 0, then further and further to either side: all of a range, or so far."""
     tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
+    tolerance_m = max(tolerance_m, wanted.high_m - wanted.low_m, open_m)
     steps = range(1, int(tolerance_m / _SHIFT_STEP_M) + 1)
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
 

@@ -18,7 +18,7 @@ import shapely
 from augment.checks.ground import VEHICLES, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, list_arms, resolve_spot
 from augment.checks.parties import CRASH_M, Role, assign_parties, meets_route
-from augment.checks.wish_patterns import Chain, Link, Pattern
+from augment.checks.wish_patterns import Chain, Link, Pattern, find_step_m
 from augment.checks.wish_places import ACROSS_M, Place, Span, find_across, list_stations
 from augment.checks.wish_shapes import find_nearest_cones, find_worker_ground
 from augment.geometry.frames import difference
@@ -31,7 +31,7 @@ ABREAST_M = 3.0
 """From one to the next of those who walk side by side, at most."""
 _ASIDE_RAD = math.radians(45.0)
 """In front of, left of: nearer to that direction than to any other."""
-_BEARINGS_RAD = {
+_BEARINGS_RAD: dict[wish.Bearing | None, float] = {
     wish.Bearing.AHEAD: 0.0,
     wish.Bearing.BEHIND: math.pi,
     wish.Bearing.LEFT: math.pi / 2.0,
@@ -208,15 +208,12 @@ class _Fitting:
         first = min(range(len(agents)), key=lambda index: self._ahead_m(agents[index]))
         place = Place.of(request.spot, self._lanes, agents[first].width_m)
         if request.spacing is None or len(agents) == 1:
-            placed = [place.nearest(point) for point in points]
-            if len(agents) > 1:  # the others stand further on, who knows how far
-                begins_m = self._lanes.route.locate(*placed[first]).ahead_m
-                onwards = replace(place, stations_m=((begins_m, math.inf),))
-                placed = [
-                    there if index == first else onwards.nearest(point)
-                    for index, (there, point) in enumerate(zip(placed, points, strict=True))
-                ]
-            return placed
+            there = place.nearest(points[first])
+            # The others stand further on, who knows how far.
+            begins_m = self._lanes.route.locate(*there).ahead_m
+            onwards = replace(place, stations_m=((begins_m, math.inf),))
+            others = [onwards.nearest(point) for point in points]
+            return [*others[:first], there, *others[first + 1 :]]
         gap_m = (request.spacing.low_m, request.spacing.high_m)
         count, route = request.count or len(agents), self._lanes.route
 
@@ -224,15 +221,12 @@ class _Fitting:
             ahead_m, step_m = numbers.tolist()
             ends = []
             for _ in range(count):
-                low_m, high_m = place.across(ahead_m) or (-ACROSS_M, ACROSS_M)
-                ends.append([route.position(ahead_m, low_m), route.position(ahead_m, high_m)])
-                further_m = step_m
-                middle_m = (low_m + high_m) / 2.0
-                here = route.position(ahead_m, middle_m)
-                for _ in range(4 if is_straight else 0):
-                    there = route.position(ahead_m + further_m, middle_m)
-                    further_m += step_m - math.dist(here, there)
-                ahead_m += further_m
+                span_m = place.across(ahead_m) or (-ACROSS_M, ACROSS_M)
+                ends.append([route.position(ahead_m, left_m) for left_m in span_m])
+                middle = partial(route.position, left_m=fmean(span_m))
+                if is_straight:
+                    step_m = find_step_m(middle, middle(ahead_m), ahead_m, float(numbers[1]))
+                ahead_m += step_m
             return np.array(ends)
 
         guess = (self._ahead_m(agents[first]), fmean(gap_m))
@@ -273,15 +267,13 @@ class _Fitting:
     ) -> list[Point]:
         """Return where they belong: they begin at the spot, or meet the ego's way there."""
         lanes, points = self._lanes, [(agent.x_m, agent.y_m) for agent in agents]
-        sign = request.start.sign if request.start else 0.0
+        ends = sorted((0.0, request.start.sign)) if request.start else (-1.0, 1.0)
 
         def beside(ahead_m: float) -> Span:
             lateral, band = request.spot.lateral, lanes.band(wish.LaneChoice.OWN, ahead_m)
             if band is not None and (request.on_road or lateral is not None):
                 return find_across(lateral, lanes.side_sign(lateral), band.width_m, 0.0)
-            return min(sign, 0.0 if sign else -1.0) * ACROSS_M, max(
-                sign, 0.0 if sign else 1.0
-            ) * ACROSS_M
+            return ends[0] * ACROSS_M, ends[-1] * ACROSS_M
 
         stations_m = list_stations(request.spot, lanes)
         begins = Place(lanes=lanes, stations_m=stations_m, across=beside)
@@ -306,43 +298,40 @@ class _Fitting:
         first: Place,
         points: Sequence[Point],
     ) -> list[Point]:
-        links = []
-        for index in range(len(agents) - 1):
-            base, gap_m, aside_rad, toward_rad = index, (0.0, ABREAST_M), math.pi, 0.0
-            if request.is_file and index < len(request.behind):
-                behind = request.behind[index]
-                base, gap_m = 0, (behind.low_m, behind.high_m)
-                if request.start is not None:
-                    ahead_m = self._lanes.route.locate(*points[0]).ahead_m
-                    toward_rad = self._lanes.route.heading_at(ahead_m)
-                    toward_rad += request.start.sign * math.pi / 2.0
-                    aside_rad = math.pi / 2.0
-            links.append(Link(base=base, gap_m=gap_m, toward_rad=toward_rad, aside_rad=aside_rad))
+        lane_rad = self._lanes.route.heading_at(self._lanes.route.locate(*points[0]).ahead_m)
+        behind = request.behind if request.is_file else ()
+        side = request.start
+        links = [
+            Link(
+                base=0,
+                gap_m=(gap.low_m, gap.high_m),
+                toward_rad=lane_rad + (side.sign if side else 0.0) * math.pi / 2.0,
+                aside_rad=math.pi / 2.0 if side else math.pi,
+            )
+            for gap in behind[: len(agents) - 1]
+        ]
+        abreast = range(len(links), len(agents) - 1)
+        links += [Link(base=index, gap_m=(0.0, ABREAST_M)) for index in abreast]
         return Chain(first=first.nearest, links=tuple(links)).nearest(points)
 
     def _place_crash(
         self, request: wish.CrashRequest, agents: Sequence[TrafficAgent]
     ) -> list[Point]:
-        points = [(agent.x_m, agent.y_m) for agent in agents]
         place = Place.of(request.spot, self._lanes, agents[0].width_m)
-        unsaid = [wish.CrashedCar()] * (len(agents) - 1)
+        said = [*request.others, *[wish.CrashedCar()] * len(agents)][: len(agents) - 1]
         touching_m = max(CRASH_M, *(agent.length_m for agent in agents))
-        ahead_m = min(map(self._ahead_m, agents))
-        links = []
-        for index, (_, other) in enumerate(
-            zip(agents[1:], [*request.others, *unsaid], strict=False)
-        ):
-            gap, bearing = other.gap, other.bearing
-            toward_rad = self._lanes.route.heading_at(ahead_m)
-            links.append(
-                Link(
-                    base=index,
-                    gap_m=(0.0, touching_m) if gap is None else (gap.low_m, gap.high_m),
-                    toward_rad=toward_rad + (_BEARINGS_RAD[bearing] if bearing else 0.0),
-                    aside_rad=_ASIDE_RAD if bearing else math.pi,
-                )
+        lane_rad = self._lanes.route.heading_at(min(map(self._ahead_m, agents)))
+        links = tuple(
+            Link(
+                base=index,
+                gap_m=(other.gap.low_m, other.gap.high_m) if other.gap else (0.0, touching_m),
+                toward_rad=lane_rad + _BEARINGS_RAD.get(other.bearing, 0.0),
+                aside_rad=_ASIDE_RAD if other.bearing else math.pi,
             )
-        return Chain(first=place.nearest, links=tuple(links)).nearest(points)
+            for index, other in enumerate(said)
+        )
+        points = [(agent.x_m, agent.y_m) for agent in agents]
+        return Chain(first=place.nearest, links=links).nearest(points)
 
     def _place_door(self, request: wish.DoorRequest, point: Point) -> Point:
         """Return where a door belongs: along its car, on the side where the ego comes past."""

@@ -83,6 +83,21 @@ class Pattern:
         return np.asarray(feet[np.arange(len(points)), columns])
 
 
+def find_step_m(at: Callable[[float], Point], begin: Point, from_m: float, gap_m: float) -> float:
+    """Return how much further along the lane a point is that far away in a straight line.
+
+    Args:
+        at: From a station to its point.
+        begin: The point to begin at, which may be elsewhere across the lane.
+        from_m: The station of it.
+        gap_m: From point to point.
+    """
+    step_m = gap_m
+    for _ in range(5):  # each of them leaves a small part of what is missing
+        step_m += gap_m - math.dist(begin, at(from_m + step_m))
+    return step_m
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
     """Where an object stands from another one of its chain.
@@ -130,8 +145,12 @@ class Chain:
         orders = [tuple(range(len(points)))]
         if len(points) <= MOST_ORDERED:
             orders = list(permutations(orders[0]))
-        placed = [self._place([points[at] for at in order], points[order[0]]) for order in orders]
-        _, order = min((_sum_m(points, p, o), o) for p, o in zip(placed, orders, strict=True))
+
+        def miss_m(order: Sequence[int]) -> float:
+            ordered = [points[at] for at in order]
+            return sum(map(math.dist, self._place(ordered, ordered[0]), ordered))
+
+        order = min(orders, key=miss_m)
         ordered = [points[at] for at in order]
 
         def total_m(start: FloatArray) -> float:
@@ -157,7 +176,3 @@ class Chain:
         for link, point in zip(self.links, points[1:], strict=False):
             placed.append(link.nearest(placed[link.base], point))
         return placed
-
-
-def _sum_m(points: Sequence[Point], placed: Sequence[Point], order: Sequence[int]) -> float:
-    return sum(math.dist(points[at], there) for at, there in zip(order, placed, strict=True))

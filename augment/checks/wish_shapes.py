@@ -6,8 +6,9 @@ nearest of its placements, the rule placer takes one.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from operator import attrgetter
 
@@ -15,8 +16,9 @@ import numpy as np
 import shapely
 
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.wish_patterns import THERE_M, Pattern
+from augment.checks.wish_patterns import THERE_M, Pattern, find_step_m
 from augment.checks.wish_places import Place, Span, find_across, list_stations
+from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene import intent as wish
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Point
@@ -27,6 +29,7 @@ CONE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1]
 EDGE_M = 0.3
 """So near to a boundary a cone, half a metre wide, stands at it, inside or outside."""
 _OPEN_GAP_M = (CONE_M, 10.0)
+_BENT_RAD = math.radians(0.5)
 _ALONG_SHARE = 0.1
 """Cones that lead less than this across form a line along the lane."""
 
@@ -120,7 +123,11 @@ def find_nearest_cones(
     gaps_m = np.hypot(*np.diff(points, axis=0).T)
     gap_m = float(np.median(gaps_m)) if len(gaps_m) else 1.0
     best: FloatArray | None = None
-    for pattern in _list_patterns(request, count, lanes, band.width_m):
+    bend_rad = difference(here[-1].tangent_rad, here[0].tangent_rad)
+    readings = _list_readings(request, count, lanes, band.width_m)
+    if abs(bend_rad) < _BENT_RAD:
+        readings = [reading for reading in readings if not reading.is_straight]
+    for pattern in _list_patterns(request, count, lanes, readings):
         guess = (stations[0], gap_m, lefts[0], lefts[-1])
         if request.shape is wish.Shape.RING:
             guess = (stations.mean(), gap_m, float(np.mean(lefts)), 0.0)
@@ -225,18 +232,18 @@ def _list_readings(
 
 
 def _list_patterns(
-    request: wish.ConesRequest, count: int, lanes: LanesAcross, lane_m: float
+    request: wish.ConesRequest, count: int, lanes: LanesAcross, readings: Sequence[_Reading]
 ) -> Iterator[Pattern]:
     lane = request.spot.lane or wish.LaneChoice.OWN
     spacing = request.spacing
     gap_m = _OPEN_GAP_M if spacing is None else (spacing.low_m, spacing.high_m)
-    for reading in _list_readings(request, count, lanes, lane_m):
+    for reading in readings:
 
         def slots(numbers: FloatArray, reading: _Reading = reading) -> FloatArray:
             flags = {"is_along": reading.is_along, "is_oblong": reading.is_oblong}
             placed = lay_out(request, count, numbers.tolist(), **flags)
             if reading.is_straight and request.reach_m is None:
-                placed = _straighten(placed, float(numbers[1]), lanes, lane)
+                placed = _straighten(placed, float(numbers[1]), partial(_position, lanes, lane))
             points = np.array([_position(lanes, lane, spot) for spot in placed])
             return np.repeat(points[:, None], 2, axis=1)
 
@@ -245,21 +252,21 @@ def _list_patterns(
 
 
 def _straighten(
-    placed: Sequence[Placement], gap_m: float, lanes: LanesAcross, lane: wish.LaneChoice
+    placed: Sequence[Placement], gap_m: float, at: Callable[[Placement], Point]
 ) -> list[Placement]:
     """Return the cones moved along the lane until each is that far from the one before."""
     moved = [placed[0]]
-    for (before_m, _), (s_m, d_m) in pairwise(placed):
+    for (before_m, before_d), (s_m, d_m) in pairwise(placed):
         if s_m < before_m:  # the line at the other boundary begins
-            moved.append((moved[0][0], d_m))
+            moved.append((placed[0][0], d_m))
             continue
-        step_m = s_m - before_m
-        for _ in range(4):
-            ends = (
-                _position(lanes, lane, spot) for spot in (moved[-1], (moved[-1][0] + step_m, d_m))
-            )
-            step_m += gap_m - math.dist(*ends)
-        moved.append((moved[-1][0] + step_m, d_m))
+
+        def abreast(station_m: float, d_m: float = d_m) -> Point:
+            return at((station_m, d_m))
+
+        begin_m = moved[-1][0]
+        step_m = find_step_m(abreast, at((begin_m, before_d)), begin_m, gap_m)
+        moved.append((begin_m + step_m, d_m))
     return moved
 
 

@@ -69,14 +69,14 @@ def car(ahead_m: float, left_m: float, number: int = 2) -> TrafficAgent:
 def named(*settings: Setting) -> Intent:
     """One car in the ego's lane at a named place."""
     where = Spot(lane=LaneChoice.OWN, settings=settings)
-    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, count=1),))
+    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, speed_mps=0.0, count=1),))
 
 
 def by_zebra(relation: Relation | None) -> Intent:
     """One car 5 m from the zebra, or on it."""
     five = metres(5.0) if relation else None
     where = Spot(distance=five, relation=relation, mark=MapPlace.CROSSWALK)
-    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, count=1),))
+    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, speed_mps=0.0, count=1),))
 
 
 def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
@@ -228,6 +228,23 @@ def measured(intent: Intent, change: Modification) -> WishDistance:
 def test_what_the_rule_placer_places_is_what_was_asked_for(name: str) -> None:
     found = measured(INTENTS[name], Modification(added=PLACED[name]))
     assert found.distances_m == pytest.approx([0.0] * len(PLACED[name]), abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("where", "setting"),
+    [
+        (junction(), Setting.BEFORE_INTERSECTION),
+        (junction(), Setting.IN_INTERSECTION),
+        (junction(), Setting.AFTER_INTERSECTION),
+        (ZEBRA, Setting.ON_CROSSWALK),
+        (ZEBRA, Setting.BY_PARKED_RIGHT),
+    ],
+)
+def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: Setting) -> None:
+    added = place(where, named(setting), seed=3).modification.added
+    found = measure_wish(Ground.of(where), Modification(added=added), named(setting))
+    assert found is not None
+    assert found.distances_m == pytest.approx([0.0], abs=0.002)
 
 
 @given(
