@@ -271,7 +271,7 @@ class Contestant(models.Model):
             return ""
         now = spell_variant(self.variant)
         before = now.replace("-plus", "")
-        return f"{self.name} asks by {now}, called {before} before that was the paper’s function."
+        return f"{self.name} runs {now}: it was named before {before} meant the paper’s function."
 
     @property
     def is_simulated(self) -> bool:

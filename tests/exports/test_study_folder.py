@@ -261,9 +261,9 @@ def test_a_folder_of_an_earlier_release_is_read_and_means_our_function_by_fc(
     assert Contestant.objects.get(pk=pk).variant == variant
     assert Simulation.objects.get().version == version
     notes = leaderboard_table(Snapshot.objects.get()).warnings
-    assert ("Llama FC+tQA asks by FC-plus+tQA, called FC+tQA before" in str(notes)) is bool(
-        lacking
-    )
+    assert (
+        "Llama FC+tQA runs FC-plus+tQA: it was named before FC+tQA meant" in str(notes)
+    ) is bool(lacking)
 
 
 def test_a_folder_with_tables_that_no_study_has_is_refused(study: Study, tmp_path: Path) -> None:

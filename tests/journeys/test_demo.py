@@ -30,6 +30,17 @@ def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) 
     kinds = "SELECT count(DISTINCT s.type) FROM augment_augmentation a JOIN augment_scenario s"
     kinds += " ON s.id = a.scenario_id WHERE a.state = 'done' AND s.catalogue_set = 'moving'"
     assert demo_home.rows(kinds) == [(8,)]
+    functions = "SELECT DISTINCT c.variant, json_extract(n.document, '$.tool') "
+    functions += "FROM augment_transcriptnote n JOIN augment_attempt t ON t.id = n.attempt_id "
+    functions += "JOIN augment_augmentation a ON a.id = t.augmentation_id "
+    functions += "JOIN augment_contestant c ON c.id = a.contestant_id "
+    functions += (
+        "WHERE n.kind = 'tool_call' AND json_extract(n.document, '$.understood') ORDER BY 1"
+    )
+    assert demo_home.rows(functions) == [
+        ("fc", "retrieve_suitable_pose"),
+        ("fc-plus", "pose_on_lane"),
+    ]
     document = json.loads((demo_home.folder / "var" / "demo" / "leaderboard.json").read_text())
     assert len(document["standings"]) == len(rows)
     assert r"\toprule" in (demo_home.folder / "var" / "demo" / "leaderboard.tex").read_text()

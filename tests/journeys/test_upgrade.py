@@ -59,7 +59,7 @@ row = Contestant.objects.get(slug="sim-careless-fc")
 staff = Client(HTTP_HOST="localhost")
 staff.force_login(User.objects.filter(is_superuser=True).first())
 page = staff.get(reverse("contestant", args=[row.code])).content.decode()
-assert "Simulated careless FC asks by FC-plus, called FC before" in page, page
+assert "Simulated careless FC runs FC-plus: it was named before FC meant" in page, page
 """
 
 

@@ -70,6 +70,7 @@ class ContestantRequest:
     variant: str = input_field(
         InputKind.CHOICE,
         "Variant",
+        "FC has the paper’s function, a pose on a lane; FC-plus ours, with what lies around it.",
         choices={name: f"{spell_variant(name)}: {one.title}" for name, one in RECIPES.items()},
     )
     endpoint: str = input_field(InputKind.TEXT, "Label of an endpoint", most=80)
