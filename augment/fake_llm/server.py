@@ -13,8 +13,12 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
+from augment.errors import ReplyUnreadable
 from augment.fake_llm import careless, playing, wire
 from augment.fake_llm.sight import KnownTasks, knows_nothing
+from augment.llm.questions import MARKER
+from augment.prompts.blocks import last_object
+from augment.scene.entities import AgentType
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""
@@ -156,6 +160,8 @@ def _unknown(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
 def _as(character: playing.Character) -> Behaviour:
     def played(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
         text, calls = _answer_probe(request) or character.answer(request, server.known)
+        if request.response_format is not None and not calls:
+            text = _by_schema(text)
         return wire.completion(request, text or None, calls=calls)
 
     return played
@@ -169,6 +175,8 @@ def _answer_probe(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
         return match[1], ()
     if text.startswith("Write a story"):
         return "A car stood on the road. " * 3, ()  # about as long as the limit allows
+    if text.startswith("Write a sentence") and request.response_format is not None:
+        return json.dumps({"plate": MARKER, "doors": 4}), ()
     if (match := re.search(r"double the number (\d+)", text)) and request.tools:
         name = request.tools[0]["function"]["name"]
         return "", ((name, json.dumps({"number": int(match[1])})),)
@@ -180,7 +188,33 @@ def _answer_probe(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
     return None
 
 
+def _by_schema(text: str) -> str:
+    """Return the block of an answer as a schema has it; any other text as it is."""
+    try:
+        block, _ = last_object(text, frozenset({"add"}))
+    except ReplyUnreadable:
+        return text
+    lists: dict[str, Any] = {"move": [], "remove": [], **block}
+    for agent in [*lists["add"], *lists["move"]]:
+        is_walker = agent["type"] == AgentType.PEDESTRIAN and "motion" not in agent
+        agent.setdefault("walk_to" if is_walker else "motion", None)
+    for agent in lists["add"]:
+        del agent["id"]
+    return json.dumps(lists)
+
+
 _good = _as(playing.GOOD)
+
+
+def _knows_json_object(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
+    """Answer to OpenAI's form of a schema as llama-cpp-python does."""
+    if request.response_format is not None and request.response_format.type == "json_schema":
+        return wire.error(500, "('body', 'response_format', 'type'): should be 'json_object'")
+    return _good(request, server)
+
+
+def _ignores_schema(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
+    return _good(request.model_copy(update={"response_format": None}), server)
 
 
 def _no_vision(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
@@ -231,6 +265,8 @@ MODELS: dict[str, Behaviour] = {
     "fake-qa-never": _as(playing.STUBBORN),
     "fake-tool-loop": _as(playing.LOOPING),
     "fake-garbage": _garbage,
+    "fake-json-object": _knows_json_object,
+    "fake-ignores-schema": _ignores_schema,
     "fake-no-vision": _no_vision,
     "fake-cuts-context": _cuts_context,
     SLOW: _good,

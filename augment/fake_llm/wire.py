@@ -65,6 +65,22 @@ class SpokenMessage(_Strict):
         return [base64.b64decode(url.removeprefix(_PNG_URL)) for url in urls]
 
 
+class _Named(_Strict):
+    name: Annotated[str, Field(min_length=1)]
+    strict: Literal[True]
+    schema_: Annotated[dict[str, Any], Field(alias="schema")]
+
+
+class _NamedSchema(_Strict):
+    type: Literal["json_schema"]
+    json_schema: _Named
+
+
+class _ObjectSchema(_Strict):
+    type: Literal["json_object"]
+    schema_: Annotated[dict[str, Any], Field(alias="schema")]
+
+
 class ChatRequest(_Strict):
     """The body of a POST to /v1/chat/completions."""
 
@@ -76,6 +92,7 @@ class ChatRequest(_Strict):
     seed: int | None = None
     tools: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_choice: Literal["auto", "none"] | None = None
+    response_format: _NamedSchema | _ObjectSchema | None = None
     stream: Literal[False] = False
 
     @property

@@ -186,6 +186,10 @@ def fault_of_status(
     code = "" if error.code == str(status) else error.code
     text = f"the endpoint answered {status}{replace(error, message=message, code=code)}"
     refused = _find_refused_parameter(error, sent) if status in (400, 422) else None
+    asked = sent.get("response_format")
+    # llama-cpp-python answers 500 to a form that it does not know.
+    if isinstance(asked, dict) and status in (400, 422, 500) and says("schema", error.message):
+        refused = str(asked["type"])
     if refused:
         return ParameterRefused(refused, text, status=status)
     passing = (status in _PASSING or status >= 500) and error.code not in _SPENT

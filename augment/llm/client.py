@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from augment.errors import ModelFault
-from augment.llm.messages import LengthName, Reply, Request
+from augment.llm.messages import LengthName, Reply, Request, SchemaForm
 
 Sending = Callable[[], None]
 """Called once, when a request is about to leave this computer; what it raises keeps it here."""
@@ -125,6 +125,9 @@ class ModelProfile:
             seed=None if "seed" in self.refused else request.seed,
             reasoning_effort=None if "reasoning_effort" in self.refused else effort,
             length_name=name,
+            schema_form=next(
+                (form for form in SchemaForm if form not in self.refused), request.schema_form
+            ),
         )
 
     def without(self, parameter: str) -> ModelProfile:
@@ -137,6 +140,8 @@ class ModelProfile:
             lacks = "can't see pictures, which this variant needs"
         elif self.native_tools is False and request.tools:
             lacks = "has no native tool calls, which this variant was told to use"
+        elif request.schema is not None and self.refused.issuperset(SchemaForm):
+            lacks = "keeps to no schema of an answer, which this contestant was told to use"
         elif self.refused.issuperset(LengthName):
             lacks = "takes no limit of the answer's length, so that its cost has no bound"
         if lacks:

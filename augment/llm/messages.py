@@ -110,6 +110,20 @@ class LengthName(StrEnum):
     MAX_TOKENS = "max_tokens"
 
 
+class SchemaForm(StrEnum):
+    """Form in which a request asks for an answer by a JSON schema; servers know one, or none."""
+
+    JSON_SCHEMA = "json_schema"
+    JSON_OBJECT = "json_object"
+
+    def to_document(self, schema: Mapping[str, object]) -> dict[str, object]:
+        """Return the request's `response_format`: OpenAI's, or that of llama-cpp-python."""
+        if self is SchemaForm.JSON_OBJECT:
+            return {"type": self.value, "schema": schema}
+        named = {"name": "block", "strict": True, "schema": schema}
+        return {"type": self.value, self.value: named}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tool:
     """A function that a model may call.
@@ -148,6 +162,8 @@ class Request:
         temperature, seed, reasoning_effort: Left out of the request where None.
         tools: What the model may call natively.
         tool_choice: Counts only where there are tools.
+        schema: A JSON schema that the answer has to obey, None for free text.
+        schema_form: Counts only where there is a schema.
     """
 
     model: str
@@ -159,6 +175,8 @@ class Request:
     tools: tuple[Tool, ...] = ()
     tool_choice: ToolChoice = ToolChoice.AUTO
     length_name: LengthName = LengthName.MAX_COMPLETION_TOKENS
+    schema: Mapping[str, object] | None = None
+    schema_form: SchemaForm = SchemaForm.JSON_SCHEMA
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The body of the request on the OpenAI-compatible wire, ready for JSON."""
@@ -174,6 +192,8 @@ class Request:
         if self.tools:
             document["tools"] = [tool.to_document() for tool in self.tools]
             document["tool_choice"] = self.tool_choice.value
+        if self.schema is not None:
+            document["response_format"] = self.schema_form.to_document(self.schema)
         return document
 
 

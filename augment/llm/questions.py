@@ -4,6 +4,7 @@ None of them can be answered well by chance, or by a server that drops what it d
 """
 
 import base64
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -34,6 +35,7 @@ class Ability(StrEnum):
     ANSWER_LIMIT = "answer_limit"
     TEMPERATURE = "temperature"
     NATIVE_TOOLS = "native_tools"
+    SCHEMA = "schema"
     VISION = "vision"
     WHOLE_PROMPT = "whole_prompt"
 
@@ -82,6 +84,7 @@ def questions_for(
     ready, steady = ("Answer with the single word: " + word for word in ("ready", "steady"))
     story = "Write a story of five hundred words about a car."
     twice = "Use the function to double the number 21."
+    sentence = "Write a sentence about a car that stands in the sun."
     halves = "Name the colour of the left half of the picture, then that of the right half."
     steadily: list[Mapping[str, Any]] = [{"temperature": 0.0, "seed": 1}, *chosen]
     return (
@@ -92,6 +95,7 @@ def questions_for(
             for values in steadily
         ),
         question(Ability.NATIVE_TOOLS, twice, _calls_double, "tools", tools=(_DOUBLE,)),
+        question(Ability.SCHEMA, sentence, _obeys_schema, schema=_PLATE),
         question(Ability.VISION, halves, _sees_both_halves, images=(_TWO_HALVES,)),
         question(Ability.WHOLE_PROMPT, _long_text(), _says(MARKER)),
     )
@@ -110,6 +114,23 @@ _DOUBLE = Tool(
         "additionalProperties": False,
     },
 )
+
+
+_PLATE: dict[str, object] = {
+    "type": "object",
+    "properties": {"plate": {"type": "string", "enum": [MARKER]}, "doors": {"type": "integer"}},
+    "required": ["plate", "doors"],
+    "additionalProperties": False,
+}
+
+
+def _obeys_schema(reply: Reply) -> bool:
+    try:
+        answer = json.loads(reply.text)
+    except ValueError:
+        return False
+    keys = {"plate": MARKER, "doors": answer.get("doors")} if isinstance(answer, dict) else None
+    return answer == keys and type(answer["doors"]) is int
 
 
 def _says(word: str) -> Callable[[Reply], bool]:

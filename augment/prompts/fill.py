@@ -128,6 +128,11 @@ def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) ->
     return (*messages, model_message(answer), make_user_message(asked))
 
 
+def block_messages(messages: Messages, answer: str) -> Messages:
+    """Return the conversation up to the modifier's sections, and the request for their block."""
+    return (*messages, model_message(answer), make_user_message(read_text("block.md")))
+
+
 def follow_up_messages(messages: Messages, instruction: str) -> Messages:
     """Return the conversation up to the modifier's last answer, and what the user wishes next."""
     return (*messages, make_user_message(fill_text("follow_up.md", quoted=quote(instruction))))

@@ -8,8 +8,9 @@ Frame: ego frame of the scene.
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field
 
@@ -24,14 +25,17 @@ from augment.prompts.blocks import (
     validate,
     without_thoughts,
 )
+from augment.prompts.extent import find_spans
 from augment.scene.codec import intent_from_parts
 from augment.scene.density import fit_boxes
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
-from augment.scene.planned_motion import PlannedMotion, PointPath
+from augment.scene.planned_motion import EGO_ID, PlannedMotion, PointPath
 from augment.scene.planned_mover import check_motions
 
 MOST_AGENTS = 64
+MOST_BY_SCHEMA = 10
+"""Agents in a list of a block by schema: a small model adds more until it is cut off."""
 LONGEST_NOTES = 4000
 NOTHING_TO_PLACE = "it asks for nothing that can be placed"
 FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
@@ -54,6 +58,8 @@ def _insist_on_object(kind: object) -> object:
     return kind
 
 
+_Schema = dict[str, Any]
+_NULL: _Schema = {"type": "null"}
 _Item = TypeVar("_Item")
 _Id = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 _Size = Annotated[float, Field(ge=0.1, le=20.0)]
@@ -173,7 +179,7 @@ class JudgeAnswer(Strict):
 
 
 def read_reply(
-    answer: str, scene: Scene, *, radius_m: float = vectors.DEFAULT_RADIUS_M
+    answer: str, scene: Scene, *, radius_m: float = vectors.DEFAULT_RADIUS_M, sections: str = ""
 ) -> ReadReply:
     """Return the modification that the answer asks for, an empty one of a refusal.
 
@@ -181,10 +187,14 @@ def read_reply(
         answer: The raw text of the model.
         scene: The scene it was asked about.
         radius_m: No object may lie further than this ahead, behind or to a side.
+        sections: What the model wrote before, where the answer is a block by `block_schema`.
 
     Raises:
         ReplyUnreadable: Whatever is wrong with the answer.
     """
+    if sections:
+        is_bare = answer.lstrip().startswith("{")
+        answer = f"{sections}\n\n" + (f"```json\n{answer}\n```" if is_bare else answer)
     try:
         document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
     except ReplyUnreadable:
@@ -192,21 +202,11 @@ def read_reply(
             raise
         said = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
         return ReadReply(modification=Modification(), notes=said, is_refusal=True)
-    block, names = validate(_Block, document), vectors.short_names(scene)
-    problems = []
-    for agent in [*block.add, *block.move]:
-        ends = (agent.x_m, agent.y_m, *(agent.walk_to or ()))
-        far_m = 2.0 * radius_m  # who moves may leave what is shown
-        if max(map(abs, ends)) > radius_m:
-            problems.append(f"{agent.id}: x and y must lie between -{radius_m:g} and {radius_m:g}")
-        if any(abs(value) > far_m for point in agent.path_m for value in point):
-            problems.append(f"{agent.id}: points_m must lie between -{far_m:g} and {far_m:g}")
-        if agent.lane is not None and agent.lane not in names.lane_ids:
-            problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
-        if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
-            problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
-        if agent.walk_to is not None and agent.motion is not None:
-            problems.append(f"{agent.id}: it has walk_to or a motion, not both")
+    names = vectors.short_names(scene)
+    if sections:
+        _number_added(document, names)
+    block = validate(_Block, document)
+    problems = _find_problems(block, names, radius_m)
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = fit_boxes(scene, _modification(block, scene, names))
@@ -216,6 +216,59 @@ def read_reply(
         notes=answer_notes(answer),
         mended=mended,
         is_refusal=modification.is_empty and "{" not in actions,
+    )
+
+
+def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
+    """Return the JSON schema of a modifier's block: ids are those that its prompt shows.
+
+    Every field is required, as strict endpoints insist: what may be left out is null instead.
+    """
+    names = vectors.short_names(scene)
+    lanes = [names.lanes[name] for name in find_spans(scene, radius_m)]
+    others = [names.agents[agent.id] for agent in scene.agents]
+    number: _Schema = {"type": "number"}
+    point = _list_schema(number, 2, 2)
+    of_lane = _one_of(lanes)
+    start = [
+        _object_schema(kind=_one_of(["time"]), after_s=number),
+        _object_schema(kind=_one_of(["ego_distance"]), within_m=number),
+        _object_schema(
+            kind=_one_of(["place"]),
+            agent_id=_one_of([EGO_ID, *others]),
+            **dict.fromkeys(("x_m", "y_m", "within_m"), number),
+        ),
+    ]
+    along = _object_schema(
+        kind=_one_of(["lanes"]), lane_ids=_list_schema(of_lane, 1, 20), change_m=number
+    )
+    over = _object_schema(
+        kind=_one_of(["points"]),
+        points_m=_list_schema(point, 1, 20),
+        keeps_heading={"type": "boolean"},
+    )
+    motion = _object_schema(
+        start={"anyOf": start},
+        path={"anyOf": [*([along] if lanes else []), over, _NULL]},
+        speeds=_list_schema(point, 0, 20),
+    )
+    numbers = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
+    body = dict.fromkeys(numbers, number) | {
+        "lane": {"anyOf": [*([of_lane] if lanes else []), _NULL]}
+    }
+    walker = {"type": _one_of([AgentType.PEDESTRIAN])} | body
+    walker["walk_to"] = {"anyOf": [point, _NULL]}
+    mover = {"type": _one_of(_TYPES)} | body | {"motion": {"anyOf": [_NULL, motion]}}
+
+    def agents(**named: _Schema) -> _Schema:
+        kinds = [_object_schema(**named, **fields) for fields in (mover, walker)]
+        return _list_schema({"anyOf": kinds}, 0, MOST_BY_SCHEMA)
+
+    if not others:
+        return _object_schema(add=agents())
+    chosen = _one_of(others)
+    return _object_schema(
+        add=agents(), move=agents(id=chosen), remove=_list_schema(chosen, 0, len(others))
     )
 
 
@@ -322,6 +375,50 @@ def read_intent(answer: str) -> Intent:
 
 
 # Private
+
+
+def _one_of(words: Sequence[str]) -> _Schema:
+    return {"type": "string", "enum": [str(word) for word in words]}
+
+
+def _list_schema(items: _Schema, least: int, most: int) -> _Schema:
+    return {"type": "array", "items": items, "minItems": least, "maxItems": most}
+
+
+def _object_schema(**fields: _Schema) -> _Schema:
+    return {
+        "type": "object",
+        "properties": fields,
+        "required": [*fields],
+        "additionalProperties": False,
+    }
+
+
+def _find_problems(block: _Block, names: vectors.ShortNames, radius_m: float) -> list[str]:
+    problems = []
+    for agent in [*block.add, *block.move]:
+        ends = (agent.x_m, agent.y_m, *(agent.walk_to or ()))
+        far_m = 2.0 * radius_m  # who moves may leave what is shown
+        if max(map(abs, ends)) > radius_m:
+            problems.append(f"{agent.id}: x and y must lie between -{radius_m:g} and {radius_m:g}")
+        if any(abs(value) > far_m for point in agent.path_m for value in point):
+            problems.append(f"{agent.id}: points_m must lie between -{far_m:g} and {far_m:g}")
+        if agent.lane is not None and agent.lane not in names.lane_ids:
+            problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
+        if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
+            problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
+        if agent.walk_to is not None and agent.motion is not None:
+            problems.append(f"{agent.id}: it has walk_to or a motion, not both")
+    return problems
+
+
+def _number_added(document: dict[str, object], names: vectors.ShortNames) -> None:
+    """Give added agents without an id those from the first new one on."""
+    added = document.get("add")
+    first = int(names.next_agent.removeprefix("Agent"))
+    for number, agent in enumerate(added if isinstance(added, list) else [], start=first):
+        if isinstance(agent, dict):
+            agent.setdefault("id", f"Agent{number}")
 
 
 def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Modification:

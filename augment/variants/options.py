@@ -13,7 +13,7 @@ from augment.errors import InvalidDocument
 from augment.prompts.calls import Tools
 from augment.variants.recipes import Recipe
 from augment.variants.respondents import Sampling
-from augment.variants.reviews import Limits
+from augment.variants.reviews import BlockForm, Limits
 
 EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
 """What endpoints call how long a model thinks; not every one takes each."""
@@ -106,6 +106,11 @@ RULES = {
         *("pictures {} px", "{}px", int, 300, 2400),
         without="shows no picture",
     ),
+    "block": Rule(
+        "Block: within the answer, or by a schema in a call of its own",
+        *("block by {}", "{}-block", BlockForm),
+        choices=tuple(BlockForm),
+    ),
 }
 NAMES = tuple(RULES)
 _DEFAULTS: dict[str, Any] = {**asdict(Limits()), "protocol": ToolProtocol.PROMPT}
@@ -125,6 +130,7 @@ class ContestantOptions:
         radius_m: How far around the ego the scene is written down.
         prompt_version: Of the texts that the prompts are made from.
         picture_px: The width of the picture that a viewer is shown.
+        block: How the modifier writes its block.
 
     Raises:
         InvalidDocument: A value is out of its range.
@@ -140,6 +146,7 @@ class ContestantOptions:
     radius_m: float | None = None
     prompt_version: str | None = None
     picture_px: int | None = None
+    block: BlockForm | None = None
 
     def __post_init__(self) -> None:
         problems = []
@@ -248,5 +255,5 @@ def complete_options(
 def recipe_with(recipe: Recipe, options: ContestantOptions) -> Recipe:
     """Return the recipe within the limits of these options."""
     known = asdict(recipe.limits)
-    chosen = {name: value for name, value in options.to_document().items() if name in known}
+    chosen = {name: getattr(options, name) for name in options.to_document() if name in known}
     return replace(recipe, limits=replace(recipe.limits, **chosen))

@@ -22,10 +22,10 @@ from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.llm.client import ChatClient, Patience
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
-from augment.prompts.blocks import names_changes
+from augment.prompts.blocks import names_changes, refuses
 from augment.prompts.calls import Tools, WrittenCall, call_form, calls_in, read_arguments
 from augment.prompts.fill import Form, Messages
-from augment.prompts.reply import ReadReply, read_intent, read_reply
+from augment.prompts.reply import ReadReply, block_schema, read_intent, read_reply
 from augment.prompts.vectors import changes_text
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
@@ -40,7 +40,7 @@ from augment.variants.respondents import (
     Transcript,
 )
 from augment.variants.retrieval import RetrievalTool
-from augment.variants.reviews import Limits, ReviewedAnswer, Verdict
+from augment.variants.reviews import BlockForm, Limits, ReviewedAnswer, Verdict
 
 LEFT_ALONE = "The modifier left the scene as it is and did not say why."
 READER_TOKENS = 4096
@@ -255,13 +255,21 @@ class _Work:
         reply = None
         if form.tools is not Tools.NONE:
             messages, reply = self._ask_with_tool(messages, form)
+        scene, radius_m = self.task.scene, self.recipe.limits.radius_m
+        schema, sections = None, ""
+        if self.recipe.limits.block is BlockForm.SCHEMA:
+            reply = reply or self.respondents.ask(ModelRole.MODIFIER, messages)
+            if not refuses(reply.text):
+                messages, sections = fill.block_messages(messages, reply.text), reply.text
+                schema, reply = block_schema(scene, radius_m=radius_m), None
         read, asked, answer = self.respondents.read(
             ModelRole.MODIFIER,
             messages,
-            partial(read_reply, scene=self.task.scene, radius_m=self.recipe.limits.radius_m),
+            partial(read_reply, scene=scene, radius_m=radius_m, sections=sections),
             again=fill.re_ask_messages,
             tools=fill.list_native_tools(form),
             reply=reply,
+            schema=schema,
         )
         return read, (*asked, fill.model_message(answer.text))
 

@@ -133,6 +133,7 @@ class Respondents:
         again: Callable[[Messages, str, list[str]], Messages] = review_re_ask_messages,
         tools: tuple[Tool, ...] = (),
         reply: Reply | None = None,
+        schema: Mapping[str, object] | None = None,
     ) -> tuple[_Read, Messages, Reply]:
         """Ask until the answer can be read.
 
@@ -144,6 +145,7 @@ class Respondents:
                 and what is wrong with it.
             tools: Named where the conversation holds calls; none can be called any more.
             reply: The first answer, where it is there already.
+            schema: What every answer has to obey.
 
         Returns:
             What was read, the conversation that led to the answer, and the answer.
@@ -153,7 +155,7 @@ class Respondents:
             ModelRefused: The model declined, or its endpoint's filter did.
             ModelFault: The wire broke for good.
         """
-        ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE)
+        ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE, schema=schema)
         max_tokens, asked = self.max_tokens, 0
         reply, has_declined = reply or ask(messages), True
         while True:
@@ -185,6 +187,7 @@ class Respondents:
         max_tokens: int | None = None,
         tools: tuple[Tool, ...] = (),
         tool_choice: ToolChoice = ToolChoice.AUTO,
+        schema: Mapping[str, object] | None = None,
     ) -> Reply:
         """Return the reply of whoever plays the role.
 
@@ -199,6 +202,7 @@ class Respondents:
             max_tokens=max_tokens or self.max_tokens,
             tools=tools,
             tool_choice=tool_choice,
+            schema=schema,
             **asdict(self.sampling),
         )
         reply = self.send(role, request, prompt_version())

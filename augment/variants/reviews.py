@@ -9,6 +9,7 @@ an intent they are held against it as well.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import partial
 
 from augment.checks import Ground, Severity
@@ -25,9 +26,16 @@ from augment.scene.intent import Intent
 from augment.variants.respondents import ModelRole, Respondents
 
 
+class BlockForm(StrEnum):
+    """Way to the block of a modifier: within its answer, or by a schema in a call of its own."""
+
+    TEXT = "text"
+    SCHEMA = "schema"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of one run of a recipe.
+    """Limits of one run of a recipe, and how its modifier writes its block.
 
     Attributes:
         radius_m: How far around the ego the scene is written down.
@@ -39,6 +47,7 @@ class Limits:
         identical_calls: Of these with the very same arguments.
         accepted_from: The mean rating from which a text review is content.
         picture_px: The width of the picture that a viewer is shown.
+        block: How the modifier writes its block.
     """
 
     radius_m: float = DEFAULT_RADIUS_M
@@ -49,6 +58,7 @@ class Limits:
     identical_calls: int = 3
     accepted_from: float = 4.0
     picture_px: int = WIDTH_PX
+    block: BlockForm = BlockForm.TEXT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

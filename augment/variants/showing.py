@@ -17,7 +17,7 @@ from augment.scene.entities import Modification, Scene
 from augment.variants.pipeline import modifier_form
 from augment.variants.recipes import Recipe
 from augment.variants.respondents import ModelRole
-from augment.variants.reviews import pictures
+from augment.variants.reviews import BlockForm, pictures
 
 CHARACTERS_PER_TOKEN = 2.6
 """Measured on number-heavy text over common vocabularies: an estimate, no bound."""
@@ -104,8 +104,10 @@ def call_ranges(recipe: Recipe) -> dict[ModelRole, CallRange]:
     again = 1 + limits.re_asks
     has_tool = recipe.tools is not Tools.NONE
     # The answer with the first call too many, and the one that it is asked for.
-    a_round = again + (limits.calls + 1 if has_tool else 0)
-    calls = {ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round)}
+    by_schema = limits.block is BlockForm.SCHEMA
+    a_round = again + (limits.calls + 1 if has_tool else 0) + by_schema
+    usual = 1 + has_tool + by_schema
+    calls = {ModelRole.MODIFIER: CallRange(least=1, usual=usual, most=rounds * a_round)}
     for role, asked in Counter(recipe.review.asks if recipe.review else ()).items():
         calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
     return calls

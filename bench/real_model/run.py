@@ -1,4 +1,6 @@
-"""Run four variants over ten scenarios with a real, tiny language model on this computer.
+"""Run four variants over ten scenarios, each with its block in the text and by a schema.
+
+A real, tiny language model answers on this computer.
 
     make real-model     (or: python -m bench.real_model.run [--write])
 
@@ -19,6 +21,7 @@ import venv
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import product
 from pathlib import Path
 from statistics import median
 from urllib.error import URLError
@@ -30,9 +33,11 @@ from tests.stack import free_port
 
 HEADING = "A real language model, from the endpoint to the table"
 VARIANTS = ("otm", "fc", "tqa", "fc+geo")
+BLOCKS = ("text", "schema")
+CONTESTANTS = tuple(product(BLOCKS, VARIANTS))
 PER_TYPE = 2
 CONTEXT_TOKENS = 8192
-MOST_TOKENS = 512
+MOST_TOKENS = 768
 """Of an answer; a model of this size often repeats itself until it is cut off."""
 LONGEST_CALL_S = 600
 # Instructions of this processor alone (AMX) have crashed llama.cpp in a virtual machine.
@@ -111,10 +116,10 @@ def answers(address: str) -> bool:
 def prepare(installation: Machine, base_url: str) -> str:
     """Load the catalogue, add the contestants and return what the probe printed."""
     installation.must("load_catalogue")
-    for number, variant in enumerate(VARIANTS):
+    for number, (block, variant) in enumerate(CONTESTANTS):
         address = () if number else ("--base-url", base_url)
         installation.must(
-            *("add_contestant", slug_of(variant), "--variant", variant),
+            *("add_contestant", slug_of(block, variant), "--variant", variant, "--block", block),
             *("--endpoint", "llama-cpp", "--model", "smollm2-135m", *address),
             *("--max-output", str(MOST_TOKENS), "--temperature", "0"),
         )
@@ -131,9 +136,9 @@ def run(installation: Machine) -> None:
         f"FROM augment_scenario WHERE reference IS NOT NULL) WHERE n <= {PER_TYPE}"
     )
     ended = installation.manage(
-        *("generate", "--name", JOB, "--contestants", *map(slug_of, VARIANTS)),
-        *("--scenarios", *(slug for (slug,) in rows), "--wait", "--timeout", "14400"),
-        within_s=14500,
+        *("generate", "--name", JOB, "--contestants", *(slug_of(*one) for one in CONTESTANTS)),
+        *("--scenarios", *(slug for (slug,) in rows), "--wait", "--timeout", "28800"),
+        within_s=28900,
     )
     print(ended.stdout, ended.stderr, file=sys.stderr)
 
@@ -142,8 +147,8 @@ def report(installation: Machine, before: str) -> str:
     """Return the table of outcomes and, below it, why rows are not done."""
     displacement = displacements(installation)
     lines = []
-    for variant in VARIANTS:
-        slug = slug_of(variant)
+    for block, variant in CONTESTANTS:
+        slug = slug_of(block, variant)
         states = Counter(
             state
             for (state,) in installation.rows(
@@ -160,7 +165,7 @@ def report(installation: Machine, before: str) -> str:
         )
         lines.append(
             [
-                variant,
+                f"{variant}, by schema" if block == "schema" else variant,
                 *(str(states[state]) for state in ("done", "unreadable", "refused", "failed")),
                 displacement.get(slug, "–"),
                 str(len(calls)),
@@ -202,9 +207,9 @@ def reasons(installation: Machine) -> list[str]:
     return [f"* {count} x {reason}" for reason, count in counts.most_common()]
 
 
-def slug_of(variant: str) -> str:
+def slug_of(block: str, variant: str) -> str:
     """Return the slug of the contestant that runs a variant."""
-    return f"smol-{variant.replace('+', '-')}"
+    return f"smol-{block}-{variant.replace('+', '-')}"
 
 
 # --- Private -----------------------------------------------------------------------------------

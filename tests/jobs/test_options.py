@@ -100,6 +100,13 @@ TABLE: list[tuple[str, str, object, Callable[[Bodies], bool], Callable[[Bodies],
         lambda bodies: png_widths(bodies) == [600, 600],
         lambda bodies: png_widths(bodies) == [1200],
     ),
+    (
+        "block",
+        "otm",
+        "schema",
+        lambda bodies: ["response_format" in body for body in bodies] == [False, True],
+        lambda bodies: ["response_format" in body for body in bodies] == [False],
+    ),
 ]
 
 

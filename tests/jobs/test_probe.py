@@ -1,5 +1,6 @@
 """The probe, over the real wire, at servers that can do more or less."""
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -8,17 +9,18 @@ import pytest
 
 from arena.contestants.queries import probe_lines
 from augment.llm.costs import least_tokens
-from augment.llm.messages import LengthName
+from augment.llm.messages import LengthName, SchemaForm
 from augment.llm.questions import MARKER, Ability
-from augment.models import CallLease, Endpoint, EndpointModel, Event
+from augment.models import CallLease, Contestant, Endpoint, EndpointModel, Event
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import ProbeReport, probe
+from augment.services.running.choosing import find_obstacle
 from tests.jobs.rows import add_model
 from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 EVERYTHING = frozenset(
-    {*("temperature", "tools", "images", "window", "usage", "seed"), *LengthName}
+    {*("temperature", "tools", "images", "window", "usage", "seed"), *LengthName, *SchemaForm}
 )
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
@@ -31,11 +33,9 @@ class Candidate(JsonServer):
         self.can, self.status = can, status
 
     def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        if self.status != 200:
-            return self.status, _error(f"wrong key {KEY}", None)
-        for name in ("temperature", "seed", "tools"):
-            if name in body and name not in self.can:
-                return 400, _error(f"Unsupported: {name}", name)
+        refused = self._refused(body)
+        if refused is not None:
+            return refused
         content = body["messages"][0]["content"]
         if not isinstance(content, str) and "images" not in self.can:
             if "a bad day" in self.can:
@@ -58,11 +58,24 @@ class Candidate(JsonServer):
             made["usage"] = {"prompt_tokens": prompt_tokens, "completion_tokens": written}
         return 200, made
 
+    def _refused(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]] | None:
+        if self.status != 200:
+            return self.status, _error(f"wrong key {KEY}", None)
+        form = body.get("response_format", {}).get("type")
+        for name in ("temperature", "seed", "tools"):
+            if name in body and name not in self.can:
+                return 400, _error(f"Unsupported: {name}", name)
+        if form and self.can.isdisjoint({form, "ignores"}):
+            return 500, _error("validation error: ('body', 'response_format', 'type')", None)
+        return None
+
     def _said(self, body: dict[str, Any], content: Any) -> str | None:
         if not isinstance(content, str):
             return "Green, then yellow."
         if "tools" in body:
             return None
+        if body.get("response_format", {}).get("type") in self.can:
+            return json.dumps({"plate": MARKER, "doors": 4})
         if MARKER in content:
             return MARKER if "window" in self.can else "I was told no word."
         return "Ready, steady."
@@ -92,16 +105,16 @@ def test_a_server_that_can_do_everything() -> None:
     with candidate():
         report = asked()
     assert {made.ability: made.has_it for made in report.findings} == dict.fromkeys(Ability, True)
-    assert (report.calls, report.refused) == (6, [])
+    assert (report.calls, report.refused) == (7, [])
     assert {made.model_returned for made in report.findings} == {"m-2026"}
     known = row()
     abilities = (known.native_tools, known.vision, known.temperature)
     assert abilities == (True, True, True)
     assert known.probed_at == report.probed_at
     assert known.probe_report is not None
-    assert len(known.probe_report["findings"]) == 6
+    assert len(known.probe_report["findings"]) == 7
     assert Event.objects.get(verb="probe").object_code == str(known.code)
-    assert CallLease.objects.filter(finished_at__isnull=False).count() == 6
+    assert CallLease.objects.filter(finished_at__isnull=False).count() == 7
 
 
 @pytest.mark.parametrize(
@@ -125,7 +138,27 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
         report = asked()
     assert report.has(Ability.ANSWER_LIMIT) is True
     assert report.refused == row().refused_parameters == ["max_completion_tokens"]
-    assert report.calls == 7
+    assert report.calls == 8
+
+
+@pytest.mark.parametrize(
+    ("can", "has_it", "refused"),
+    [
+        ({SchemaForm.JSON_OBJECT}, True, ["json_schema"]),
+        ({SchemaForm.JSON_OBJECT, "ignores"}, True, ["json_schema"]),
+        (set[str](), False, ["json_object", "json_schema"]),
+        ({"ignores"}, False, ["json_object", "json_schema"]),
+    ],
+)
+def test_a_schema_is_asked_for_in_the_form_that_the_answer_obeys(
+    can: set[str], has_it: bool, refused: list[str]
+) -> None:
+    with candidate(EVERYTHING - {*SchemaForm} | can):
+        report = asked()
+        add_model("small", endpoint=Endpoint.objects.get(), model="m", options={"block": "schema"})
+    assert (report.has(Ability.SCHEMA), row().refused_parameters) == (has_it, refused)
+    obstacle = find_obstacle(Contestant.objects.get(slug="small"))
+    assert ("keeps to none" in obstacle) is not has_it
 
 
 class Particular(Candidate):

@@ -1,23 +1,29 @@
 import json
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from augment.errors import ReplyUnreadable
+from augment.metrics.displacement import displacement
 from augment.prompts.reply import (
+    block_schema,
     read_questions,
     read_ratings,
     read_reply,
     read_sight,
     read_verdict,
 )
+from augment.prompts.vectors import short_names, with_short_ids
 from augment.scene.entities import AgentType, TrafficAgent
+from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import scene, vehicle
 from tests.variants.playing import GOOD, agent, block, rating
 
+NUMBERS = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
 PARKED = TrafficAgent(
     id="Agent2",
     type=AgentType.VEHICLE,
@@ -288,3 +294,34 @@ def test_a_viewers_lines_are_read_by_their_numbers(said: str, read: dict[int, st
 def test_a_good_answer_of_another_kind_is_none(reader: Callable[[str], object]) -> None:
     with pytest.raises(ReplyUnreadable):
         reader(json.dumps({"add": [], "move": [], "remove": []}))
+
+
+@pytest.mark.parametrize("slug", [*SLUGS[::10], *HARD_SLUGS[::10], *MOVING_SLUGS[::3]])
+def test_references_can_be_written_by_the_schema(slug: str) -> None:
+    shown, wanted = shown_scene(slug), entry(slug).reference
+    names = short_names(shown)
+    short = with_short_ids(wanted, names)
+
+    def fields(one: TrafficAgent, *, is_new: bool) -> dict[str, object]:
+        written = {name: getattr(one, name) for name in NUMBERS}
+        written |= {"type": one.type.value, "lane": one.lane_id}
+        if one.walk_to_m is not None:
+            written["walk_to"] = list(one.walk_to_m)
+        else:
+            written["motion"] = asdict(one.motion) if one.motion else None
+        return written if is_new else {"id": one.id} | written
+
+    document = {
+        "add": [fields(one, is_new=True) for one in short.added],
+        "move": [fields(one, is_new=False) for one in short.moved],
+        "remove": list(short.removed),
+    }
+    schema = block_schema(shown, radius_m=80.0)
+    Draft202012Validator.check_schema(schema)
+    required = schema["required"]
+    assert isinstance(required, list)
+    filled = json.loads(json.dumps({name: document[name] for name in required}))
+    problems = [error.message for error in Draft202012Validator(schema).iter_errors(filled)]
+    assert problems == []
+    read = read_reply(json.dumps(filled), shown, sections="Insights: It can.")
+    assert displacement(read.modification, wanted).missing == ()

@@ -3,6 +3,7 @@
 import json
 import random
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from augment.errors import ModelFault
 from augment.llm.client import Patience
@@ -12,6 +13,7 @@ from augment.scene.intent import Intent
 from augment.variants.pipeline import EditTask, Outcome, run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
+from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
@@ -70,11 +72,13 @@ class Play:
         native: bool = False,
         others: Mapping[ModelRole, RespondentClient] | None = None,
         intent: Intent | None = None,
+        block: BlockForm = BlockForm.TEXT,
     ) -> None:
         self.client = ScriptedClient(script)
         self.transcript = MemoryTranscript()
+        recipe = find_recipe(variant)
         self.outcome: Outcome = run(
-            find_recipe(variant),
+            replace(recipe, limits=replace(recipe.limits, block=block)),
             EditTask(scene=shown or scene(), instruction=WISH, intent=intent),
             modifier=RespondentClient(client=self.client, model="m", native_tools=native),
             transcript=self.transcript,

@@ -6,10 +6,11 @@ from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import EditTask, OutcomeStatus, run
 from augment.variants.recipes import OTM
 from augment.variants.respondents import RespondentClient
+from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
-from tests.variants.playing import GOOD, Play, agent, answer, block, native
+from tests.variants.playing import GOOD, Play, agent, answer, block, call, native
 
 
 def test_one_good_answer_is_one_call_and_a_modification() -> None:
@@ -114,3 +115,22 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
             transcript=Stops(),
         )
     assert len(client.requests) == 1
+
+
+def test_a_block_by_schema_is_one_more_call_after_the_sections() -> None:
+    sections = GOOD.partition("Modified Vectors")[0]
+    by_schema = block(*(agent(id=..., x_m=x_m, motion=None) for x_m in (20.0, 30.0)))
+    made = Play("otm", [sections, by_schema], block=BlockForm.SCHEMA)
+    first, second = made.client.requests
+    assert (first.schema, second.messages[2].text) == (None, sections)
+    assert second.to_document()["response_format"] == {
+        "type": "json_schema",
+        "json_schema": {"name": "block", "strict": True, "schema": second.schema},
+    }
+    assert made.outcome.modification is not None
+    assert [one.id for one in made.outcome.modification.added] == ["Agent2", "Agent3"]
+    assert made.outcome.notes.startswith("One road, two lanes.")
+    refused = Play("otm", ["I can't do that."], block=BlockForm.SCHEMA)
+    assert (refused.outcome.status, refused.roles) == (OutcomeStatus.REFUSED, "m")
+    ignored = Play("fc", [call(), GOOD, "Here it is."], block=BlockForm.SCHEMA)
+    assert (ignored.outcome.status, ignored.x_m) == (OutcomeStatus.DONE, 21.4)

@@ -17,7 +17,7 @@ from django.utils import timezone
 from augment.errors import Conflict, ModelFault, ParameterRefused
 from augment.llm.client import ChatClient, ModelProfile
 from augment.llm.costs import find_cut, to_usd
-from augment.llm.messages import LengthName, Reply, Request, shorten
+from augment.llm.messages import LengthName, Reply, Request, SchemaForm, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
@@ -187,7 +187,9 @@ class _Prober:
         except ModelFault as fault:
             # A value that is not taken says nothing of others.
             is_other = ability in (Ability.ANSWERS, Ability.TEMPERATURE)
+            lacks_schema = self.profile.refused.issuperset(SchemaForm)
             refuses = fault.status in _REFUSALS and not is_other
+            refuses |= ability == Ability.SCHEMA and lacks_schema
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = find_cut(request, reply, context_tokens=self._row.context_tokens)
@@ -197,6 +199,11 @@ class _Prober:
             renamed = self.profile.without(request.length_name)
             if not renamed.refused.issuperset(LengthName):
                 self.profile = renamed
+                return replace(self.ask(question), cost_usd=None)
+        if ability == Ability.SCHEMA and is_good is False:
+            # Others answer 200 and ignore it.
+            self.profile = self.profile.without(request.schema_form)
+            if not self.profile.refused.issuperset(SchemaForm):
                 return replace(self.ask(question), cost_usd=None)
         calls = ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
         said = str(cut) if cut else reply.text or reply.refusal or calls

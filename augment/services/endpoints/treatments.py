@@ -16,7 +16,7 @@ from django.db.models import Exists, OuterRef
 
 from augment.errors import Conflict, InvalidDocument, ModelFault, ParameterRefused
 from augment.llm.client import ModelProfile
-from augment.llm.messages import LengthName
+from augment.llm.messages import LengthName, SchemaForm
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints.known_models import find_price, read_facts, read_profile
@@ -258,8 +258,8 @@ def _complete_options(contestant: Contestant) -> ContestantOptions:
 
 
 def _profile_document(profile: ModelProfile) -> dict[str, Any]:
-    """Return the part of a profile that changes requests; no variant sends a schema."""
-    sent = SAMPLING | frozenset(LengthName)
+    """Return the part of a profile that changes requests."""
+    sent = SAMPLING | frozenset(LengthName) | frozenset(SchemaForm)
     return asdict(profile) | {"refused": sorted(profile.refused & sent)}
 
 

@@ -8,13 +8,20 @@ from django.db.models import Q
 
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName, check_names
+from augment.llm.messages import SchemaForm
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.benchmarks.submissions import refuse_unanswered
 from augment.services.endpoints.known_endpoints import find_key_obstacle
-from augment.services.endpoints.treatments import other_prompts, read_options, read_respondents
+from augment.services.endpoints.treatments import (
+    Respondent,
+    other_prompts,
+    read_options,
+    read_respondents,
+)
 from augment.services.scenarios.choosing import ALL
-from augment.variants.options import ToolProtocol
+from augment.variants.options import ContestantOptions, ToolProtocol
 from augment.variants.respondents import ModelRole
+from augment.variants.reviews import BlockForm
 
 Kind = Contestant.Kind
 
@@ -47,13 +54,8 @@ def find_obstacle(contestant: Contestant) -> str:
         if obstacle := find_key_obstacle(endpoint.key_variable, endpoint.base_url):
             return obstacle
     modifier, viewer = respondents[ModelRole.MODIFIER], respondents.get(ModelRole.VIEWER)
-    is_open = contestant.frozen_options is None
-    if (
-        is_open
-        and options.protocol is ToolProtocol.NATIVE
-        and modifier.facts.native_tools is False
-    ):
-        return f"it is to call its function natively, and {modifier} has no native calls"
+    if contestant.frozen_options is None and (obstacle := _find_lack(options, modifier)):
+        return obstacle
     # Two calls of every augmentation would be paid for before a blind viewer fails.
     sees = viewer is None or viewer.facts.vision
     if sees is None:
@@ -131,3 +133,13 @@ def find_job(name_or_code: str) -> GenerationJob:
         codes = ", ".join(str(job.code) for job in jobs)
         raise Conflict(f"{len(jobs)} jobs are called {name_or_code!r}; name one code: {codes}.")
     return jobs[0]
+
+
+def _find_lack(options: ContestantOptions, modifier: Respondent) -> str:
+    """Return what of a modifier's options its model is known not to do; empty for nothing."""
+    facts = modifier.facts
+    if options.protocol is ToolProtocol.NATIVE and facts.native_tools is False:
+        return f"it is to call its function natively, and {modifier} has no native calls"
+    if options.block is BlockForm.SCHEMA and {*SchemaForm} <= {*facts.refused_parameters}:
+        return f"it is to write its block by a schema, and {modifier} keeps to none"
+    return ""
