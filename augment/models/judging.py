@@ -21,6 +21,9 @@ class JudgeRun(CappedWork):
     endpoint = models.ForeignKey(Endpoint, on_delete=models.PROTECT, related_name="judge_runs")
     model = models.CharField(max_length=120, help_text="the model id on the endpoint")
     question = models.CharField(max_length=20, default="instruction", help_text="what is asked")
+    frames = models.PositiveSmallIntegerField(
+        default=0, help_text="moments of what moves that are shown beside each picture"
+    )
     state = models.CharField(max_length=20, choices=State.choices, default=State.RUNNING)
     asked_by = account_column()
 

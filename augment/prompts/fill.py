@@ -35,6 +35,8 @@ VECTORS_VERSION = 5
 """Raised with every change to what of a scene is written down, or how: no text shows that."""
 
 Messages = tuple[Message, ...]
+Shown = tuple[bytes, ...]
+"""What a judge sees of one side (PNG): the still, and of what moves a sheet of frames."""
 
 
 class JudgeQuestion(StrEnum):
@@ -245,11 +247,16 @@ def reader_messages(instruction: str) -> Messages:
 
 
 def judge_messages(
-    question: JudgeQuestion, instruction: str, pictures: tuple[bytes, bytes]
+    question: JudgeQuestion, instruction: str, pictures: tuple[Shown, Shown]
 ) -> Messages:
-    """Ask a judge which of two pictures (PNG, A first) is better; nothing says who made them."""
+    """Ask a judge which of two pictures (A first) is better; nothing says who made them."""
     system = fill_text("judge.md", question=read_text(f"judge_{question}.md"))
-    return _opening(system, fill_text("judge_task.md", quoted=quote(instruction)), pictures)
+    task = fill_text("judge_task.md", quoted=quote(instruction))
+    images = [(name, png) for name, shown in zip("AB", pictures, strict=True) for png in shown]
+    if len(images) > len(pictures):
+        names = [f"{n}. picture {name}" for n, (name, _) in enumerate(images, start=1)]
+        task += "\n\n" + fill_text("judge_frames.md", images="\n".join(names))
+    return _opening(system, task, tuple(png for _, png in images))
 
 
 # Private

@@ -244,7 +244,7 @@ def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
     )
     over = _object_schema(
         kind=_one_of(["points"]),
-        points_m=_list_schema(point, 1, 20),
+        points_m=_list_schema(point, 1, 40),
         keeps_heading={"type": "boolean"},
     )
     motion = _object_schema(

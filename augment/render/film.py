@@ -11,12 +11,14 @@ each [mark, first step, last step, values]: x and y in tenths of a pixel and the
 clockwise, at the first step, then, of who moves, what is added at each.
 """
 
+import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
@@ -33,6 +35,11 @@ STEPS = round(HORIZON_S / STEP_S) + 1
 _FINE = 10.0
 """Parts of a pixel."""
 _MARGIN_M = 3.0
+_FRAME_COLOURS = 64
+
+FRAMES_S = (1.5, 3.0, 4.5, 6.0)
+"""Moments after t0 of `draw_frames`."""
+_TEXT_PX = 28
 
 Entry = list[Any]
 
@@ -89,7 +96,56 @@ def make_film(
     return json.dumps(document, separators=(",", ":")).encode()
 
 
+def draw_frames(film: Mapping[str, Any], ground: bytes) -> bytes:
+    """Return a PNG with four moments of a film, two by two, each with its time.
+
+    Args:
+        film: What `make_film` wrote.
+        ground: The picture (PNG) that it plays over.
+    """
+    empty = Image.open(io.BytesIO(ground)).convert("RGB")
+    width, height = film["width"], film["height"]
+    scale = empty.width / width
+    sheet = Image.new("RGB", (2 * width, 2 * height))
+    for number, time_s in enumerate(FRAMES_S):
+        frame, step = empty.copy(), round(time_s / film["step_s"])
+        pen = ImageDraw.Draw(frame)
+        for mark, first, last, values in film["movers"]:
+            if first <= step <= last:
+                # Values (T, 3): the pose at the first step, then what is added at each.
+                poses = np.cumsum(np.reshape(values, (-1, 3)), axis=0)
+                pose = poses[min(step - first, len(poses) - 1)]
+                _paint_mark(pen, film["marks"][mark], pose, scale)
+        pen.text((20, 20), f"after {time_s:g} s", fill=0, font_size=_TEXT_PX * scale)
+        corner = (number % 2 * width, number // 2 * height)
+        sheet.paste(frame.resize((width, height)), corner)
+    png = io.BytesIO()
+    sheet.quantize(_FRAME_COLOURS).save(png, "PNG")
+    return png.getvalue()
+
+
 # Private
+
+
+def _paint_mark(
+    pen: ImageDraw.ImageDraw, shapes: list[dict[str, Any]], pose: FloatArray, scale: float
+) -> None:
+    """Paint a mark at a pose: x and y in tenths of a pixel, the turn in degrees, clockwise."""
+    turn_rad, size = np.radians(pose[2]), scale / _FINE
+    # y runs down, so this matrix turns clockwise.
+    turn = np.array([[np.cos(turn_rad), -np.sin(turn_rad)], [np.sin(turn_rad), np.cos(turn_rad)]])
+    for shape in shapes:
+        if "disc" in shape:
+            x, y, radius = shape["disc"]
+            middle = (turn @ (x, y) + pose[:2]) * size
+            pen.circle(tuple(middle.tolist()), radius * size, fill=shape["fill"])
+            continue
+        points = (np.reshape(shape["points"], (-1, 2)) @ turn.T + pose[:2]) * size
+        corners = [tuple(point) for point in points.tolist()]
+        if "fill" in shape:
+            pen.polygon(corners, fill=shape["fill"])
+        else:
+            pen.line(corners, fill=shape["stroke"], width=max(1, round(shape["width"] * scale)))
 
 
 class _Sketch(Canvas):

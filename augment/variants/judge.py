@@ -5,7 +5,7 @@ from enum import StrEnum
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, worst_case
 from augment.llm.messages import Request
-from augment.prompts.fill import JudgeQuestion, judge_messages
+from augment.prompts.fill import JudgeQuestion, Shown, judge_messages
 from augment.prompts.reply import JudgeAnswer, read_judge
 from augment.variants.respondents import (
     ModelRole,
@@ -52,13 +52,13 @@ def combine_answers(first: str, second: str) -> int:
 def ask_judge(
     question: JudgeQuestion,
     instruction: str,
-    pictures: tuple[bytes, bytes],
+    pictures: tuple[Shown, Shown],
     *,
     client: ChatClient,
     model: str,
     transcript: Transcript,
 ) -> JudgeAnswer:
-    """Ask once which of two pictures (PNG, A first) is better.
+    """Ask once which of two pictures (A first) is better.
 
     Raises:
         ReplyUnreadable: The answer holds no decision; nobody asks again.
@@ -80,6 +80,6 @@ def ask_judge(
 
 def most_nano_usd(instruction: str, price: Price) -> int:
     """Return the largest cost of one question to a judge, in nano-dollars."""
-    messages = judge_messages(JudgeQuestion.INSTRUCTION, instruction, (b"", b""))
+    messages = judge_messages(JudgeQuestion.INSTRUCTION, instruction, ((b"", b""), (b"", b"")))
     request = Request(model="", messages=messages, max_tokens=JUDGE_TOKENS)
     return worst_case(request).nano_usd(price) or 0

@@ -1,13 +1,16 @@
 """Models that judge pairs: asked over the wire in both orders, blind, within caps, paid once."""
 
 import base64
+import io
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from decimal import Decimal
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from augment.errors import Conflict
 from augment.fake_llm.server import running
@@ -23,7 +26,7 @@ from augment.services.running.judge_runs import (
     estimate_judge,
     plan_judge,
 )
-from augment.services.scenarios.pictures import store
+from augment.services.scenarios.pictures import film_name, store, store_as
 from augment.variants.judge import Exchange, combine_answers, exchange
 from tests import study_rows
 from tests.jobs.scripted import Scripted
@@ -91,6 +94,45 @@ def test_both_orders_are_asked_blind_and_each_call_is_kept_raw() -> None:
     assert [call.answer for call in row.calls.order_by("number")] == [says("A"), says("B")]
     assert (run.state, run.spent_calls, run.reserved_calls) == (Run.FINISHED, 2, 0)
     assert run.spent_usd == Decimal("0.00204")
+
+
+def test_of_what_moves_four_frames_are_shown_beside_the_still() -> None:
+    mark = [{"fill": "#2060c0", "points": [-200, -100, 200, -100, 200, 100, -200, 100]}]
+    # From (300, 200) on, 2 px to the right each step; at 6 s it is turned by 90 degrees.
+    moves = [3000, 2000, 0, *[20, 0, 0] * 59, 20, 0, 90]
+    film = {"window": "w", "step_s": 0.1, "steps": 61, "width": 600, "height": 400}
+    film |= {
+        "ground": store(png(3, width=1200, height=800)),
+        "marks": [mark],
+        "movers": [[0, 0, 60, moves]],
+    }
+    picture = f"augmentations/w-film/{'a' * 64}.png"
+    store_as(picture, PICTURES[0])
+    store_as(film_name(picture), json.dumps(film).encode())
+    with judge(says("A"), says("B"), *[says("A")] * 2) as (server, run):
+        PairJudgement.objects.update(left_image=picture)
+        work(run)
+        PairJudgement.objects.all().delete()
+        JudgeRun.objects.update(frames=0)  # as of runs before there were frames
+        left, right = Augmentation.objects.order_by("pk")
+        PairJudgement.objects.create(
+            run=run, left=left, right=right, left_image=picture, right_image=store(PICTURES[1])
+        )
+        JudgeRun.objects.update(state=Run.RUNNING)
+        work(run)
+    still, sheet, other = images_of(server.bodies[0])
+    assert (still, other) == tuple(PICTURES)
+    assert images_of(server.bodies[1]) == [other, still, sheet]
+    assert images_of(server.bodies[2]) == PICTURES
+    told = server.bodies[0]["messages"][-1]["content"][0]["text"]
+    assert told.endswith("1. picture A\n2. picture A\n3. picture B")
+    shown = Image.open(io.BytesIO(sheet)).convert("RGB")
+    assert shown.size == (1200, 800)
+    blue = np.asarray(shown)[..., 2].astype(int) - np.asarray(shown)[..., 0] > 100
+    for number, (x, wide) in enumerate([(330, 40), (360, 40), (390, 40), (420, 20)]):
+        rows, columns = np.nonzero(blue[number // 2 * 400 :, number % 2 * 600 :][:400, :600])
+        assert (columns.mean(), rows.mean()) == pytest.approx((x, 200), abs=1.0)
+        assert np.ptp(columns) == pytest.approx(wide, abs=2)
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def test_a_judge_is_estimated_started_worked_and_shown(
     admin = signed_in(people()["admin"])
     asked = start(admin, study, "fake-good")
     assert "Calls: 12, each pair in both orders" in asked
-    assert "Cost: at most 1." in asked
+    assert "Cost: at most 2." in asked
     assert not JudgeRun.objects.exists()
     with django_capture_on_commit_callbacks(execute=True):
         assert "is asked about 6 pairs" in start(admin, study, "fake-good", sure="1")

@@ -21,7 +21,8 @@ from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase, to_usd
 from augment.llm.messages import shorten
 from augment.models import JudgeRun, ModelCall, PairJudgement
-from augment.prompts.fill import JudgeQuestion
+from augment.prompts.fill import JudgeQuestion, Shown
+from augment.render.film import FRAMES_S, draw_frames
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_endpoints import find_endpoint
@@ -31,6 +32,7 @@ from augment.services.inputs import InputKind, input_field
 from augment.services.running import budget
 from augment.services.running.budget import Caps, Room
 from augment.services.running.calls import CallTranscript, reason_sentence
+from augment.services.scenarios.pictures import film_document
 from augment.services.texts import make_storable
 from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants.judge import UNREADABLE, ask_judge, most_nano_usd
@@ -136,6 +138,7 @@ def plan_judge(
         endpoint=endpoint,
         model=request.model,
         question=request.question,
+        frames=len(FRAMES_S),
         asked_by=actor,
         **budget.cap_columns(request, unpriced),
     )
@@ -196,7 +199,7 @@ class Judgements(WorkKind[PairJudgement]):
         transcript = JudgeTranscript(held, row)
         queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=transcript.insist)
         endpoint = row.run.endpoint
-        pictures = _read_picture(row.left_image), _read_picture(row.right_image)
+        pictures = _read_shown(row.run, row.left_image), _read_shown(row.run, row.right_image)
         columns: dict[str, str] = {}
         try:
             with self._client or EndpointClient(wire_to(endpoint), endpoint, queue) as client:
@@ -253,6 +256,12 @@ class JudgeTranscript(CallTranscript):
 # --- Private -----------------------------------------------------------------------------------
 
 
+def _read_shown(run: JudgeRun, name: str) -> Shown:
+    """Return a picture, and of what moves the sheet of frames, where the run shows one."""
+    still, film = _read_picture(name), film_document(name) if run.frames else None
+    return (still,) if film is None else (still, draw_frames(film, _read_picture(film["ground"])))
+
+
 def _read_picture(name: str) -> bytes:
     """Return the bytes of a stored picture.
 
@@ -269,7 +278,7 @@ def _read_picture(name: str) -> bytes:
 
 def _ask(
     row: PairJudgement,
-    pictures: tuple[bytes, bytes],
+    pictures: tuple[Shown, Shown],
     client: ChatClient,
     transcript: JudgeTranscript,
 ) -> tuple[str, str]:
