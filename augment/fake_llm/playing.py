@@ -160,13 +160,14 @@ def review_problems(task: Task) -> list[Problem]:
 
 
 def _purpose_problems(task: Task, changed: Sequence[TrafficAgent]) -> list[Problem]:
-    known = {agent.id for agent in task.scene.agents}
+    names = {agent.id for agent in task.scene.agents}
     change = Modification(
-        added=tuple(agent for agent in changed if agent.id not in known),
-        moved=tuple(agent for agent in changed if agent.id in known),
+        added=tuple(agent for agent in changed if agent.id not in names),
+        moved=tuple(agent for agent in changed if agent.id in names),
     )
     findings = check_against_intent(Ground.of(task.scene), change, task.intent)
-    return [_problem(one.sentence(), "Place it otherwise.") for one in findings if one.is_fault]
+    faults = [finding for finding in findings if finding.is_fault]
+    return [_problem(fault.sentence(), "Place it otherwise.") for fault in faults]
 
 
 # --- Answers -----------------------------------------------------------------------------------

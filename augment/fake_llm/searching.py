@@ -45,10 +45,11 @@ def search(
     route, purpose = EgoRoute.of(scene), intent.purpose
     if route is None or purpose is None:
         raise CannotPlace("There is no purpose, or the ego stands on no lane of the map.")
-    ground = Ground.of(scene, lambda: None)
+    ground = Ground.of(scene)
     for change in islice(_draw_changes(route, purpose, rng), MOST_TRIES):
-        faults = [one for one in check_against_intent(ground, change, intent) if one.is_fault]
-        missed = [one for one in faults if one.kind is FindingKind.PURPOSE]
+        findings = check_against_intent(ground, change, intent)
+        faults = [finding for finding in findings if finding.is_fault]
+        missed = [fault for fault in faults if fault.kind is FindingKind.PURPOSE]
         if len(missed) < len(faults) or (missed and not misses):
             continue
         driven = () if missed else find_driven_faults(scene, change, purpose)
@@ -64,16 +65,16 @@ def find_driven_faults(scene: Scene, change: Modification, purpose: Purpose) -> 
     setting, faults = DriveSetting(scene=scene, modification=change), list[Finding]()
     for name in sorted(NAMED):  # IDM first, which is faster
         drive = run(setting, planner_named(name))
-        met = collisions(drive)
-        critical = criticality(drive, met)
-        held = check_drive(
+        hits = collisions(drive)
+        critical = criticality(drive, hits)
+        findings = check_drive(
             purpose,
             name,
             braking_mps2=critical["required_braking_mps2"] or 0.0,
             ttc_s=critical["least_ttc_s"] or math.inf,
-            crashes=bool(met),
+            crashes=bool(hits),
         )
-        faults += [one for one in held if one.is_fault]
+        faults += [finding for finding in findings if finding.is_fault]
         if faults:
             break
     return faults

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import asdict
 from datetime import timedelta
 from io import StringIO
 from pathlib import Path
@@ -13,6 +14,7 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 from pytest_django import Settings
 
+from arena.jobs.exports.tables import augmentation_sheet
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.scene.codec import intent_to_document
@@ -107,14 +109,30 @@ def test_an_open_wish_about_driving_is_held_against_the_drives() -> None:
     Scenario.objects.update(intent=intent, intent_origin=IntentOrigin.ENTERED)
     row = job.augmentations.select_related("scenario__base_scene").get()
     assert not any(one.kind is FindingKind.PURPOSE for one in read_findings([row.pk])[row.pk])
-    driven(job, Options(planner="idm"))
+    drive = {"required_braking_mps2": 9.5, "least_ttc_s": 1.0, "least_distance_m": 2.0}
+    Simulation.objects.create(
+        scenario=row.scenario,
+        augmentation=row,
+        subject=Subject.AUGMENTATION,
+        **asdict(Options(planner="idm")),
+        state=State.DONE,
+        nuplan_score=1.0,
+        interplan_score=1.0,
+        document={"criticality": drive, "collisions": []},
+        trace=b"{}",
+        finished_at=rows.NOON,
+    )
     checked = check_augmentation(row)
     assert checked is not None
     for findings in (read_findings([row.pk])[row.pk], checked.findings):
         words = [one.sentence() for one in findings if one.kind is FindingKind.PURPOSE]
-        assert words[0].startswith("The hardest braking required of idm is ")
-        assert words[0].endswith(" m/s²; 3 to 8 m/s² is asked for.")
+        assert words == [
+            "The hardest braking required of idm is 9.50 m/s²; 3 to 8 m/s² is asked for."
+        ]
     assert of_augmentation(row).why_not is MissingReason.OPEN_WISH
+    sheet = augmentation_sheet(job)
+    assert list(sheet.columns)[-2:] == ["purpose_served", "purpose_measured"]
+    assert [row[-2:] for row in sheet.rows] == [(False, words[0])]
 
 
 def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:

@@ -60,6 +60,12 @@ OVER_TIME: Columns = {
 }
 """Of augmentations, where something moves in one."""
 
+PURPOSE: Columns = {
+    "purpose_served": ("serves", Dtype.YES_NO),
+    "purpose_measured": ("purpose_words", Dtype.TEXT),
+}
+"""Of augmentations, where a wish is open; what only drives tell is empty before the first."""
+
 REPEATS: Columns = {
     **Dtype.TEXT.columns("contestant", "name"),
     **Dtype.YES_NO.columns("simulated"),
@@ -109,6 +115,8 @@ def augmentation_sheet(job: GenerationJob) -> Sheet:
     if any(line.displacement and line.displacement.over_time for line in lines):
         columns = {**columns, **OVER_TIME}
     columns = {**columns, "sends": (lambda line: _json(line.row.contestant.sends), Dtype.TEXT)}
+    if any(line.row.scenario.is_open for line in lines):
+        columns = {**columns, **PURPOSE}
     return make_sheet(lines, columns, name=name, key=name)
 
 

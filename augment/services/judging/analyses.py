@@ -13,7 +13,7 @@ from typing import Any
 from django.db.models import Q
 from pydantic import TypeAdapter
 
-from augment.checks import Severity
+from augment.checks import Finding, FindingKind, Severity
 from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
@@ -46,6 +46,7 @@ class AugmentationLine:
         kept: What a follow-up was to leave alone, None without any.
         spending: None where no model was asked.
         wrong, doubtful: Findings of the checks, None where nothing was checked.
+        purpose: Findings on the windows of an open wish.
     """
 
     row: Augmentation
@@ -54,6 +55,17 @@ class AugmentationLine:
     spending: Spending | None
     wrong: int | None = None
     doubtful: int | None = None
+    purpose: tuple[Finding, ...] = ()
+
+    @property
+    def serves(self) -> bool | None:
+        """True if all that is measured of its purpose lies in the windows; None without any."""
+        return not any(one.is_fault for one in self.purpose) if self.purpose else None
+
+    @property
+    def purpose_words(self) -> str | None:
+        """What was measured of its purpose, and what was asked for."""
+        return " ".join(one.sentence() for one in self.purpose) or None
 
 
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
@@ -64,7 +76,8 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
         if line.row.pk in found:
             counts = Counter(finding.severity for finding in found[line.row.pk])
             wrong, doubtful = counts[Severity.WRONG], counts[Severity.DOUBTFUL]
-            line = replace(line, wrong=wrong, doubtful=doubtful)
+            purpose = (one for one in found[line.row.pk] if one.kind is FindingKind.PURPOSE)
+            line = replace(line, wrong=wrong, doubtful=doubtful, purpose=tuple(purpose))
         yield line
 
 

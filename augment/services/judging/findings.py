@@ -84,7 +84,7 @@ def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
 def read_findings(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     """Return the findings about rows that can be checked, those of their drives among them."""
     found, driven = FINDINGS.of(ids), _check_drives(ids)
-    return {pk: _worst_first((*one, *driven.get(pk, ()))) for pk, one in found.items()}
+    return {pk: _worst_first((*own, *driven.get(pk, ()))) for pk, own in found.items()}
 
 
 FINDINGS = Measure("findings", tuple[Finding, ...], _compute)
@@ -159,19 +159,19 @@ def _check_drives(ids: Collection[int]) -> dict[int, list[Finding]]:
     rows = plain.filter(scenario__intent__has_key="purpose").order_by("planner", "version")
     columns = rows.values_list("augmentation", "planner", "document", "scenario__intent")
     newest = {(pk, planner): rest for pk, planner, *rest in columns}
-    found: defaultdict[int, list[Finding]] = defaultdict(list)
+    by_row: defaultdict[int, list[Finding]] = defaultdict(list)
     for (pk, planner), (drive, intent) in newest.items():
         purpose, document = intent_from_document(intent).purpose, drive or {}
         critical = document.get("criticality", {})
         if purpose is not None and "required_braking_mps2" in critical:
-            found[pk] += check_drive(
+            by_row[pk] += check_drive(
                 purpose,
                 planner,
                 braking_mps2=critical["required_braking_mps2"],
                 ttc_s=math.inf if critical["least_ttc_s"] is None else critical["least_ttc_s"],
                 crashes=bool(document["collisions"]),
             )
-    return found
+    return by_row
 
 
 def _worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
