@@ -114,18 +114,15 @@ def check_across(asked: Case) -> Iterator[Finding]:
 def _check_walk_ends(asked: Case, party: Party, request: wish.WalkRequest) -> Iterator[Finding]:
     """The numbers across the way at which walks begin and end, where they are said."""
     for agent in party.agents:
-        here, end = (agent.x_m, agent.y_m), end_of_walk(agent)
-        for lateral, point, part in (
-            (request.spot.lateral, here, "beginning"),
-            (request.end, end, "end"),
+        for lateral, point in (
+            (request.spot.lateral, (agent.x_m, agent.y_m)),
+            (request.end, end_of_walk(agent)),
         ):
-            if lateral is not None and lateral.offset is not None and point is not None:
+            if lateral is not None and point is not None:
                 place = asked.route.locate(*point)
                 band = asked.lanes.band(wish.LaneChoice.OWN, place.ahead_m)
                 if band is not None:
-                    wanted = _bounds(asked, lateral, band, 0.0)
-                    subject = f"the {part} of the walk of {{agents[0]}}"
-                    yield _across([agent], place.left_m, wanted, subject=subject)
+                    yield _across([agent], place.left_m, _bounds(asked, lateral, band, 0.0))
 
 
 def _across(

@@ -18,7 +18,6 @@ from augment.checks.lanes_across import (
     find_place_along,
 )
 from augment.checks.places import SHORT_M
-from augment.checks.registry import check_against_intent
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
@@ -94,32 +93,18 @@ def describe_change(
     counts = [len(part) for part in (requests, moves, removals)]
     if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
-    unnamed = [one.id for one in change.changed if one.motion and one.id not in wishes]
-    strolls = [
-        agent.id
-        for agent in change.added
-        if agent.walk_to_m is not None and _find_walk(agent, lanes) is None
+    unsaid = [
+        one.id
+        for one in change.changed
+        if (one.motion and one.id not in wishes) or (one.walk_to_m and not _crosses(one, lanes))
     ]
-    full = wish.Intent(
+    return sentence, wish.Intent(
         requests=requests,
         moves=moves,
         removals=removals,
         route=lanes.route.turn,
-        beyond=(
-            *(f"the motion of {name}" for name in unnamed),
-            *(f"the walk of {name}" for name in strolls),
-        ),
+        beyond=tuple(f"the motion of {name}" for name in unsaid),
     )
-    looser = replace(
-        full,
-        requests=tuple(map(_looser, requests)),
-        moves=tuple(replace(one, spot=_looser_spot(one.spot)) for one in moves),
-    )
-    faults = [
-        sum(one.is_fault for one in check_against_intent(ground, change, intent))
-        for intent in (full, looser)
-    ]
-    return sentence, full if faults[0] <= faults[1] else looser
 
 
 def classify_change(change: Modification, scene: Scene) -> ScenarioType | MotionPreset:
@@ -144,17 +129,27 @@ def _find_place(agent: TrafficAgent, lanes: LanesAcross) -> LanePlace:
     return find_place(lanes, (agent.x_m, agent.y_m), agent.heading_rad)
 
 
-def _find_walk(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, LanePlace] | None:
-    """Return both ends of a walk by the lane that it crosses, None for who crosses none."""
-    here, end = (agent.x_m, agent.y_m), end_of_walk(agent)
-    if agent.type is not AgentType.PEDESTRIAN or end is None or math.dist(here, end) <= SHORT_M:
-        return None
-    middle = ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)
-    via = find_place(lanes, middle).via
-    first, last = (find_place_along(lanes, via, point) for point in (here, end))
-    crosses = first.left_m * last.left_m < 0.0 or abs(first.left_m) < _ON_ROAD_M
-    crosses &= abs(first.left_m - last.left_m) > _ACROSS_SHARE * math.dist(here, end)
-    return (first, last) if crosses or agent.motion is not None else None
+def _find_ends(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, LanePlace]:
+    """Return where a walk begins and ends along the lane in its middle."""
+    here = (agent.x_m, agent.y_m)
+    end = end_of_walk(agent) or here
+    via = find_place(lanes, ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)).via
+    return find_place_along(lanes, via, here), find_place_along(lanes, via, end)
+
+
+def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
+    """Return whether somebody crosses a lane, or waits to; a worker's step does not."""
+    if agent.type is not AgentType.PEDESTRIAN or agent.motion is not None:
+        return agent.type is AgentType.PEDESTRIAN
+    (x_m, y_m), (first, last) = (
+        end_of_walk(agent) or (math.nan, math.nan),
+        _find_ends(agent, lanes),
+    )
+    walk_m = math.hypot(x_m - agent.x_m, y_m - agent.y_m)
+    is_over = first.left_m * last.left_m < 0.0 or abs(first.left_m) < _ON_ROAD_M
+    return (
+        walk_m > SHORT_M and is_over and abs(first.left_m - last.left_m) > _ACROSS_SHARE * walk_m
+    )
 
 
 # The intent
@@ -171,9 +166,9 @@ def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iter
     doors = [wishes[one.id] for one in added if one.id in wishes and one.type not in _MOVERS]
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
-        motion, walk = _find_motion(agent, wishes), _find_walk(agent, lanes)
-        if walk is not None:
-            yield _walk(agent, *walk, motion)
+        motion = _find_motion(agent, wishes)
+        if _crosses(agent, lanes):
+            yield _walk(agent, lanes, motion)
         elif agent.type in _MOVERS:
             request = _vehicle(agent, lanes, motion)
             yield replace(request, name=agent.id) if agent.id in anchors else request
@@ -293,8 +288,9 @@ def _facing(agent: TrafficAgent, place: LanePlace) -> tuple[wish.Facing, float]:
 
 
 def _walk(
-    agent: TrafficAgent, start: LanePlace, end: LanePlace, motion: wish.MotionWish | None
+    agent: TrafficAgent, lanes: LanesAcross, motion: wish.MotionWish | None
 ) -> wish.WalkRequest:
+    start, end = _find_ends(agent, lanes)
     return wish.WalkRequest(
         spot=replace(_spot(start), lane=None),
         start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
@@ -305,20 +301,6 @@ def _walk(
         end=_lateral(end),
         motion=motion,
     )
-
-
-def _looser(request: wish.Request) -> wish.Request:
-    """Without what says how things stand across the road and to each other."""
-    spot = _looser_spot(request.spot)
-    match request:
-        case wish.WalkRequest():
-            return replace(request, spot=spot, drift_m=None, on_road=False, end=None)
-        case _:
-            return replace(request, spot=spot)
-
-
-def _looser_spot(spot: wish.Spot) -> wish.Spot:
-    return replace(spot, lateral=None, lane=None)
 
 
 # The sentence
@@ -378,13 +360,12 @@ def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:
 def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | None) -> str:
     here = _where(agent, lanes)
     if agent.type is AgentType.PEDESTRIAN:
-        if lanes is not None and (walk := _find_walk(agent, lanes)) is not None:
-            start, end = map(_name_place, walk)
-            return f"a pedestrian who walks from {start} to {end}"
-        if lanes is not None and agent.walk_to_m is not None:
-            via = _find_place(agent, lanes).via
-            there = _name_place(find_place_along(lanes, via, agent.walk_to_m))
-            return f"a pedestrian who walks from {here} to {there}"
+        if agent.walk_to_m is not None:
+            there = replace(agent, x_m=agent.walk_to_m[0], y_m=agent.walk_to_m[1])
+            ends = [here, _where(there, lanes)]
+            if lanes is not None:
+                ends = [_name_place(end) for end in _find_ends(agent, lanes)]
+            return f"a pedestrian who walks from {ends[0]} to {ends[1]}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
     what, drives = agent.type.lower().replace("_", " "), not is_stopped(agent)

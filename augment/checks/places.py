@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
 from augment.checks.ground import VEHICLES, ChangedScene, Ground, is_stopped
+from augment.checks.lanes_across import LanesAcross, find_place
 from augment.geometry.frames import Box, difference
 from augment.scene.entities import AgentType, TrafficAgent
 
@@ -25,6 +26,8 @@ MOST_SHARE = 0.5
 EDGE_M = 1.0
 """Cones stand on the road or as far beside it as this."""
 NEAR_ROAD_M = 3.0
+_BRANCH_M = 5.0
+"""Further off the ego's route a lane is another way's, or a further one beside it."""
 VERGE_M = 2.0
 """Beside everything that a map shows people stand on verges that it does not show."""
 FAR_FROM_PATHS_M = 10.0
@@ -43,16 +46,23 @@ def lane(situation: ChangedScene) -> Iterator[Finding]:
         return
     for agent in situation.changed:
         place, under = route.locate_agent(agent), situation.under[agent.id]
-        words = "off every lane"
+        words, lanes = "off every lane", tuple[str, ...]() if under is None else (under.lane_id,)
+        way = "its lanes and {left_m:.1f} m left of them"
         if under is not None:
             words = f"on {{lanes[0]}}, {under.d_m:.2f} m left of its centre line"
+            if abs(place.left_m) > _BRANCH_M:
+                there = find_place(
+                    LanesAcross(route=route), (agent.x_m, agent.y_m), agent.heading_rad
+                )
+                if there.via is not None:
+                    place, lanes = there.route.locate_agent(agent), (under.lane_id, there.via)
+                    way = "the way to {lanes[1]} and {left_m:.1f} m left of it"
         yield find(
             FindingKind.LANE,
             Severity.FACT,
             [agent],
-            "{agents[0]} is {ahead_m:.1f} m ahead of the ego along its lanes and {left_m:.1f} m "
-            f"left of them, {words}.",
-            lanes=() if under is None else (under.lane_id,),
+            f"{{agents[0]}} is {{ahead_m:.1f}} m ahead of the ego along {way}, {words}.",
+            lanes=lanes,
             ahead_m=place.ahead_m,
             left_m=place.left_m,
         )

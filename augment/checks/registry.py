@@ -8,7 +8,7 @@ Adding a check is adding one function to `CHECKS`, which never ask what was want
 `ASKED_CHECKS`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from augment.checks.asked_crash import check_crash
@@ -96,23 +96,16 @@ def check_against_intent(
     return (*held, *_drop_answered(alone, held, asked))
 
 
-def _by_way(asked: Case) -> list[Case]:
+def _by_way(asked: Case) -> Iterator[Case]:
     """The case of the intent's route with all changes, then one for each other way's parties."""
-    cases: list[Case] = []
-    own, everyone = asked.lanes, asked.parties
+    everyone, nobody, case = asked.parties, frozenset[str](), asked
     for via in dict.fromkeys((None, *(party.request.spot.via for party in everyone))):
-        lanes = own.over(via)
+        lanes = asked.lanes.over(via)
         assert lanes is not None, "spots without a way are left open"
         parties = tuple(party for party in everyone if party.request.spot.via == via)
-        cases.append(replace(asked, lanes=lanes, parties=parties))
-        asked = replace(
-            asked,
-            modification=Modification(),
-            surplus=(),
-            to_move=frozenset(),
-            to_remove=frozenset(),
-        )
-    return cases
+        yield replace(case, lanes=lanes, parties=parties)
+        case = replace(case, modification=Modification(), to_move=nobody, to_remove=nobody)
+        case = replace(case, surplus=())
 
 
 def _drop_answered(

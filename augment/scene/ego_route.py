@@ -81,8 +81,12 @@ class EgoRoute:
         own = find_ego_lane(scene, graph)
         if own is None or via not in (None, *graph.lanes):
             return None
-        way = [own] if via is None else _find_way(graph, own, via)
-        own = next((name for name in graph.abreast(own) if name in way), way[0])
+        way, abreast = [own], graph.abreast(own)
+        if via is not None:
+            way = graph.find_way(abreast, [via], _ROUND_M) or [via]
+            if way == [via]:
+                way = graph.find_way([via], abreast, _ROUND_M) or way
+        own = next((name for name in abreast if name in way), way[0])
         lane_s_m = graph.lane(own).centerline.project(scene.ego.x_m, scene.ego.y_m).s_m
         before = _list_before(graph, way[0])
         after = graph.route(way[-1], lane_s_m + REACH_M, turn=turn)
@@ -145,18 +149,6 @@ def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:
 
 
 # Private
-
-
-def _find_way(graph: LaneGraph, own: str, via: str) -> list[str]:
-    """Ids of the shortest way between the ego's lane or one abreast and a lane, either first."""
-    ways = [
-        way
-        for name in graph.abreast(own)
-        for way in (graph.find_way(name, via), graph.find_way(via, name))
-        if way is not None
-        and sum(graph.lane(lane).centerline.length_m for lane in way[1:-1]) <= _ROUND_M
-    ]
-    return min(ways, key=len, default=[via])
 
 
 def _list_before(graph: LaneGraph, lane_id: str) -> Sequence[str]:

@@ -5,7 +5,6 @@ Frame: ego frame of the scene; any one frame for turns and sides.
 """
 
 import math
-from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -260,17 +259,25 @@ class LaneGraph:
             total += self.lanes[following].centerline.length_m
         return route
 
-    def find_way(self, lane_id: str, to_id: str) -> list[str] | None:
-        """Return ids of the fewest lanes that lead from one to another, None if none do."""
-        ways = {lane_id: [lane_id]}
-        waiting = deque(ways)
-        while waiting and to_id not in ways:
-            here = waiting.popleft()
-            for following in self.successors(here):
+    def find_way(
+        self, starts: Sequence[str], ends: Sequence[str], reach_m: float
+    ) -> list[str] | None:
+        """Return ids of the fewest lanes from any of some to any of others, None if none lead.
+
+        No more than `reach_m` of lanes lie between them.
+        """
+        ways = {name: ([name], 0.0) for name in starts}
+        waiting = list(starts)
+        for here in waiting:  # which grows meanwhile
+            way, length_m = ways[here]
+            if here in ends:
+                return way
+            length_m += self.lanes[here].centerline.length_m * (here not in starts)
+            for following in self.successors(here) if length_m <= reach_m else ():
                 if following not in ways:
-                    ways[following] = [*ways[here], following]
+                    ways[following] = ([*way, following], length_m)
                     waiting.append(following)
-        return ways.get(to_id)
+        return None
 
     def _choose(self, lane_id: str, turn: TurnType) -> str | None:
         options = self.successors(lane_id)

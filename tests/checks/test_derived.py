@@ -204,6 +204,8 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     assert not [
         one for one in check_against_intent(Ground.of(here), change, intent) if one.is_fault
     ]
+    measured = findings_on(Ground.of(here), Modification(added=(replace(barrier, y_m=0.5),)))
+    assert "is 45.0 m ahead of the ego along the way to Lane2 and" in measured[0].sentence()
     placed = {one.type: one for one in place(here, intent).modification.added}
     assert placed[AgentType.BARRIER].pose == barrier.pose
     assert placed[AgentType.PEDESTRIAN].pose.beside(0.0) == pytest.approx((40.0, 3.0))
