@@ -18,6 +18,7 @@ import shapely
 from augment.checks.ground import VEHICLES, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, list_arms, resolve_spot
 from augment.checks.parties import CRASH_M, Role, assign_parties, meets_route
+from augment.checks.wish_motion import measure_placed
 from augment.checks.wish_patterns import Chain, Link, Pattern, find_step_m
 from augment.checks.wish_places import ACROSS_M, Place, Span, find_across, list_stations
 from augment.checks.wish_shapes import find_nearest_cones, find_worker_ground
@@ -101,6 +102,10 @@ def measure_wish(
         return None
     case = assign_parties(ground, modification, intent, lanes)
     fitting, missing, matches = _Fitting(lanes), 0, list[WishMatch]()
+    moves = modification.has_motion or any(
+        getattr(party.request, "motion", None) for party in case.parties
+    )
+    motion = ground.motion_after(modification, of_all=False) if moves else None
     for number, party in enumerate(case.parties):
         request = party.request
         if number < len(intent.requests):
@@ -121,7 +126,14 @@ def measure_wish(
             WishMatch(
                 agent_id=agent.id,
                 nearest_m=there[agent.id],
-                distance_m=math.dist(there[agent.id], (agent.x_m, agent.y_m)),
+                distance_m=measure_placed(
+                    case,
+                    motion,
+                    request,
+                    replace(agent, x_m=there[agent.id][0], y_m=there[agent.id][1]),
+                    fitting.find_car(request),
+                    fitting.place,
+                ),
             )
             for agent in (*agents, *party.workers)
         ]
@@ -333,11 +345,18 @@ class _Fitting:
         points = [(agent.x_m, agent.y_m) for agent in agents]
         return Chain(first=place.nearest, links=links).nearest(points)
 
+    def find_car(self, request: wish.Request) -> TrafficAgent | None:
+        """Return the car of a door where it belongs; None where there is none."""
+        spot = request.spot
+        if not isinstance(request, wish.DoorRequest):
+            return None
+        if spot.landmark is None:
+            return self._first.get(spot.anchor or "")
+        return next(iter(find_picked(self._lanes, spot.landmark)), None)
+
     def _place_door(self, request: wish.DoorRequest, point: Point) -> Point:
         """Return where a door belongs: along its car, on the side where the ego comes past."""
-        car = self._first.get(request.spot.anchor or "")
-        if request.spot.landmark is not None:
-            car = next(iter(find_picked(self._lanes, request.spot.landmark)), None)
+        car = self.find_car(request)
         if car is None:
             return point
         here = self._lanes.route.locate_agent(car)

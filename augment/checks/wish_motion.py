@@ -8,7 +8,7 @@ Frame: the scene's. T steps.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,8 @@ from augment.checks.motions import LIMITS, measure_bends
 from augment.checks.parties import Case
 from augment.errors import CannotPlace
 from augment.scene import planned_motion, presets
-from augment.scene.entities import TrafficAgent
-from augment.scene.intent_parts import MotionWish
+from augment.scene.entities import Point, TrafficAgent
+from augment.scene.intent import MotionWish, Request, Spot, VehicleRequest
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
 from augment.scene.planned_mover import PlannedMover, walk_as_motion, way_and_speed
 
@@ -28,8 +28,8 @@ _FURTHER_S = 15.0
 """So long after its start a motion is followed to see where it leads."""
 _NONE_M = 0.005
 """Nothing nearer than this is looked for."""
-_GENTLEST_MPS2 = 1.0
-"""Who is to come to a speed does so at least as briskly, where nobody says."""
+_GENTLEST_MPS2, _USUAL_MPS2 = 1.0, 3.0
+"""Who is to come to a speed does so at least as briskly, where nobody says; as presets do."""
 _CHANGES_M = 10.0, 60.0
 """How long a lane change may be that is looked for beside the answer's own."""
 _SHARES = 0.25, 0.05
@@ -50,7 +50,7 @@ class MotionCase:
     """One agent that is to move, and what its motion is held against.
 
     Attributes:
-        asked: The modification that it is of.
+        whole: The modification that it is of.
         motion: Everybody after it.
         answer: The agent among them.
         placed: The agent at the admissible place nearest to it, as fast as is asked for at t0.
@@ -58,7 +58,7 @@ class MotionCase:
         car: Of a door, at its admissible place.
     """
 
-    asked: Case
+    whole: Case
     motion: Motion
     answer: Movement
     placed: TrafficAgent
@@ -79,40 +79,91 @@ class MotionCase:
 
     def carry_out(self, agent: TrafficAgent, until_s: float = HORIZON_S) -> FloatArray:
         """Return the states (T, 4) of an agent whose motion waits for nobody."""
-        mover, rows = PlannedMover(agent, self.asked.route.graph), []
+        mover, rows = PlannedMover(agent, self.whole.route.graph), []
         for time_s in np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist():
             mover.advance(time_s)
             rows.append(mover.state())
         return np.array(rows)
 
+    def find_offsets(self, agent: TrafficAgent) -> FloatArray:
+        """Return from an agent to the answer (T, 2), in m; NaN where one is past the map."""
+        states = self.carry_out(agent)
+        return np.asarray(self.answer.states[: len(states), :2] - states[:, :2])
+
     def measure(self, agent: TrafficAgent) -> float:
         """Return how far the answer is from an agent on average, in m."""
-        states = self.carry_out(agent)
-        apart_m = np.hypot(*(states[:, :2] - self.answer.states[: len(states), :2]).T)
-        return float(np.nanmean(apart_m))
+        return float(np.nanmean(np.hypot(*self.find_offsets(agent).T)))
+
+    def find_nearest(self) -> TrafficAgent:
+        """Return the agent with the nearest admissible motion."""
+        if self.wish is None:
+            return replace(self.placed, motion=planned_motion.PlannedMotion())
+        if self.car is not None:
+            return min(_list_doors(self, self.car, self.wish), key=self.measure)
+        return _Search(self, self.wish).run()
 
 
-def measure_motion(case: MotionCase) -> float:
-    """Return the mean distance in m between the answer and the nearest admissible motion."""
-    if case.wish is None:
-        return case.measure(replace(case.placed, motion=planned_motion.PlannedMotion()))
-    if case.car is not None:
-        return min(map(case.measure, _list_doors(case, case.car, case.wish)))
-    return _Search(case, case.wish).run()
+def measure_placed(
+    case: Case,
+    motion: Motion | None,
+    request: Request,
+    placed: TrafficAgent,
+    car: TrafficAgent | None,
+    place: Callable[[Request, list[TrafficAgent]], list[Point]],
+) -> float:
+    """Return how far an agent is from its wish: over time where it moves or is to, else at t0.
+
+    Args:
+        case: The modification that it is of.
+        motion: Everybody after it; None where nobody has a motion or is to have one.
+        request: What it answers.
+        placed: One that is added or moved, at the admissible place nearest to it.
+        car: Of a door, where it belongs.
+        place: Finds the admissible places nearest to those who answer a request.
+    """
+    wish: MotionWish | None = getattr(request, "motion", None)
+    agents = {agent.id: agent for agent in case.modification.changed}
+    agent = agents[placed.id]
+    is_driven = agent.motion is not None and isinstance(request, VehicleRequest)
+    if motion is None or not (wish or is_driven):
+        return math.dist(placed.pose.beside(0.0), agent.pose.beside(0.0))
+    before = {other.id: other for other in case.route.scene.agents}
+    if isinstance(request, VehicleRequest):
+        if request.spot == Spot():
+            placed = before.get(agent.id, placed)
+        speed_mps = placed.speed_mps if request.speed_mps is None else request.speed_mps
+        placed = replace(placed, speed_mps=speed_mps)
+        lanes, spot = case.lanes.over(request.spot.via) or case.lanes, request.spot
+        station_m = lanes.route.locate_agent(placed).ahead_m
+        band = lanes.band(spot.lane, station_m) if spot.lane else None
+        if band is not None and request.facing is None:
+            placed = replace(placed, heading_rad=band.tangent_rad, lane_id=band.lane_id)
+    (answer,) = (other for other in motion.others if other.agent.id == agent.id)
+    at_t0 = MotionCase(whole=case, motion=motion, answer=answer, placed=placed, wish=wish, car=car)
+    nearest = at_t0.find_nearest()
+    nearest_m = at_t0.measure(nearest)
+    if nearest_m <= _NONE_M or request.count != 1 or request.name or placed.id in before:
+        return nearest_m
+    # Over time another place may be nearer than the one at t0: that of the mean over (T,).
+    ahead_m, aside_m = np.nanmean(at_t0.find_offsets(nearest), axis=0).tolist()
+    moved = replace(agent, x_m=nearest.x_m + ahead_m, y_m=nearest.y_m + aside_m)
+    ((x_m, y_m),) = place(request, [moved])
+    again = replace(at_t0, placed=replace(placed, x_m=x_m, y_m=y_m))
+    return min(nearest_m, again.measure(again.find_nearest()))
 
 
 # Private
 
 
 class _Search:
-    """The nearest admissible motion, and the nearest of those that are none."""
+    """The nearest admissible motion, or the nearest of all until one is admissible."""
 
     def __init__(self, case: MotionCase, wish: MotionWish) -> None:
         self._case, self._wish, self._best = case, wish, planned_motion.PlannedMotion()
-        self._best_m = self._else_m = math.inf
+        self._best_m, self._fits = math.inf, False
 
-    def run(self) -> float:
-        """Return how far off the nearest is."""
+    def run(self) -> TrafficAgent:
+        """Return the agent with the nearest motion."""
         case, wish = self._case, self._wish
         for speeds in _list_speeds(case, wish):
             for span in _list_starts(case, wish, case.placed, speeds):
@@ -121,19 +172,24 @@ class _Search:
                     self._try(path, speeds, after_s)
         for share in _SHARES:
             self._vary(share)
-        return min(self._best_m, self._else_m) if math.isinf(self._best_m) else self._best_m
+        return self._give(self._best)
+
+    def _give(self, motion: planned_motion.PlannedMotion) -> TrafficAgent:
+        return replace(self._case.placed, walk_to_m=None, motion=motion)
 
     def _try(self, path: planned_motion.Path | None, speeds: Speeds, after_s: float) -> None:
-        if self._best_m <= _NONE_M:
+        if self._fits and self._best_m <= _NONE_M:
             return
         motion = planned_motion.PlannedMotion(
             path=path, speeds=speeds, start=planned_motion.AtTime(after_s=after_s)
         )
-        agent = replace(self._case.placed, walk_to_m=None, motion=motion)
+        agent = self._give(motion)
         mean_m = self._case.measure(agent)
-        self._else_m = min(self._else_m, mean_m)
-        if mean_m < self._best_m and _is_admissible(self._case, agent, self._wish, after_s):
-            self._best_m, self._best = mean_m, motion
+        if self._fits and mean_m >= self._best_m:
+            return
+        fits = _is_admissible(self._case, agent, self._wish, after_s)
+        if fits or (not self._fits and mean_m < self._best_m):
+            self._best_m, self._best, self._fits = mean_m, motion, fits
 
     def _vary(self, share: float) -> None:
         """Vary the ramp, the start and the length of a lane change of the nearest, in turn."""
@@ -172,7 +228,7 @@ def _is_admissible(
     begins_s = min(after_s, HORIZON_S)
     states = case.carry_out(agent, begins_s + _FURTHER_S)[round(begins_s / STEP_S) :]
     states = states[~np.isnan(states[:, 0])]
-    exact = replace(case.asked, tolerances=replace(case.asked.tolerances, middle_m=_MIDDLE_M))
+    exact = replace(case.whole, tolerances=replace(case.whole.tolerances, middle_m=_MIDDLE_M))
     if not len(states) or any(
         finding.is_fault for finding in check_path(exact, agent, wish, states)
     ):
@@ -200,9 +256,9 @@ def _list_starts(
     else:
         waits = planned_motion.PlannedMotion(start=planned_motion.AtTime(after_s=math.inf))
         places = case.carry_out(replace(placed, walk_to_m=None, motion=waits), times_s[-1])[:, :2]
-        mark_m = find_mark(case.asked.lanes, start.mark) if start.mark else None
+        mark_m = find_mark(case.whole.lanes, start.mark) if start.mark else None
         if mark_m is not None:
-            places[:] = case.asked.route.position(mark_m)
+            places[:] = case.whole.route.position(mark_m)
         apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
         near = start.ego_distance
         reaches_m = (near.high_m, near.low_m) if near else (planned_motion.REACHED_M,) * 2
@@ -251,8 +307,9 @@ def _list_speeds(case: MotionCase, wish: MotionWish) -> Iterator[Speeds]:
     takes_s = change_mps / max(steepest, default=math.inf) if change_mps else 0.0
     if rows[-1][1] == ramp.to_mps and ramp.least_s <= takes_s <= ramp.most_s:
         yield speeds
-    takes_s = _shift(speeds[-1][0] if speeds else 0.0, 0.0, (ramp.least_s, ramp.most_s))
-    yield ((takes_s, ramp.to_mps),) if change_mps else ()
+    own_s, span = speeds[-1][0] if speeds else 0.0, (ramp.least_s, ramp.most_s)
+    for takes_s in {_shift(value_s, 0.0, span) for value_s in (own_s, change_mps / _USUAL_MPS2)}:
+        yield ((takes_s, ramp.to_mps),) if change_mps else ()
 
 
 def _list_paths(
@@ -285,7 +342,7 @@ def _list_paths(
     if speeds and "speed_mps" in presets.preset_numbers(wish.preset):
         numbers = replace(numbers, speed_mps=speeds[-1][1])
     try:
-        usual = presets.with_preset(wish.preset, case.asked.ground.scene, case.placed, numbers)
+        usual = presets.with_preset(wish.preset, case.whole.ground.scene, case.placed, numbers)
     except CannotPlace:
         return
     assert usual.motion is not None
@@ -294,7 +351,7 @@ def _list_paths(
 
 def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterator[TrafficAgent]:
     """Yield doors in the car's side, along it or across it, that come out on the ego's side."""
-    door, own, place = case.answer.agent, case.own, case.asked.route.locate_agent(car)
+    door, own, place = case.answer.agent, case.own, case.whole.route.locate_agent(car)
     toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
     side = np.array([1.0, math.copysign(1.0, math.sin(toward_rad - car.heading_rad))])
     points = own.path.points_m[-1:] if isinstance(own.path, planned_motion.PointPath) else ()
