@@ -236,6 +236,7 @@ class DisplacementSummary:
     Attributes:
         at_t0_m, final_m: Means of objects of changes that move, of which median and mean are
             over time; None without any.
+        wish_median_m, wish_mean_m: Of the distances to the wish; None without an intent.
     """
 
     slug: str
@@ -247,6 +248,8 @@ class DisplacementSummary:
     augmentations: int
     at_t0_m: float | None = field(default=None, metadata=_SINCE_5)
     final_m: float | None = field(default=None, metadata=_SINCE_5)
+    wish_median_m: float | None = field(default=None, metadata=_WHERE_SET)
+    wish_mean_m: float | None = field(default=None, metadata=_WHERE_SET)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,8 +18,10 @@ import numpy as np
 from pydantic import Field
 
 from augment.checks import Ground
+from augment.checks.wish import measure_wish
 from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.intent import Intent
 from augment.scene.motion import HORIZON_S
 
 
@@ -184,6 +186,42 @@ def displacement(
         missing=tuple(agent.id for agent in reference.changed if agent.id not in taken),
         surplus=tuple(agent.id for agent in placed if agent.id not in used),
     )
+
+
+def displacement_from_wish(
+    generated: Modification | None, intent: Intent, ground: Ground
+) -> Displacement | None:
+    """Return the distance to the wish, as one from the nearest placement that an intent admits.
+
+    Of its objects the names are empty.
+
+    Args:
+        generated: None for an answer that was unreadable or refused: all is missing.
+        intent: What the instruction asks for.
+        ground: Of the scene before the change.
+
+    Returns:
+        None where the ego is off every lane.
+
+    Raises:
+        InvalidModification: The modification does not fit the scene.
+    """
+    change = generated or Modification()
+    wish = measure_wish(ground, change, intent)
+    if wish is None:
+        return None
+    classes = {agent.id: CLASS_OF[agent.type] for agent in change.changed}
+    matches = (
+        Match(
+            reference="",
+            generated=match.agent_id,
+            object_class=classes[match.agent_id],
+            distance_m=match.distance_m,
+        )
+        for match in wish.matches
+    )
+    missing = ("",) * wish.missing
+    return Displacement(matches=tuple(matches), missing=missing, surplus=wish.surplus)
 
 
 def _match(

@@ -65,6 +65,7 @@ def snapshot() -> Snapshot:
     far = DisplacementSummary(
         slug="", median_m=0.5, mean_m=1.0, n=5, missing=0, surplus=0, augmentations=5
     )
+    far = replace(far, wish_median_m=0.25, wish_mean_m=0.5)
     displacement = (replace(far, slug=slug) for slug in slugs)
     made.results = replace(made.results, cost=tuple(cost), displacement=tuple(displacement))
     made.save()

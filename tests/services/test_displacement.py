@@ -96,10 +96,10 @@ def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once
         ended(job, one, rows.add_kind(slug, Contestant.Kind.RULE), change=starts(start))
         ended(job, still, rows.add_kind(f"{slug}-2"))
     # Rows, their scenarios and contestants; keys of rows and of scenarios, what is stored; rows
-    # with theirs, one scene; what is stored then.
-    with django_assert_num_queries(11):
+    # with theirs, one scene; what is stored then. The same of distances to the wish.
+    with django_assert_num_queries(17):
         of_job(job)
-    with django_assert_num_queries(6):  # read from the store
+    with django_assert_num_queries(9):  # read from the store
         found = of_job(job)
     over_time = [line.displacement.over_time for line in found if line.displacement is not None]
     assert over_time[0] is not None
@@ -108,7 +108,9 @@ def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once
     # 5 (t - 3.9) from 3.9 s on.
     assert over_time[1].average_m == pytest.approx(0.5 * sum(range(22)) / 61)
     assert over_time[2:] == [None, None]
-    scores = metric_scores([row.row.pk for row in found])[0].by_code
+    wished, compared, *_ = metric_scores([row.row.pk for row in found])
+    assert (wished.name, compared.name) == ("Distance to the wish", "Displacement")
+    scores = compared.by_code
     assert scores[str(found[1].row.code)] == pytest.approx(-over_time[1].average_m)
     lines = {line.row.pk: line for line in augmentation_lines(job)}
     assert lines[found[1].row.pk].doubtful == 1  # its motion never begins

@@ -1,4 +1,4 @@
-"""The displacement errors of a job: a table in groups or one row an object, and box plots."""
+"""Distances to the wish and displacement of a job: in groups, by object, and as box plots."""
 
 from __future__ import annotations
 
@@ -20,7 +20,16 @@ from arena.exports.formats import (
 )
 from augment.models import GenerationJob
 from augment.services.judging import PLACED_EXACTLY, list_objects
-from augment.services.judging.displacement import HORIZON_S, By, Group, groups, of_job
+from augment.services.judging.displacement import (
+    HORIZON_S,
+    BoxSummary,
+    By,
+    Group,
+    Summary,
+    groups,
+    of_job,
+    summarise,
+)
 from augment.services.scenarios import ScenarioType, in_type_order, type_choices
 
 if TYPE_CHECKING:
@@ -33,6 +42,10 @@ PAPERS_CHOICE = (
 OVER_TIME_NOTE = (
     f"Where something moves, a distance is the mean over the {HORIZON_S:g} s after t0; beside it "
     "the means at t0 and at the end, and by how many seconds motions begin apart."
+)
+WISH_NOTE = (
+    "Distance to the wish: of each object from where the nearest placement has it that the "
+    "instruction allows, 0 for whatever it allows; of scenarios with an intent."
 )
 KEPT_NOTE = (
     "Kept: of what follow-ups were to leave as in the answer before, how much looks the same, and "
@@ -68,6 +81,11 @@ class DisplacementTable:
         return any(group.contestant.is_simulated for group in self.groups)
 
     @property
+    def wishes(self) -> bool:
+        """True if one of its scenarios has an intent."""
+        return any(group.wish for group in self.groups)
+
+    @property
     def moves(self) -> bool:
         """True if an object moves in it."""
         return any(group.summary.over_time for group in self.groups)
@@ -80,7 +98,7 @@ class DisplacementTable:
     @property
     def columns(self) -> int:
         """Number of columns that a page shows."""
-        return 7 + 3 * self.moves + 2 * self.has_follow_ups
+        return 7 + 3 * self.wishes + 3 * self.moves + 2 * self.has_follow_ups
 
     @property
     def types_text(self) -> str:
@@ -96,8 +114,9 @@ class DisplacementTable:
     def remarks(self) -> tuple[str, ...]:
         """Sentences that belong beneath every form of it, beside the scenario types."""
         return (
-            "Distances between centres, in metres, of objects matched within their class so that "
-            "their sum is smallest; each matched object counts once.",
+            *([WISH_NOTE] if self.wishes else []),
+            "Displacement: distances between centres, in metres, of objects matched within their "
+            "class so that their sum is smallest; each matched object counts once.",
             "Missing and surplus objects are counted and have no distance; an unreadable or "
             "refused answer misses all.",
             *([OVER_TIME_NOTE] if self.moves else []),
@@ -128,11 +147,14 @@ KEPT: Columns = {
 }
 """Of follow-ups: what was to stay of the answer before, what did, and how far it was moved."""
 
-GROUPS: Columns = {
+_GROUPED: Columns = {
     "group": ("heading", Dtype.TEXT),
     "contestant": (lambda group: show_name(group.contestant), Dtype.TEXT),
     **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
     "simulated": ("contestant.is_simulated", Dtype.YES_NO),
+}
+GROUPS: Columns = {
+    **_GROUPED,
     **Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
     **Dtype.NUMBER.columns(
         "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", of="summary.box"
@@ -143,6 +165,12 @@ GROUPS: Columns = {
         Dtype.TEXT,
     ),
 }
+WISHED: Columns = {
+    "wish_median_m": ("wish.box.median_m", Dtype.NUMBER),
+    "wish_mean_m": ("wish.box.mean_m", Dtype.NUMBER),
+    **{f"wish_{name}": (f"wish.{name}", Dtype.WHOLE) for name in ("n", "missing", "surplus")},
+}
+"""Of groups, where one of them has an intent."""
 OVER_TIME = Dtype.NUMBER.columns("at_t0_m", "final_m", "start_s", of="summary.over_time")
 """Of groups, where one of them has something that moves."""
 
@@ -157,7 +185,12 @@ def group_sheet(table: DisplacementTable) -> Sheet:
         "notes": [f"{table.types_text}.", *table.remarks],
         "not_measured": table.left_out,
     }
-    columns: Columns = {**GROUPS, "types": (lambda group: types, Dtype.TEXT)}
+    columns: Columns = {
+        **_GROUPED,
+        **(WISHED if table.wishes else {}),
+        **GROUPS,
+        "types": (lambda group: types, Dtype.TEXT),
+    }
     if table.moves:
         columns = {**columns, **OVER_TIME}
     return make_sheet(
@@ -199,6 +232,8 @@ def object_sheet(job: GenerationJob) -> Sheet:
     name, objects = "displacement-objects", list(list_objects(job))
     moves = any(entry["match"] and entry["match"].average_m is not None for entry in objects)
     columns = {**OBJECTS, **MATCHES_OVER_TIME} if moves else OBJECTS
+    if any(thing["wish_m"] is not None for thing in objects):
+        columns = {**WHOSE, "wish_distance_m": ("wish_m", Dtype.NUMBER), **columns}
     return make_sheet(objects, columns, name=name, key="objects", number=".4f")
 
 
@@ -206,40 +241,56 @@ def object_sheet(job: GenerationJob) -> Sheet:
 
 
 def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
-    """Draw a box a group: quartiles, median, Tukey's whiskers, outliers, mean as a diamond."""
+    """Draw a box a group: quartiles, median, Tukey's whiskers, outliers, mean as a diamond.
+
+    The distances to the wish stand above, where there is an intent.
+    """
     from matplotlib.figure import Figure
 
-    boxes = {place: _stats(group) for place, group in enumerate(table.groups) if group.summary.box}
+    panels = {"Displacement error (m)": [group.summary for group in table.groups]}
+    if table.wishes:
+        wishes = [group.wish or summarise([]) for group in table.groups]
+        panels = {"Distance to the wish (m)": wishes, **panels}
+    height = 0.8 + len(panels) * (0.6 + 0.3 * len(table.groups))
     with chart_style():
-        figure = Figure(figsize=(7.2, 1.4 + 0.3 * len(table.groups)), layout="constrained")
-        axes = figure.add_subplot()
-        axes.bxp(
-            list(boxes.values()),
-            positions=list(boxes),
-            widths=0.56,
-            orientation="horizontal",
-            manage_ticks=False,
-            patch_artist=True,
-            showmeans=True,
-            boxprops={"facecolor": f"{MARK}33", "edgecolor": MARK},
-            medianprops={"color": MARK, "linewidth": 2.2},
-            meanprops={"marker": "D", "markersize": 3.5, "markerfacecolor": "white"},
-            flierprops={"marker": "o", "markersize": 3.2, "markeredgecolor": MARK},
-        )
-        simulated = [group.contestant.is_simulated for group in table.groups]
-        name_lines(axes, [_name(table, group) for group in table.groups], simulated)
-        _scale(axes, list(boxes.values()))
+        figure = Figure(figsize=(7.2, height), layout="constrained")
+        rows = figure.subplots(len(panels), squeeze=False)[:, 0]
+        for axes, (words, summaries) in zip(rows, panels.items(), strict=True):
+            _draw_boxes(axes, table, summaries)
+            if table.wishes:
+                axes.set_title(words, fontsize=8, loc="left")
         marks = ", with simulated contestants" if table.simulated else ""
         legend = "Boxes: quartiles around the median; whiskers: up to 1.5 boxes; diamonds: means"
-        text = f"Displacement error (m){marks}\n{table.types_text}\n{legend}"
-        figure.supxlabel(text, fontsize=8)
+        heading = "Metres" if table.wishes else "Displacement error (m)"
+        figure.supxlabel(f"{heading}{marks}\n{table.types_text}\n{legend}", fontsize=8)
         return write_figure(figure, file_format)
 
 
-def _stats(group: Group) -> dict[str, Any]:
+def _draw_boxes(axes: Axes, table: DisplacementTable, summaries: Sequence[Summary]) -> None:
+    boxes = {place: _stats(summary.box) for place, summary in enumerate(summaries) if summary.box}
+    axes.bxp(
+        list(boxes.values()),
+        positions=list(boxes),
+        widths=0.56,
+        orientation="horizontal",
+        manage_ticks=False,
+        patch_artist=True,
+        showmeans=True,
+        boxprops={"facecolor": f"{MARK}33", "edgecolor": MARK},
+        medianprops={"color": MARK, "linewidth": 2.2},
+        meanprops={"marker": "D", "markersize": 3.5, "markerfacecolor": "white"},
+        flierprops={"marker": "o", "markersize": 3.2, "markeredgecolor": MARK},
+    )
+    names = [
+        _name(table, group, summary)
+        for group, summary in zip(table.groups, summaries, strict=True)
+    ]
+    name_lines(axes, names, [group.contestant.is_simulated for group in table.groups])
+    _scale(axes, list(boxes.values()))
+
+
+def _stats(box: BoxSummary) -> dict[str, Any]:
     """Return a box as matplotlib takes it."""
-    box = group.summary.box
-    assert box is not None
     return {
         "med": box.median_m,
         "q1": box.q1_m,
@@ -251,11 +302,10 @@ def _stats(group: Group) -> dict[str, Any]:
     }
 
 
-def _name(table: DisplacementTable, group: Group) -> str:
+def _name(table: DisplacementTable, group: Group, summary: Summary) -> str:
     """Return the label of a box: its group, and its number of objects."""
     name = show_name(group.contestant)
     heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
-    summary = group.summary
     counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}
     remark = ", ".join(
         f"{word} {number}" for word, number in counts.items() if number or word == "n"

@@ -22,11 +22,12 @@ from augment.services.judging.displacement import By
 from augment.services.running import tool_calls
 
 
-def _count(name: str) -> Callable[[Any], int | None]:
+def _count(name: str, measure: str = "displacement") -> Callable[[Any], int | None]:
     """Return a function that counts matched, missing or surplus objects of a line."""
 
     def count(line: Any) -> int | None:
-        return None if line.displacement is None else len(getattr(line.displacement, name))
+        distance = getattr(line, measure)
+        return None if distance is None else len(getattr(distance, name))
 
     return count
 
@@ -35,12 +36,18 @@ def _json(document: Any) -> str | None:
     return None if document is None else json.dumps(document, sort_keys=True)
 
 
+_WISHED: Columns = {
+    "wish_distance_m": ("wish.mean_m", Dtype.NUMBER),
+    "wish_missing": (_count("missing", "wish"), Dtype.WHOLE),
+    "wish_surplus": (_count("surplus", "wish"), Dtype.WHOLE),
+}
 AUGMENTATIONS: Columns = {
     **displacement.WHOSE,
     "sample": ("row.sample", Dtype.WHOLE),
     "options": (lambda line: _json(line.row.options), Dtype.TEXT),
     "augmentation": ("row.code", Dtype.TEXT),
     "state": ("row.state", Dtype.TEXT),
+    **_WISHED,
     "matched": (_count("matches"), Dtype.WHOLE),
     "missing": (_count("missing"), Dtype.WHOLE),
     "surplus": (_count("surplus"), Dtype.WHOLE),

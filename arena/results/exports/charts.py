@@ -91,19 +91,24 @@ def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
 def make_scatters(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatter]:
     """Return the scatter charts that have points, by name."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
+    wishes = {line.slug: line.wish_median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}
     rated = [(key, row) for key, row in key_rows(table) if row.rating is not None]
-    far = [
-        Point(key=key, row=row, x=x)
-        for key, row in rated
-        if (x := metres.get(row.slug)) is not None
-    ]
+    wished, far = (
+        [
+            Point(key=key, row=row, x=x)
+            for key, row in rated
+            if (x := values.get(row.slug)) is not None
+        ]
+        for values in (wishes, metres)
+    )
     spent = [
         Point(key=key, row=row, x=cost.usd, model_class=cost.model_class)
         for key, row in rated
         if (cost := costs.get(row.slug)) and cost.usd
     ]
     by_name = {
+        "wish": Scatter(across="Median distance to the wish (m)", points=wished),
         "displacement": Scatter(across="Median displacement (m)", points=far),
         "elo-usd": Scatter(across="USD per scenario", points=spent, is_log=True),
     }

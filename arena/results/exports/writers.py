@@ -207,7 +207,7 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
     return chart_functions[name]
 
 
-CHARTS = ("pairs", "types", "displacement", "elo-usd")
+CHARTS = ("pairs", "types", "wish", "displacement", "elo-usd")
 RATING_FILES = {
     "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
     "agreement": Export(

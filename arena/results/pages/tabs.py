@@ -203,12 +203,19 @@ def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
+_DISTANCES = {"wish": "distance to the wish", "displacement": "displacement"}
+
+
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Elo against the distance from the references."""
+    """Elo against the distances to the wishes and from the references."""
     lines = _keyed(table, {line.slug: line for line in snapshot.results.displacement})
+    drawn = make_scatters(snapshot, table)
     return {
         "lines": lines,
-        "has_chart": "displacement" in make_scatters(snapshot, table),
+        "charts": [
+            (name, f"Elo against {words}") for name, words in _DISTANCES.items() if name in drawn
+        ],
+        "wishes": any(line.wish_median_m is not None for line in snapshot.results.displacement),
         "moves": any(line.at_t0_m is not None for line in snapshot.results.displacement),
     }
 

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Any
 
 import numpy as np
 from django.db.models import Count
@@ -32,7 +31,7 @@ from arena.rating.snapshot_document import (
 )
 from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote
 from arena.voting.queries.blinding import is_imported
-from augment.services.judging.displacement import of_rows, summarise
+from augment.services.judging.displacement import MeasuredRow, of_rows, summarise
 from augment.services.scenarios import in_type_order, type_label
 
 SCORES = {
@@ -207,12 +206,19 @@ def _rate_type(
 
 
 def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
-    """Return each contestant's distance of shown augmentations from the references."""
-    by_slug: dict[str, list[Any]] = {}
+    """Return each contestant's distances of shown augmentations from references and wishes."""
+    by_slug: dict[str, list[MeasuredRow]] = {}
     for row in of_rows(list_shown_ids(study)):
         if row.displacement is not None:
-            by_slug.setdefault(row.row.contestant.slug, []).append(row.displacement)
-    totals = ((slug, summarise(measured)) for slug, measured in sorted(by_slug.items()))
+            by_slug.setdefault(row.row.contestant.slug, []).append(row)
+    totals = (
+        (
+            slug,
+            summarise([row.displacement for row in rows if row.displacement is not None]),
+            summarise([row.wish for row in rows if row.wish is not None]).box,
+        )
+        for slug, rows in sorted(by_slug.items())
+    )
     return tuple(
         DisplacementSummary(
             slug=slug,
@@ -224,8 +230,10 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
             augmentations=total.augmentations,
             at_t0_m=None if total.over_time is None else total.over_time.at_t0_m,
             final_m=None if total.over_time is None else total.over_time.final_m,
+            wish_median_m=None if wish is None else wish.median_m,
+            wish_mean_m=None if wish is None else wish.mean_m,
         )
-        for slug, total in totals
+        for slug, total, wish in totals
     )
 
 

@@ -18,7 +18,13 @@ from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.displacement import DISTANCES, KeptSummary, MeasuredRow, of_job
+from augment.services.judging.displacement import (
+    DISTANCES,
+    WISHES,
+    KeptSummary,
+    MeasuredRow,
+    of_job,
+)
 from augment.services.judging.findings import FINDINGS, read_findings
 from augment.services.judging.measures import Measure, compute_once, digest_code, digest_rows
 from augment.services.judging.realism import REALISM, realism_of_job
@@ -31,7 +37,7 @@ Answers = Mapping[str, Sequence[MeasuredRow]]
 SEED = 2026
 """Of the bootstrap."""
 MISSES = (State.UNREADABLE, State.REFUSED)
-_ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, DISTANCES, FINDINGS)
+_ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, WISHES, DISTANCES, FINDINGS)
 _PAIRS = TypeAdapter(tuple[paired.PairedComparison, ...])
 _AT_ONCE = 50
 """So many rows are measured before they are stored."""
@@ -42,6 +48,7 @@ class AugmentationLine:
     """One augmentation with all that is measured of it.
 
     Attributes:
+        wish: How far it is from what is asked for, None without an intent.
         displacement: None where nothing can be measured.
         kept: What a follow-up was to leave alone, None without any.
         spending: None where no model was asked.
@@ -50,6 +57,7 @@ class AugmentationLine:
     """
 
     row: Augmentation
+    wish: Displacement | None
     displacement: Displacement | None
     kept: KeptSummary | None
     spending: Spending | None
@@ -200,7 +208,11 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     for one in of_job(job):
         spending = spent.get(one.row.pk)
         yield AugmentationLine(
-            row=one.row, displacement=one.displacement, kept=one.kept_summary, spending=spending
+            row=one.row,
+            wish=one.wish,
+            displacement=one.displacement,
+            kept=one.kept_summary,
+            spending=spending,
         )
 
 

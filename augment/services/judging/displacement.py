@@ -1,7 +1,8 @@
-"""Displacement of stored augmentations from their references: single, grouped, by object."""
+"""Distance of stored augmentations to their wishes, and displacement from their references."""
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
@@ -12,8 +13,10 @@ from django.db.models import QuerySet
 
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
-from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
+from augment.metrics.displacement import CLASS_OF, are_alike, displacement, displacement_from_wish
+from augment.metrics.displacement import BoxSummary as BoxSummary
 from augment.metrics.displacement import Displacement as Displacement
+from augment.metrics.displacement import Summary as Summary
 from augment.metrics.displacement import summarise as summarise
 from augment.metrics.kept import KeptObject, find_kept_objects, summarise_kept
 from augment.metrics.kept import KeptSummary as KeptSummary
@@ -21,8 +24,8 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
-from augment.services.judging.measures import Measure
-from augment.services.scenarios.scenes import load_ground
+from augment.services.judging.measures import Measure, rows_by_scenario
+from augment.services.scenarios.scenes import load_ground, load_intent
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State
@@ -78,9 +81,14 @@ class Distance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredRow(Distance):
-    """An augmentation with how far it is from the reference."""
+    """An augmentation with how far it is from the reference.
+
+    Attributes:
+        wish: How far it is from what its instruction asks for, None without an intent.
+    """
 
     row: Augmentation
+    wish: Displacement | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +97,7 @@ class Group:
 
     Attributes:
         heading: What they have in common: a type, a variant, or the contestant's name.
+        wish: Of those that have an intent, None without any.
         kept: What follow-ups were to leave alone, None without any.
     """
 
@@ -96,6 +105,7 @@ class Group:
     contestant: Contestant
     summary: Summary
     kept: KeptSummary | None
+    wish: Summary | None = None
 
 
 def of_job(job: GenerationJob) -> list[MeasuredRow]:
@@ -134,8 +144,10 @@ def groups(measured: Iterable[MeasuredRow], *, by: By) -> list[Group]:
             contestant=cell[0].row.contestant,
             summary=summarise([one.displacement for one in cell if one.displacement is not None]),
             kept=summarise_kept([thing for one in cell for thing in one.kept]),
+            wish=summarise(wishes) if wishes else None,
         )
         for _, cell in sorted(cells.items())
+        for wishes in [[measured.wish for measured in cell if measured.wish is not None]]
     ]
 
 
@@ -157,7 +169,8 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
 
     Each is a dict: the `row` that it is of; `object`, whether it is matched, missing or surplus;
     its `class`; where the `reference` and the `generated` one place it, None where only the other
-    has it; and their `match`, None without one. The matched ones come first, in the order in
+    has it; their `match`, None without one; and `wish_m`, how far the generated one is from what
+    is asked for, None without an intent. The matched ones come first, in the order in
     which they were matched. What has no displacement (see `Unmeasured`) has no objects.
     """
     for one in _measure(_rows().filter(job=job)):
@@ -168,6 +181,7 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
             for change in (_read(one.row.scenario.reference), _read_answer(one.row))
         )
         found = one.displacement
+        wish_m = {match.generated: match.error_m for match in one.wish.matches} if one.wish else {}
         for standing, reference_id, generated_id, match in (
             *(("matched", m.reference, m.generated, m) for m in found.matches),
             *(("missing", name, "", None) for name in found.missing),
@@ -181,6 +195,7 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
                 "reference": reference,
                 "generated": generated,
                 "match": match,
+                "wish_m": wish_m.get(generated_id),
             }
 
 
@@ -228,12 +243,19 @@ def _rows() -> QuerySet[Augmentation]:
 def _measure(rows: Iterable[Augmentation]) -> list[MeasuredRow]:
     listed = list(rows)
     unfinished = Distance(why_not=MissingReason.UNFINISHED)
-    distances = DISTANCES.of(row.pk for row in listed)
-    return [_measure_augmentation(row, distances.get(row.pk, unfinished)) for row in listed]
+    ids = [row.pk for row in listed]
+    distances, wishes = DISTANCES.of(ids), WISHES.of(ids)
+    return [
+        _join_measures(row, distances.get(row.pk, unfinished), wishes.get(row.pk))
+        for row in listed
+    ]
 
 
-def _measure_augmentation(row: Augmentation, distance: Distance) -> MeasuredRow:
-    return MeasuredRow(row=row, **{field.name: getattr(distance, field.name) for field in _FIELDS})
+def _join_measures(
+    row: Augmentation, distance: Distance, wish: Displacement | None
+) -> MeasuredRow:
+    values = {field.name: getattr(distance, field.name) for field in _FIELDS}
+    return MeasuredRow(row=row, wish=wish, **values)
 
 
 def _compute(ids: Collection[int]) -> dict[int, Distance]:
@@ -269,7 +291,25 @@ def _measure_row(
     return Distance(displacement=found, kept=kept)
 
 
+def _compute_wishes(ids: Collection[int]) -> dict[int, Displacement]:
+    """Measure all rows whose scenario has an intent; a scene is read once."""
+    wishes: dict[int, Displacement] = {}
+    wished = Augmentation.objects.filter(pk__in=ids, scenario__intent__isnull=False)
+    for scenario, rows in rows_by_scenario(wished):
+        with suppress(InvalidDocument):
+            ground, intent = load_ground(scenario), load_intent(scenario)
+            for row in rows:
+                answer = _read_answer(row)
+                if intent is None or (answer is None and row.state == State.DONE):
+                    continue
+                with suppress(InvalidModification):
+                    wish = displacement_from_wish(answer, intent, ground)
+                    wishes |= {} if wish is None else {row.pk: wish}
+    return wishes
+
+
 DISTANCES = Measure("displacement", Distance, _compute)
+WISHES = Measure("wish distance", Displacement, _compute_wishes)
 _FIELDS = fields(Distance)
 
 

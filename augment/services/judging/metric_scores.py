@@ -14,6 +14,7 @@ from augment.services.judging.findings import read_findings
 SAME_M = 0.15
 """Displacements that differ by no more are equal: objects so near each other look the same."""
 
+_REFERENCE = Contestant.Kind.REFERENCE
 UNREADABLE_OR_REFUSED = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 
 
@@ -34,20 +35,27 @@ class MetricScores:
 
 def metric_scores(ids: Collection[int]) -> tuple[MetricScores, ...]:
     """Return the scores of the augmentations with these primary keys; a second for a hundred."""
-    return (_displacement(ids), _checks(ids), *_driving(ids))
+    return (*_distances(ids), _checks(ids), *_driving(ids))
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _displacement(ids: Collection[int]) -> MetricScores:
-    """Less is better; none for the reference itself, which would be held against itself."""
-    scores = {
-        str(one.row.code): -one.displacement.error_m
-        for one in of_rows(ids)
-        if one.displacement is not None and one.row.contestant.kind != Contestant.Kind.REFERENCE
-    }
-    return MetricScores(name="Displacement", by_code=scores, tolerance=SAME_M)
+def _distances(ids: Collection[int]) -> list[MetricScores]:
+    """Less is better; by displacement none for the reference, which is held against itself."""
+    wishes, displacements = dict[str, float](), dict[str, float]()
+    for measured in of_rows(ids):
+        code, is_reference = str(measured.row.code), measured.row.contestant.kind == _REFERENCE
+        if measured.wish is not None:
+            wishes[code] = -measured.wish.error_m
+        if measured.displacement is not None and not is_reference:
+            displacements[code] = -measured.displacement.error_m
+    by_name = {"Distance to the wish": wishes} if wishes else {}
+    by_name["Displacement"] = displacements
+    return [
+        MetricScores(name=name, by_code=scores, tolerance=SAME_M)
+        for name, scores in by_name.items()
+    ]
 
 
 def _checks(ids: Collection[int]) -> MetricScores:
