@@ -157,10 +157,12 @@ class _Fitting:
             request: As the intent has it.
             counted: The same, counted from the ego; what it is for an anchor that is missing.
         """
+        if isinstance(request, wish.DoorRequest):
+            return replace(counted, spot=request.spot)  # its car is named there
         via = counted.spot.via
         anchor = self._first.get(request.spot.anchor or "")
-        if anchor is None or isinstance(request, wish.DoorRequest):
-            return replace(counted, spot=request.spot) if anchor else counted
+        if anchor is None:
+            return counted
         lanes = self._own.over(via) or self._own
         ahead_m = lanes.route.locate_agent(anchor).ahead_m
         there = wish.Spot(

@@ -162,6 +162,7 @@ def test_a_careless_answer_is_far_off_or_wrong_and_no_further_than_the_reference
     slug, made = CARELESS[name]
     distance_m = wish_m(slug, Modification(added=(made,)))
     assert distance_m > 1.0 or is_wrong(slug, made)
+    assert distance_m > 0.3
     ground = Ground.of(shown_scene(slug))
     found = displacement(Modification(added=(made,)), entry(slug).reference, ground)
     assert found.mean_m is not None
