@@ -67,8 +67,11 @@ EARLIER: dict[str, tuple[str, frozenset[str]]] = {
         frozenset({"augment.simulation.version"}),
     ),
     "augment.0043_fc_plus": ("change_values", frozenset()),
+    "augment.0044_open_set": ("", frozenset()),
+    "augment.0045_judge_frames": ("", frozenset({"augment.judgerun.frames"})),
 }
-"""Migrations that rows may lack: what these do to values, and columns that get their default."""
+"""Migrations that rows may lack: what these do to values (empty for nothing), and columns that get
+their default."""
 SMALL = 1 << 24
 """A manifest is far below this; a longer one is none of ours."""
 EXPERTS = "expert"
@@ -371,8 +374,9 @@ def _restore(
             stored_rows.list_prepared_rows().delete()
             write()
             for migration in sorted(later):
-                module = import_module(migration.replace(".", ".migrations."))
-                getattr(module, EARLIER[migration][0])(apps, None)
+                if change := EARLIER[migration][0]:
+                    module = import_module(migration.replace(".", ".migrations."))
+                    getattr(module, change)(apps, None)
     except BaseException:
         for name in written:
             default_storage.delete(name)

@@ -21,6 +21,7 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 from pytest_django import Settings
 
+from arena.management.backups import EARLIER
 from arena.models import Person, Snapshot, Study
 from arena.results.exports.tables import leaderboard_table
 from arena.results.services.ratings import rate_now as rate
@@ -225,7 +226,7 @@ def test_nobody_of_a_folder_rules_and_no_key_is_sent_to_it(study: Study, tmp_pat
 @pytest.mark.parametrize(
     ("lacking", "variant", "version"),
     [
-        (["augment.0042_drives_have_a_version", "augment.0043_fc_plus"], "fc-plus+tqa", 2),
+        (list(EARLIER), "fc-plus+tqa", 2),
         (["augment.0043_fc_plus"], "fc-plus+tqa", 3),
         ([], "fc+tqa", 3),
     ],
