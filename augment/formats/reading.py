@@ -42,7 +42,7 @@ LONGEST_GAP_S = 0.35
 NEIGHBOURS = 2
 """Steps on either side that a speed is taken over: one alone shows the annotators' jitter."""
 _STANDING = (AgentType.TRAFFIC_CONE, AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
-_HEADED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
+_HEADED = (AgentType.EGO_VEHICLE, AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 STATE = ("x_m", "y_m", "heading_rad", "speed_mps")
 """The columns of a state."""
 
@@ -410,14 +410,11 @@ def place_on_lanes(scene: Scene) -> Scene:
     """
     graph = LaneGraph(scene)
 
-    def place(agent: TrafficAgent, heading_rad: float | None) -> TrafficAgent:
+    def place(agent: TrafficAgent) -> TrafficAgent:
+        heading_rad = agent.heading_rad if agent.type in _HEADED else None
         return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
 
-    agents = [
-        place(agent, agent.heading_rad if agent.type in _HEADED else None)
-        for agent in scene.agents
-    ]
-    return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))
+    return replace(scene, ego=place(scene.ego), agents=tuple(map(place, scene.agents)))
 
 
 # Private

@@ -190,14 +190,14 @@ def make_document(
         number: Of the new table.
         now: When it is made.
     """
-    vote_sets = [
+    sets = [
         vote_set(study, filters=Filters(authors=author_pairs(study)), last=last_vote_id(study))
         for study in studies
     ]
-    votes = [vote for votes_of in vote_sets for vote in votes_of.counted]
-    by_slug = {who.slug: who for votes_of in vote_sets for who in votes_of.competitors}
+    votes = [vote for votes_of in sets for vote in votes_of.counted]
+    by_slug = {who.slug: who for votes_of in sets for who in votes_of.competitors}
     competitors = [by_slug[slug] for slug in sorted(by_slug)]
-    founders = tuple(who.slug for who in vote_sets[0].competitors)
+    founders = tuple(who.slug for who in sets[0].competitors)
     arrays = vote_arrays(competitors, votes)
     rated = rate(arrays.comparisons, founders=founders)
     remarks = board_remarks(rated, arrays)
@@ -222,13 +222,11 @@ def make_document(
         method=_method_text(rated),
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
-        studies=tuple(map(_pool, studies, vote_sets)),
+        studies=tuple(map(_pool, studies, sets)),
         founders=founders,
         votes=cast,
         votes_sha256=sha256_hex(votes_csv(vote_rows(votes, judges))),
-        left_out=dict(
-            sorted(sum((Counter(x.left_out) for x in vote_sets), Counter[str]()).items())
-        ),
+        left_out=dict(sorted(sum((Counter(x.left_out) for x in sets), Counter[str]()).items())),
         notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
         versions={name: str(version) for name, version in software_versions().items()},
         includes_simulated=any(who.is_simulated for who in competitors)

@@ -130,11 +130,9 @@ def store(
         NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
-    frames_before = (
-        frames_shown(study, {scenario_at(pair.scenario) for pair in planned}) if batch else {}
-    )
-    scenarios = _scenarios(planned, cells, reads_scenes=not frames_before)
-    frames = find_frames(planned, cells, scenarios, frames_before)
+    fixed = frames_shown(study, {scenario_at(pair.scenario) for pair in planned}) if batch else {}
+    scenarios = _scenarios(planned, cells, reads_scenes=not fixed)
+    frames = find_frames(planned, cells, scenarios, fixed)
     changes = legends_of_changes(
         {
             cell.pk: frames[pair.scenario].view
@@ -145,22 +143,20 @@ def store(
     rows = [
         Matchup(
             study=study,
-            expert=by_name[planned_pair.expert],
-            position=planned_pair.position,
-            scenario=scenarios[scenario_at(planned_pair.scenario)],
+            expert=by_name[plan.expert],
+            position=plan.position,
+            scenario=scenarios[scenario_at(plan.scenario)],
             left=left,
             right=right,
             left_image=left.image,
             right_image=right.image,
             original_image=frame.original_image,
             view={**frame.view, LEGEND: {"scene": frame.legend, "pair": pair}},
-            kind=planned_pair.kind,
+            kind=plan.kind,
             batch=batch,
         )
-        for planned_pair in planned
-        for frame, (left, right) in [
-            (frames[planned_pair.scenario], find_sides(planned_pair, cells))
-        ]
+        for plan in planned
+        for frame, (left, right) in [(frames[plan.scenario], find_sides(plan, cells))]
         for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
@@ -172,8 +168,8 @@ def store(
         expert__in={row.expert_id for row, _ in again}, kind=Matchup.Kind.MAIN
     )
     keys = {(expert, at): pk for expert, at, pk in mains.values_list("expert", "position", "pk")}
-    for row, planned_pair in again:
-        row.repeat_of_id = keys[row.expert_id, planned_pair.repeats or 0]
+    for row, plan in again:
+        row.repeat_of_id = keys[row.expert_id, plan.repeats or 0]
     Matchup.objects.bulk_create([row for row, _ in again], batch_size=500)
 
 
