@@ -135,9 +135,9 @@ def store(
     frames = find_frames(planned, cells, scenarios, fixed)
     changes = legends_of_changes(
         {
-            cell.pk: frames[pair.scenario].view
-            for pair in planned
-            for cell in find_sides(pair, cells)
+            cell.pk: frames[plan.scenario].view
+            for plan in planned
+            for cell in find_sides(plan, cells)
         }
     )
     rows = [
@@ -161,9 +161,8 @@ def store(
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
     Matchup.objects.bulk_create(firsts, batch_size=500)
-    again = [
-        (row, pair) for row, pair in zip(rows, planned, strict=True) if pair.repeats is not None
-    ]
+    pairs = zip(rows, planned, strict=True)
+    again = [(row, plan) for row, plan in pairs if plan.repeats is not None]
     mains = study.matchups.filter(
         expert__in={row.expert_id for row, _ in again}, kind=Matchup.Kind.MAIN
     )
