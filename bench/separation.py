@@ -1,113 +1,142 @@
-"""How far a careless stand-in is from a good one: `python -m bench.separation`.
+"""How well measures tell careless answers from right ones: `python -m bench.separation [FOLDER]`.
 
-Both answer every scenario of the still sets (paper and hard) and of the moving set, without a
-server: the good one as the rule placer does, the careless one with its mistakes, `SAMPLES` times.
-Measured is the displacement, over time where something moves, and its spread: the standard
-deviation of the good one's over the scenarios. Scenarios are clusters: the intervals are
-percentiles of the bootstrap over them, the spread held. Writes into docs/catalogue.md.
+Right are placements of the rule placer by several seeds: where a sentence leaves a choice they
+differ, as answers of several people would. Careless are the stand-in's, without the function
+(`otm`) and with it (`fc-plus`). FOLDER may hold a model's answers as SCENARIO.KIND.md, of which
+`careless` ones are careless and all others right. Nothing is asked; a server is not needed.
+
+Each answer is measured by its displacement from the reference, by the distance to the wish and by
+the number of wrong findings. `told apart` is the share of pairs of a right and a careless answer
+of one scenario in which the careless one is worse, ties half (0.5 is chance); its intervals are
+percentiles of the bootstrap over scenarios. The spread is the standard deviation over all right
+answers. Writes into docs/catalogue.md.
 """
 
-from collections.abc import Sequence
+import sys
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from augment.baselines.rule_placer import place
-from augment.checks import Ground
+from augment.checks import Ground, Severity
+from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.fake_llm import careless
-from augment.metrics.displacement import Displacement, displacement
+from augment.metrics.displacement import displacement, displacement_from_wish
+from augment.prompts.reply import read_reply
+from augment.scene.entities import Modification
 from bench.moving_set import PROCESSES
 from bench.report import ROOT, table, write_block
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 
-SAMPLES, ROUNDS, SEED = 20, 10_000, 2026
-PLACED_WITHIN_M = 2.0
-"""At t0 whatever is this near to the reference's place stands where it should."""
+SEEDS, SAMPLES, ROUNDS, SEED = 4, 5, 10_000, 2026
+RIGHT, CARELESS = "right", "careless"
+KINDS = {"otm": frozenset[str](), "fc-plus": careless.SPARED_BY_TOOL}
+"""The stand-in's, with the mistakes that are spared."""
+MEASURES = ("displacement", "wish", "findings")
 
-Pairs = NDArray[np.float64]
-"""(S, 2): mean displacements of the good and the careless one, by scenario."""
+Errors = NDArray[np.float64]
+"""(N, 3): of N answers, by each of `MEASURES`; more is worse."""
 
 
-def measure(slug: str) -> tuple[float, list[tuple[float, bool]]] | None:
-    """Return the good answer's error, and those of the careless ones with whether all is placed.
-
-    None where a wish can't be met.
-    """
-    scene, asked = shown_scene(slug), entry(slug)
+def measure(slug: str, answers: Sequence[Modification | None]) -> Errors:
+    """Return the errors of answers to one scenario; None is one that could not be read."""
+    asked, ground = entry(slug), Ground.of(shown_scene(slug))
     assert asked.intent is not None
-    ground = Ground.of(scene)
-    try:
-        right = place(scene, asked.intent).modification
-    except CannotPlace:
-        return None
-    bent = []
-    for sample in range(SAMPLES):
-        rng = careless.dice(f"{slug} {sample}")
-        answer = None if careless.is_unreadable(rng) else careless.bend(scene, right, rng)[0]
-        found = displacement(answer, asked.reference, ground)
-        bent.append((found.error_m, is_placed(found)))
-    return displacement(right, asked.reference, ground).error_m, bent
-
-
-def is_placed(found: Displacement) -> bool:
-    """Whether at t0 all stands where it should, so that no still picture tells of a mistake."""
-    far = any(distance_m > PLACED_WITHIN_M for distance_m in found.distances_m)
-    return not (far or found.missing or found.surplus)
-
-
-def pairs_of(slugs: Sequence[str]) -> tuple[Pairs, Pairs]:
-    """Return the pairs of all answers, and of those whose objects are placed at t0."""
-    with get_context("spawn").Pool(PROCESSES) as pool:
-        measured = [one for one in pool.map(measure, slugs, chunksize=1) if one is not None]
-    every, placed = [], []
-    for good_m, bent in measured:
-        every.append((good_m, float(np.mean([error_m for error_m, _ in bent]))))
-        errors_m = [error_m for error_m, fits in bent if fits]
-        if errors_m:
-            placed.append((good_m, float(np.mean(errors_m))))
-    return np.array(every), np.array(placed)
-
-
-def drawn_differences(pairs: Pairs, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return the mean difference (ROUNDS,) over scenarios drawn with replacement."""
-    rows = rng.integers(len(pairs), size=(ROUNDS, len(pairs)))
-    return np.asarray((pairs[:, 1] - pairs[:, 0])[rows].mean(axis=1))
-
-
-def report() -> str:
-    """A row for each set and kind of answer, and the ratios."""
-    rng = np.random.default_rng(SEED)
-    still, moving = pairs_of([*SLUGS, *HARD_SLUGS]), pairs_of(MOVING_SLUGS)
     rows = []
-    for name, before, now in zip(("all", "placed at t0"), still, moving, strict=True):
-        drawn = [drawn_differences(pairs, rng) for pairs in (before, now)]
-        for title, pairs, found in zip(("still", "moving"), (before, now), drawn, strict=True):
-            medians = [f"{median_m:.2f}" for median_m in np.median(pairs, axis=0)]
-            spread = f"{np.std(pairs[:, 0], ddof=1):.2f}"
-            apart = _within(_apart(pairs), found)
-            rows.append([name, title, str(len(pairs)), *medians, spread, apart])
-        if name == "all":
-            spread_m = float(np.std(before[:, 0], ddof=1))
-            by_spread = _within(_apart(now) / spread_m, drawn[1] / spread_m)
-            rows.append([name, "moving : still spread", "", "", "", "", by_spread])
-        ratio = _within(_apart(now) / _apart(before), drawn[1] / drawn[0])
-        rows.append([name, "moving : still", "", "", "", "", ratio])
-    head = ["answers", "set", "scenarios", "good, median (m)", "careless, median (m)"]
-    return table([*head, "good, SD (m)", "mean difference (m)"], rows)
+    for answer in answers:
+        wish = displacement_from_wish(answer, asked.intent, ground)
+        found = check_against_intent(ground, answer or Modification(), asked.intent)
+        wrong = sum(one.severity is Severity.WRONG for one in found)
+        far_m = displacement(answer, asked.reference, ground).error_m
+        rows.append((far_m, np.nan if wish is None else wish.error_m, float(wrong)))
+    return np.array(rows, dtype=np.float64).reshape(-1, len(MEASURES))
 
 
-def _apart(pairs: Pairs) -> float:
-    return float(np.mean(pairs[:, 1] - pairs[:, 0]))
+def measure_stand_ins(slug: str) -> dict[str, Errors]:
+    """Return the errors of right answers, and of careless ones by kind; none of an unmet wish."""
+    scene, intent = shown_scene(slug), entry(slug).intent
+    try:
+        right = [place(scene, intent, seed=seed).modification for seed in range(SEEDS)]
+    except CannotPlace:
+        return {}
+    measured = {RIGHT: measure(slug, right)}
+    for kind, spared in KINDS.items():
+        bent: list[Modification | None] = []
+        for sample in range(SAMPLES):
+            rng = careless.dice(f"{slug} {sample}")
+            is_lost, start = careless.is_unreadable(rng), right[sample % SEEDS]
+            bent.append(None if is_lost else careless.bend(scene, start, rng, spared)[0])
+        measured[kind] = measure(slug, bent)
+    return measured
 
 
-def _within(value: float, drawn: NDArray[np.float64]) -> str:
-    low, high = np.percentile(drawn, [2.5, 97.5])
-    return f"{value:.2f} [{low:.2f}, {high:.2f}]"
+def measure_folder(folder: Path) -> list[dict[str, Errors]]:
+    """Return the errors of a model's answers, right and careless ones, by scenario."""
+    answers: defaultdict[str, dict[str, list[Modification | None]]]
+    answers = defaultdict(lambda: {RIGHT: [], CARELESS: []})
+    for file in sorted(folder.glob("*.*.md")):
+        slug, kind, _ = file.name.split(".")
+        reply = read_reply(file.read_text(encoding="utf-8"), scene=shown_scene(slug))
+        answers[slug][CARELESS if kind == CARELESS else RIGHT].append(reply.modification)
+    return [
+        {kind: measure(slug, some) for kind, some in kinds.items()}
+        for slug, kinds in answers.items()
+    ]
+
+
+def count_told_apart(measured: Sequence[Mapping[str, Errors]], kind: str) -> Errors:
+    """Return the share of pairs (S, 3) that are told apart, by scenario and measure."""
+    shares = []
+    for errors in measured:
+        gaps = errors[kind][:, None, :] - errors[RIGHT][None, :, :]
+        # What differs by rounding alone is a tie.
+        shares.append(((gaps > 1e-6) + 0.5 * (abs(gaps) <= 1e-6)).mean(axis=(0, 1)))
+    return np.array(shares)
+
+
+def make_row(
+    title: Sequence[str], measured: Sequence[Mapping[str, Errors]], kind: str
+) -> list[str]:
+    """Return a row of the table: what right and careless answers have, and what tells them."""
+    right = np.vstack([errors[RIGHT] for errors in measured])
+    bent = np.vstack([errors[kind] for errors in measured])
+    shares, rng = count_told_apart(measured, kind), np.random.default_rng(SEED)
+    drawn = shares[rng.integers(len(shares), size=(ROUNDS, len(shares)))].mean(axis=1)
+    lows, highs = np.percentile(drawn, [2.5, 97.5], axis=0)
+    cells = [*title, str(len(measured))]
+    for number in range(2):
+        medians = [f"{np.median(some[:, number]):.2f}" for some in (right, bent)]
+        cells += [*medians, f"{np.std(right[:, number], ddof=1):.2f}"]
+    cells += [f"{(some[:, 2] > 0).mean():.0%}" for some in (right, bent)]
+    means = shares.mean(axis=0)
+    return cells + [
+        f"{mean:.2f} [{low:.2f}, {high:.2f}]"
+        for mean, low, high in zip(means, lows, highs, strict=True)
+    ]
+
+
+def report(folder: Path | None) -> str:
+    """Return the table: a row for each kind of careless answers and set."""
+    rows = []
+    with get_context("spawn").Pool(PROCESSES) as pool:
+        for title, slugs in (("still", [*SLUGS, *HARD_SLUGS]), ("moving", MOVING_SLUGS)):
+            measured = [one for one in pool.map(measure_stand_ins, slugs, chunksize=1) if one]
+            rows += [make_row((kind, title), measured, kind) for kind in KINDS]
+    if folder is not None:
+        rows.append(make_row(("a model's", "moving"), measure_folder(folder), CARELESS))
+    head = ["careless", "set", "scenarios"]
+    for name in ("displacement", "wish"):
+        head += [f"{name} (m), right", "careless", "spread of right"]
+    head += ["wrong by checks, right", "careless", "told apart by displacement"]
+    return table([*head, "by wish", "by checks"], rows)
 
 
 if __name__ == "__main__":
-    text = report()
+    text = report(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
     print(text)
     write_block("separation", text, page=ROOT / "docs" / "catalogue.md")
