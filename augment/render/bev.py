@@ -31,7 +31,7 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import AnyLane
 from augment.scene.recording import Recording
-from augment.scene.trails import find_trails
+from augment.scene.trails import find_trails, plan_held
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named for reviewers, and lie over the boxes."""
@@ -136,7 +136,8 @@ def _paint_scene(
     ground = _draw_unchanged(rest, camera, corner).copy()
     if ghosts:
         draw_ghosts(ground, scene, modification)
-    draw_trails(ground, find_trails(scene, modification, recording))
+    shown = plan_held(modification) if camera.is_filmed else modification
+    draw_trails(ground, find_trails(scene, shown, recording))
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
     lost = [one for one in modification.changed if not ground.shows(ground.at(one.x_m, one.y_m))]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]

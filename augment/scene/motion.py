@@ -194,13 +194,13 @@ def _resample_track(
     agent: TrafficAgent, states: FloatArray, recording: Recording, times_s: FloatArray
 ) -> Movement:
     """A track, read at even times; its first state is that of the scene, to the last digit."""
-    read = _read_at(states, recording.times_s, times_s)
+    read = read_at(states, recording.times_s, times_s)
     read[0] = _state(agent)
     return Movement(agent=agent, source=MotionSource.RECORDED, states=read)
 
 
-def _read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> FloatArray:
-    """States between two recorded ones; NaN beside a step where nothing was seen."""
+def read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> FloatArray:
+    """Return states between two recorded ones; NaN beside a step where nothing was seen."""
     after = np.clip(np.searchsorted(recorded_s, times_s - 1e-9), 1, len(recorded_s) - 1)
     before = after - 1
     share = (times_s - recorded_s[before]) / (recorded_s[after] - recorded_s[before])
@@ -220,7 +220,7 @@ def _later(
     for track in recording.tracks:
         if track.agent_id in taken or track.agent_id in replaced:
             continue
-        states = _read_at(track.states, recording.times_s, times_s)
+        states = read_at(track.states, recording.times_s, times_s)
         seen = np.flatnonzero(~np.isnan(states).any(axis=1))
         if len(seen):
             agent = track_agent(track, states[seen[0]])

@@ -10,7 +10,7 @@ import numpy as np
 
 from augment.scene.entities import Modification, Scene, TrafficAgent, apply
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, find_motion, with_movers_alone
-from augment.scene.planned_motion import AtTime
+from augment.scene.planned_motion import AtTime, PlannedMotion
 from augment.scene.recording import Recording
 
 EVERY_S = 1.0
@@ -80,6 +80,17 @@ def find_trails(
             spots = _spots(agent, spots_at)
             trails.append(Trail(agent=agent, way_m=_there(way_m), spots=spots, sets_out=True))
     return tuple(trails)
+
+
+def plan_held(modification: Modification) -> Modification:
+    """Return a change in which who holds a velocity has a motion that says so, for its trail."""
+
+    def plan(agent: TrafficAgent) -> TrafficAgent:
+        holds = agent.speed_mps > 0.0 and agent.motion is None and agent.walk_to_m is None
+        return replace(agent, motion=PlannedMotion()) if holds else agent
+
+    added, moved = (tuple(map(plan, part)) for part in (modification.added, modification.moved))
+    return replace(modification, added=added, moved=moved)
 
 
 @lru_cache(maxsize=8)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
-from augment.scene.motion import LENGTH_S
+from augment.scene.motion import LENGTH_S, read_at
 from augment.scene.planned_motion import EGO_ID
 from augment.scene.planned_mover import HeldCourse, PlannedMover
 from augment.scene.recording import Recording, Track, track_agent
@@ -147,23 +147,29 @@ class Walkers:
 
 
 class Replay:
-    """Tracks, read every 0.1 s; who was not seen at a moment is not there.
+    """Tracks, read every 0.1 s as `find_motion` reads them; who was not seen is not there.
 
     Args:
-        recording: Its times need not be even; each step takes the nearest moment.
+        recording: Its times need not be even.
         tracks: Those of the recording that are replayed.
     """
 
     def __init__(self, recording: Recording, tracks: Sequence[Track]) -> None:
-        self._tracks, self._times = tuple(tracks), recording.times_s
-        self.steps_left = round(float(self._times[-1]) / STEP_S)
+        self.steps_left = round(float(recording.times_s[-1]) / STEP_S)
+        times_s: FloatArray = np.asarray(STEP_S * np.arange(self.steps_left + 1), np.float64)
+        self._rows = [
+            (
+                one,
+                read_at(one.states, recording.times_s, times_s) if self.steps_left else one.states,
+            )
+            for one in tracks
+        ]
         self._step = 0
 
     def agents(self) -> list[TrafficAgent]:
         """Return those who are seen now, as agents."""
-        at = int(np.abs(self._times - self._step * STEP_S).argmin())
-        seen = [track for track in self._tracks if not np.isnan(track.states[at]).any()]
-        return [track_agent(track, track.states[at]) for track in seen]
+        rows = [(track, states[self._step]) for track, states in self._rows]
+        return [track_agent(track, state) for track, state in rows if not np.isnan(state).any()]
 
     def objects(self) -> Objects:
         """Return those who are seen now."""

@@ -92,6 +92,16 @@ def test_a_picture_shows_a_trail_and_one_without_has_the_palette_that_it_had() -
     assert int.from_bytes(png[entry - 4 : entry]) == 3 * palette.inks()[palette.TRAIL[0]]
 
 
+def test_in_filmed_pictures_who_holds_a_velocity_looks_as_if_a_motion_said_so() -> None:
+    bus = replace(vehicle("New1", 20.0, 0.0), speed_mps=6.0, lane_id="Lane1")
+    said = replace(bus, motion=PlannedMotion())
+    changes = [Modification(added=(one,)) for one in (bus, said)]
+    camera = camera_for(STREET, changes[1])
+    first, second = (opened(draw(STREET, one, camera)).tobytes() for one in changes)
+    assert first == second
+    assert first != opened(draw(STREET, changes[0], replace(camera, is_filmed=False))).tobytes()
+
+
 def test_a_film_names_nobody_and_is_the_same_whatever_they_are_called() -> None:
     cars = (cutting_in(0.5), vehicle("New2", 40.0, 0.0), cone("New3", 30.0, 2.0))
     change = Modification(added=cars)

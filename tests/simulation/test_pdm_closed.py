@@ -8,7 +8,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent, without_traffic
+from augment.scene.entities import (
+    Area,
+    AreaKind,
+    InterplanRules,
+    Modification,
+    SceneOptions,
+    TrafficAgent,
+    without_traffic,
+)
 from augment.simulation.drive import Drive, run
 from augment.simulation.pdm_closed import (
     ORIGINAL_OFFSETS_M,
@@ -200,7 +208,8 @@ def test_one_walker_who_steps_out_late_makes_a_slow_ego_brake(
     at_m = 2.2 * speed
     walker = pedestrian("P", at_m, -2.2, (at_m, 26.6))
     scene = street(speed_mps=speed, limit_mps=1.1 * speed)
-    setting = DriveSetting(scene=scene, modification=Modification(added=(walker,)))
+    by_rules = replace(scene, options=SceneOptions(interplan=InterplanRules()))
+    setting = DriveSetting(scene=by_rules, modification=Modification(added=(walker,)))
     drive = run(setting, PdmClosed(offsets), steps=20)
     assert any(plan.braking for plan in drive.plans) == brakes
     assert (drive.states[-1, 3] < 0.5 * speed) == brakes

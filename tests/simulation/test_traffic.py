@@ -19,6 +19,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
+from augment.scene.motion import find_motion
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.recording import Recording
 from augment.simulation.road import Road
@@ -178,6 +179,21 @@ def test_a_recording_is_replayed() -> None:
     assert place(made[5], "Agent2") == pytest.approx((23.0, 0.0))
     assert place(made[40], "Agent2") == pytest.approx((26.0, 0.0))
     assert ["Agent3" in row.ids for row in made[8:23]] == [False] * 2 + [True] * 11 + [False] * 2
+
+
+def test_a_recording_with_few_moments_is_read_as_films_read_it() -> None:
+    setting = recorded()
+    assert setting.recording is not None
+    thin = setting.recording
+    thin = Recording(
+        times_s=thin.times_s[::4],
+        ego=thin.ego[::4],
+        tracks=tuple(replace(one, states=one.states[::4]) for one in thin.tracks),
+    )
+    states = find_motion(setting.scene, recording=thin).others[0].states
+    made = after(replace(setting, recording=thin), 40)
+    for step in range(41):
+        assert place(made[step], "Agent2") == pytest.approx(tuple(states[step, :2]))
 
 
 def test_in_a_reactive_drive_recorded_vehicles_follow_their_lanes() -> None:
