@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
+from arena import tasks
 from arena.exports.drawing import SIMULATED
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
@@ -109,6 +110,7 @@ def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None
 def test_a_worker_draws_the_charts_and_pages_only_read_them(
     snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    assert tasks is not None  # registers what a worker draws
     draw, what = sending.send_charts.args  # the message
     draw(what, snapshot.pk)
     monkeypatch.setattr("arena.results.exports.charts.write_figure", None)

@@ -163,9 +163,8 @@ def store(
     Matchup.objects.bulk_create(firsts, batch_size=500)
     pairs = zip(rows, planned, strict=True)
     again = [(row, plan) for row, plan in pairs if plan.repeats is not None]
-    mains = study.matchups.filter(
-        expert__in={row.expert_id for row, _ in again}, kind=Matchup.Kind.MAIN
-    )
+    repeaters = {row.expert_id for row, _ in again}
+    mains = study.matchups.filter(expert__in=repeaters, kind=Matchup.Kind.MAIN)
     keys = {(expert, at): pk for expert, at, pk in mains.values_list("expert", "position", "pk")}
     for row, plan in again:
         row.repeat_of_id = keys[row.expert_id, plan.repeats or 0]
