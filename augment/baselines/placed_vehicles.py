@@ -88,8 +88,8 @@ def place_vehicles(
         assert wish is not None
         speed_mps = request.speed_mps or 0.0
         pose, lane_id = find_arm(ground, wish.side, speed_mps, nearer_m=distance_m)
-        one = build_agent(_agent_type(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
-        return (give_motion(wish, ground, one, rng),)
+        vehicle = build_agent(_agent_type(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
+        return (give_motion(wish, ground, vehicle, rng),)
     apart_m = _size_m(body)[0] + BUMPER_GAP_M
     if request.spacing is not None:
         apart_m = request.spacing.drawn(rng)
@@ -249,7 +249,7 @@ def _choices(
             return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
         pose = pose_at(_touching_m(body, before, pose_at) if gap_m is None else gap_m)
-        shared = max(_shared_area(body, pose, one) for one in poses)
+        shared = max(_shared_area(body, pose, taken_pose) for taken_pose in poses)
         off_lane = 0.0 if other.turn_deg is None else abs(wrap(heading_rad - lane_rad))
         cost = abs(aside_rad) + 10.0 * shared + _COST_OF_TURN * min(off_lane, math.pi - off_lane)
         if shared <= _MOST_SHARED:
@@ -266,6 +266,6 @@ def _touching_m(body: Body, before: Pose, pose_at: Callable[[float], Pose]) -> f
     return high_m + _CRASH_GAP_M
 
 
-def _shared_area(body: Body, one: Pose, other: Pose) -> float:
+def _shared_area(body: Body, pose: Pose, other: Pose) -> float:
     """Return the share of a box that two of that kind have in common."""
-    return overlap(_box(body, one), _box(body, other)).share_of_first
+    return overlap(_box(body, pose), _box(body, other)).share_of_first

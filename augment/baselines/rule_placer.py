@@ -83,7 +83,11 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
     sentences = [f"{name} is removed." for name in changes.removed]
     for move in resolved.moves:
         agent = find_picked(lanes, move.who)[0]
-        others = tuple(one for one in apply(scene, changes).agents if one.id != agent.id)
+        others = tuple(
+            agent_before
+            for agent_before in apply(scene, changes).agents
+            if agent_before.id != agent.id
+        )
         fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
         moved, sentence = fitting.fit(_as_request(move, agent), agent if move.stays else None)
         same = {name: getattr(agent, name) for name in ("id", "type", "length_m", "width_m")}
@@ -91,10 +95,10 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
         sentences.append(f"{agent.id} is moved. {sentence}")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
     named: dict[str, _Agents] = {}
-    for asked, added in zip(intent.requests, resolved.requests, strict=True):
-        car = _make_car(asked, lanes, named) if isinstance(asked, intents.DoorRequest) else None
+    for wanted, added in zip(intent.requests, resolved.requests, strict=True):
+        car = _make_car(wanted, lanes, named) if isinstance(wanted, intents.DoorRequest) else None
         agents, sentence = fitting.fit(added, car)
-        named[asked.name] = agents
+        named[wanted.name] = agents
         fitting.added += agents
         sentences.append(sentence)
     if intent.beyond:
@@ -116,8 +120,8 @@ def list_open(request: intents.Request) -> list[str]:
     }
     return [
         f"What is asked of the {who} leaves open {what}."
-        for what, given in needs.items()
-        if given is None or given is False
+        for what, value in needs.items()
+        if value is None or value is False
     ]
 
 
@@ -225,8 +229,8 @@ class _Fitting:
             ground = Ground.of(replace(self._scene, agents=(*self._scene.agents, *before)))
         intent = intents.Intent(requests=(request,), route=self._route)
         findings = check_against_intent(ground, Modification(added=own), intent)
-        wrong = (one.sentence() for one in findings if one.severity is Severity.WRONG)
-        return next(wrong, ""), sum(one.severity is Severity.DOUBTFUL for one in findings)
+        wrong = (finding.sentence() for finding in findings if finding.severity is Severity.WRONG)
+        return next(wrong, ""), sum(finding.severity is Severity.DOUBTFUL for finding in findings)
 
 
 def _as_request(move: intents.Move, agent: TrafficAgent) -> intents.Request:

@@ -111,9 +111,9 @@ def _read_files(root: Path, names: Sequence[str], progress: Path) -> dict[str, F
     Raises:
         InvalidDocument: Too many end their process, or they hold too many agents together.
     """
-    found: dict[str, FileContent] = {}
+    by_name: dict[str, FileContent] = {}
     deaths = agents = 0
-    while rest := names[len(found) :]:
+    while rest := names[len(by_name) :]:
         problem = "was not read"
         request = {"what": "read", "root": str(root), "files": list(rest), "told": str(progress)}
         progress.write_bytes(b"")
@@ -135,8 +135,8 @@ def _read_files(root: Path, names: Sequence[str], progress: Path) -> dict[str, F
         if deaths > MOST_DEATHS:
             text = f"more than {MOST_DEATHS} files break the limits of their reader, the last"
             raise InvalidDocument("submission", [("", f"{text} {rest[0]}: {problem}")])
-        found.update(zip(rest, contents, strict=False))
-    return found
+        by_name.update(zip(rest, contents, strict=False))
+    return by_name
 
 
 def _remarks_on(strangers: Sequence[str]) -> tuple[str, ...]:

@@ -31,15 +31,15 @@ DOOR = Bounds(0.5, 1.2, 0.3)
 """How far a door opens, in metres."""
 
 
-def check_course(asked: Case) -> Iterator[Finding]:
+def check_course(case: Case) -> Iterator[Finding]:
     """Check the requested motion: its start, its course and its numbers."""
-    before = {agent.id: agent for agent in asked.route.scene.agents}
-    for party in asked.parties:
+    before = {agent.id: agent for agent in case.route.scene.agents}
+    for party in case.parties:
         wish: MotionWish | None = getattr(party.request, "motion", None)
         for agent in map(walk_as_motion, party.agents if wish is not None else ()):
             assert wish is not None
             if agent.id in before and party.request.spot == Spot():
-                off_m, wanted = apart_m(agent, before[agent.id]), asked.tolerances.distance_m
+                off_m, wanted = apart_m(agent, before[agent.id]), case.tolerances.distance_m
                 words = f"{{agents[0]}} is {off_m:.2f} m from where it was and is to stay."
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
             motion = agent.motion
@@ -50,21 +50,21 @@ def check_course(asked: Case) -> Iterator[Finding]:
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
             if wish.start is not None:
-                yield from _start(asked, agent, motion, wish.start)
-            states = _carry_out(asked, agent, motion)
+                yield from _start(case, agent, motion, wish.start)
+            states = _carry_out(case, agent, motion)
             if not len(states):
                 words = "{agents[0]} has left the map before its motion begins."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
-            yield from check_path(asked, agent, wish, states)
-            yield from _numbers(asked, agent, motion, wish, states)
+            yield from check_path(case, agent, wish, states)
+            yield from _numbers(case, agent, motion, wish, states)
 
 
 # Private
 
 
 def _start(
-    asked: Case, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
+    case: Case, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
 ) -> Iterator[Finding]:
     start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
     if wish.after_s is not None and isinstance(start, AtTime):
@@ -78,9 +78,9 @@ def _start(
     is_at_mark = isinstance(start, AtPlace) and start.agent_id == planned.EGO_ID
     if wish.after_s is None and (is_at_mark if wish.mark else isinstance(start, NearEgo)):
         assert not isinstance(start, AtTime)
-        mark_m = find_mark(asked.lanes, wish.mark) if wish.mark else None
+        mark_m = find_mark(case.lanes, wish.mark) if wish.mark else None
         if mark_m is not None and isinstance(start, AtPlace):
-            off_m = asked.route.locate(start.x_m, start.y_m).ahead_m - mark_m
+            off_m = case.route.locate(start.x_m, start.y_m).ahead_m - mark_m
             what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
             yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
         ends_m = (near.low_m, near.high_m) if near else (planned.REACHED_M, planned.REACHED_M)
@@ -94,11 +94,11 @@ def _start(
     yield find(kind, False, [agent], words)
 
 
-def _carry_out(asked: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
+def _carry_out(case: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
     """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
     begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
     alone = replace(agent, motion=replace(motion, start=begins))
-    mover, rows = PlannedMover(alone, asked.route.graph), []
+    mover, rows = PlannedMover(alone, case.route.graph), []
     for time_s in np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist():
         mover.advance(time_s)
         rows.append(mover.state())
@@ -107,15 +107,15 @@ def _carry_out(asked: Case, agent: TrafficAgent, motion: PlannedMotion) -> Float
 
 
 def check_path(
-    asked: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
+    case: Case, agent: TrafficAgent, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
     """Check the place that the motion reaches."""
-    places = [asked.route.locate(x, y) for x, y in states[:, :2].tolist()]
+    places = [case.route.locate(x, y) for x, y in states[:, :2].tolist()]
     first, last = places[0], places[-1]
     match wish.preset:
         case MotionPreset.CUT_IN | MotionPreset.PULL_OUT:
             what = "The offset of {agents[0]} in the end to the left of the ego's lane's centre"
-            wanted = Bounds(0.0, 0.0, asked.tolerances.middle_m)
+            wanted = Bounds(0.0, 0.0, case.tolerances.middle_m)
             yield hold(FindingKind.ASKED_ACROSS, [agent], what, last.left_m, wanted)
         case MotionPreset.U_TURN:
             turned_deg = math.degrees(abs(difference(states[-1, 2], states[0, 2])))
@@ -132,7 +132,7 @@ def check_path(
                     FindingKind.ASKED_SIDE, fits, [agent], f"{words}, from the {wish.side}."
                 )
         case MotionPreset.EMERGENCY_STOP:
-            bend_m = find_bend_end(asked.route) or 0.0
+            bend_m = find_bend_end(case.route) or 0.0
             words = (
                 f"{{agents[0]}} stops {last.ahead_m:.1f} m ahead; the bend ends at {bend_m:.1f} m."
             )
@@ -144,7 +144,7 @@ def check_path(
 
 
 def _numbers(
-    asked: Case, agent: TrafficAgent, motion: PlannedMotion, wish: MotionWish, states: FloatArray
+    case: Case, agent: TrafficAgent, motion: PlannedMotion, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
     profile = [(0.0, agent.speed_mps), *motion.speeds]
     slows = wish.preset in (MotionPreset.HARD_BRAKING, MotionPreset.EMERGENCY_STOP)
@@ -153,7 +153,7 @@ def _numbers(
     ]
     moves = states[:, 3] > 0.0
     if wish.preset is MotionPreset.CUT_IN:
-        lefts_m = np.array([asked.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])
+        lefts_m = np.array([case.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])
         moves = np.abs(lefts_m - lefts_m[-1]) > _THERE_M
     measured = {
         "speed_mps": ("The speed in the end of {agents[0]}", profile[-1][1], "m/s"),

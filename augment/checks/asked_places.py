@@ -19,25 +19,25 @@ _TAPER_M = 1.0
 """Cones of which the last is this far across from the first run from one side to the other."""
 
 
-def check_distance(asked: Case) -> Iterator[Finding]:
+def check_distance(case: Case) -> Iterator[Finding]:
     """One finding a request: wrong beyond the tolerance.
 
     A crash counts by its first vehicle, cones by the first, a ring by its middle, pedestrians
     by where a walk begins or meets the ego's route. Where the number is wrong, which is a fault of
     its own, any may be the first, and where the first is missing the next one is.
     """
-    for party in asked.parties:
-        spans_m = list_stations(party.request.spot, asked.lanes)
+    for party in case.parties:
+        spans_m = list_stations(party.request.spot, case.lanes)
         if not party.placed or spans_m == (EVERYWHERE,):
             continue
-        nearest_m = asked.ahead_m(party.placed[0])
+        nearest_m = case.ahead_m(party.placed[0])
         span_m = min(spans_m, key=lambda span_m: find_off(nearest_m, [span_m]))
-        allowed_m, furthest_m = asked.tolerances.distance_m, max(map(abs, span_m))
+        allowed_m, furthest_m = case.tolerances.distance_m, max(map(abs, span_m))
         if math.isfinite(furthest_m):
-            share_m = asked.tolerances.distance_share * furthest_m
+            share_m = case.tolerances.distance_share * furthest_m
             allowed_m = max(allowed_m, share_m) + _to_next_m(party)
         wanted = Bounds(*span_m, allowed_m)
-        first, ahead_m = _measure_ahead(asked, party, wanted)
+        first, ahead_m = _measure_ahead(case, party, wanted)
         what = "the cones' middle" if _is_ring(party) else "{agents[0]}"
         yield hold(
             FindingKind.ASKED_DISTANCE,
@@ -52,21 +52,21 @@ def _is_ring(party: Party) -> bool:
     return isinstance(party.request, wish.ConesRequest) and party.request.shape is wish.Shape.RING
 
 
-def _measure_ahead(asked: Case, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
+def _measure_ahead(case: Case, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
     """Return the agent that defines a party's distance, and its distance ahead of the ego in m."""
     request = party.request
     sign = -1.0 if request.spot.relation is wish.Relation.BEHIND else 1.0
     agents = [*party.placed, *party.spare]
-    ahead = [(asked.ahead_m(agent), agent) for agent in agents]
+    ahead = [(case.ahead_m(agent), agent) for agent in agents]
     first_m, first = min(ahead, key=lambda item: (sign * item[0], item[1].id))
     if _is_ring(party):
         return first, sum(value for value, _ in ahead) / len(ahead)
     if isinstance(request, wish.CrashRequest) and party.is_exact:
-        first = in_order(party, request, asked.route)[0]
-        return first, asked.ahead_m(first)
+        first = in_order(party, request, case.route)[0]
+        return first, case.ahead_m(first)
     if isinstance(request, wish.WalkRequest):
-        meetings = [(meets_route(asked.route, agent), agent) for agent in party.placed]
-        ahead += [(asked.route.locate(*at).ahead_m, agent) for at, agent in meetings if at]
+        meetings = [(meets_route(case.route, agent), agent) for agent in party.placed]
+        ahead += [(case.route.locate(*at).ahead_m, agent) for at, agent in meetings if at]
     elif not isinstance(request, wish.CrashRequest) and party.is_exact:
         return first, first_m
     value, agent = min(ahead, key=lambda item: (wanted.off(item[0]), item[1].id))
@@ -82,36 +82,36 @@ def _to_next_m(party: Party) -> float:
     return 0.0
 
 
-def check_across(asked: Case) -> Iterator[Finding]:
+def check_across(case: Case) -> Iterator[Finding]:
     """Vehicles by their offset, crashes and cones by the lane that they are in."""
-    for party in asked.parties:
+    for party in case.parties:
         request, lane = party.request, party.request.spot.lane
         if isinstance(request, wish.WalkRequest) and not request.is_file:
-            yield from _check_walk_ends(asked, party, request)
+            yield from _check_walk_ends(case, party, request)
         if isinstance(request, wish.WalkRequest) or not party.placed or lane is None:
             continue
-        first = min(party.placed, key=lambda agent: (abs(asked.ahead_m(agent)), agent.id))
-        band = asked.lanes.band(lane, asked.ahead_m(first))
+        first = min(party.placed, key=lambda agent: (abs(case.ahead_m(agent)), agent.id))
+        band = case.lanes.band(lane, case.ahead_m(first))
         if band is None:
             continue
         if isinstance(request, wish.VehicleRequest):
             for agent in party.placed:
-                wanted = _bounds(asked, request.spot.lateral, band, agent.width_m / 2.0)
-                left_m = asked.left_m(agent) - band.left_m
+                wanted = _bounds(case, request.spot.lateral, band, agent.width_m / 2.0)
+                left_m = case.left_m(agent) - band.left_m
                 yield _across([agent], left_m, wanted)
         elif isinstance(request, wish.ConesRequest):
-            yield from _cones(asked, party, request, band)
+            yield from _cones(case, party, request, band)
         elif (
             isinstance(request, wish.CrashRequest) and not party.missing
         ):  # else the nearest may be missing, and the others lie anywhere
             if party.is_exact:
-                first = in_order(party, request, asked.route)[0]
+                first = in_order(party, request, case.route)[0]
             others = [agent for agent in party.everyone if agent is not first]
-            left_m = asked.left_m(first) - band.left_m
-            yield _across([first, *others], left_m, _bounds(asked, None, band, 0.0))
+            left_m = case.left_m(first) - band.left_m
+            yield _across([first, *others], left_m, _bounds(case, None, band, 0.0))
 
 
-def _check_walk_ends(asked: Case, party: Party, request: wish.WalkRequest) -> Iterator[Finding]:
+def _check_walk_ends(case: Case, party: Party, request: wish.WalkRequest) -> Iterator[Finding]:
     """The numbers across the way at which walks begin and end, where they are said."""
     for agent in party.agents:
         for lateral, point in (
@@ -119,10 +119,10 @@ def _check_walk_ends(asked: Case, party: Party, request: wish.WalkRequest) -> It
             (request.end, end_of_walk(agent)),
         ):
             if lateral is not None and point is not None:
-                place = asked.route.locate(*point)
-                band = asked.lanes.band(wish.LaneChoice.OWN, place.ahead_m)
+                place = case.route.locate(*point)
+                band = case.lanes.band(wish.LaneChoice.OWN, place.ahead_m)
                 if band is not None:
-                    yield _across([agent], place.left_m, _bounds(asked, lateral, band, 0.0))
+                    yield _across([agent], place.left_m, _bounds(case, lateral, band, 0.0))
 
 
 def _across(
@@ -139,47 +139,47 @@ def _across(
     )
 
 
-def _bounds(asked: Case, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
+def _bounds(case: Case, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
     """Return the requested place across its lane, left positive; anywhere in it by default."""
-    sign, allowed = asked.lanes.side_sign(lateral), asked.tolerances
+    sign, allowed = case.lanes.side_sign(lateral), case.tolerances
     allowed_m = allowed.across_m if sign else allowed.middle_m
     span_m = find_across(lateral, sign, band.width_m, 2.0 * half_box_m)
     return Bounds(*span_m, allowed.edge_m if lateral is None else allowed_m)
 
 
-def _cones(asked: Case, party: Party, request: wish.ConesRequest, band: Band) -> Iterator[Finding]:
+def _cones(case: Case, party: Party, request: wish.ConesRequest, band: Band) -> Iterator[Finding]:
     """A line by its side of the lane, all other shapes by their middle and their first cone."""
-    cones = sorted(party.placed, key=asked.ahead_m)
-    lefts = [asked.left_m(cone) - band.left_m for cone in cones]
-    sign, middle_m = asked.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
+    cones = sorted(party.placed, key=case.ahead_m)
+    lefts = [case.left_m(cone) - band.left_m for cone in cones]
+    sign, middle_m = case.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
     is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
-    wanted = _bounds(asked, None, band, 0.0)
+    wanted = _bounds(case, None, band, 0.0)
     if is_line:
         edge_m = sign * band.width_m / 2.0
         # A cone at a boundary stands inside of it or outside: half a cone to either side.
-        wanted = Bounds(edge_m, edge_m, max(asked.tolerances.across_m, CONE_M))
+        wanted = Bounds(edge_m, edge_m, max(case.tolerances.across_m, CONE_M))
     everyone = [*cones, *party.workers]
     yield _across(everyone, middle_m, wanted, subject="the middle of the cones")
     if is_line:
         return
     if request.ends_in_middle and party.is_exact:
-        yield _across(cones[-1:], lefts[-1], Bounds(0.0, 0.0, asked.tolerances.middle_m))
+        yield _across(cones[-1:], lefts[-1], Bounds(0.0, 0.0, case.tolerances.middle_m))
     begins_m = lefts[0] - lefts[-1]
     if request.shape is wish.Shape.TAPER and abs(begins_m) > _TAPER_M:
-        start = asked.lanes.kerb if request.start is None else request.start.sign
+        start = case.lanes.kerb if request.start is None else request.start.sign
         side = wish.Side.LEFT if start > 0.0 else wish.Side.RIGHT
         words = f"The taper is to begin with {{agents[0]}} at the {side} of the lane."
         yield find(FindingKind.ASKED_SIDE, begins_m * start > 0.0, cones, words)
 
 
-def check_spacing(asked: Case) -> Iterator[Finding]:
+def check_spacing(case: Case) -> Iterator[Finding]:
     """The median gap between neighbours in a row, and from a worker to the cones."""
-    for party in asked.parties:
+    for party in case.parties:
         request = party.request
         if isinstance(request, wish.VehicleRequest):
-            yield from _in_row(asked, party, request.spacing)
+            yield from _in_row(case, party, request.spacing)
         elif isinstance(request, wish.ConesRequest):
-            yield from _in_row(asked, party, None if request.reach_m else request.spacing)
+            yield from _in_row(case, party, None if request.reach_m else request.spacing)
             for worker in party.workers if party.agents else ():
                 nearest = min(party.agents, key=lambda cone: (apart_m(worker, cone), cone.id))
                 yield hold(
@@ -191,20 +191,20 @@ def check_spacing(asked: Case) -> Iterator[Finding]:
                 )
 
 
-def _in_row(asked: Case, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
+def _in_row(case: Case, party: Party, spacing: wish.Length | None) -> Iterator[Finding]:
     """From centre to centre, straight or along the ego's lane: whichever is nearer to the wish."""
     things = party.agents
     if spacing is None or not party.is_exact or len(things) < 2:
         return
     # Who stands in another is a fault of its own, which leaves gaps elsewhere.
-    if any(apart_m(one, other) <= one.width_m for one, other in combinations(things, 2)):
+    if any(apart_m(thing, other) <= thing.width_m for thing, other in combinations(things, 2)):
         return
     straight_m = median(
-        min(apart_m(one, other) for other in things if other is not one) for one in things
+        min(apart_m(thing, other) for other in things if other is not thing) for thing in things
     )
-    stations_m = sorted(asked.ahead_m(one) for one in things)
+    stations_m = sorted(case.ahead_m(thing) for thing in things)
     along_m = median(after - before for before, after in pairwise(stations_m))
-    wanted = asked.gap(spacing)
+    wanted = case.gap(spacing)
     gap_m = min(straight_m, along_m, key=wanted.off)
     what = "The gap between neighbours in the row of {agents[0]}"
     yield hold(FindingKind.ASKED_SPACING, things, what, gap_m, wanted)

@@ -20,28 +20,28 @@ _NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN, Body.TRAFFIC_CONE, 
 _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}
 
 
-def check_count(asked: Case) -> Iterator[Finding]:
+def check_count(case: Case) -> Iterator[Finding]:
     """Find missing objects and objects that nobody asked for."""
-    for party in asked.parties:
+    for party in case.parties:
         for role, number in party.missing:
             words = f"Asked for and not there: {role}, {number} of them."
             yield find(FindingKind.ASKED_COUNT, False, party.everyone, words)
-    for agent in asked.surplus:
+    for agent in case.surplus:
         words = f"{{agents[0]}}, {name_type(agent.type)}, is more than was asked for."
         yield find(FindingKind.ASKED_COUNT, False, [agent], words)
 
 
-def check_type(asked: Case) -> Iterator[Finding]:
+def check_type(case: Case) -> Iterator[Finding]:
     """Find objects of another type than the requested one."""
-    for party in asked.parties:
+    for party in case.parties:
         for agent, role in party.mistyped:
             words = f"{{agents[0]}} is {name_type(agent.type)}; a {role} is asked for."
             yield find(FindingKind.ASKED_TYPE, False, [agent], words)
 
 
-def check_motion(asked: Case) -> Iterator[Finding]:
+def check_motion(case: Case) -> Iterator[Finding]:
     """The speed of vehicles: those that are to stand do, the others drive as fast as said."""
-    for party in asked.parties:
+    for party in case.parties:
         wanted_mps = 0.0 if isinstance(party.request, CrashRequest) else None
         if isinstance(party.request, VehicleRequest):
             wanted_mps = party.request.speed_mps
@@ -54,34 +54,34 @@ def check_motion(asked: Case) -> Iterator[Finding]:
             yield hold(kind, [agent], what, agent.speed_mps, wanted, unit="m/s")
 
 
-def check_changes(asked: Case) -> Iterator[Finding]:
+def check_changes(case: Case) -> Iterator[Finding]:
     """Agents of the scene that are to be moved or removed and were not, or the reverse.
 
     What is done about a wish that can't be met is not asked for either.
     """
-    change = asked.modification
+    change = case.modification
     moved, removed = {agent.id for agent in change.moved}, set(change.removed)
     for names, kind, words in (
-        (asked.to_move - moved, FindingKind.ASKED_COUNT, "is to be moved and is not"),
-        (asked.to_remove - removed, FindingKind.ASKED_COUNT, "is to be removed and is not"),
-        (moved - asked.to_move, FindingKind.UNASKED, "is moved; nobody asked for that"),
-        (removed - asked.to_remove, FindingKind.UNASKED, "is removed; nobody asked for that"),
+        (case.to_move - moved, FindingKind.ASKED_COUNT, "is to be moved and is not"),
+        (case.to_remove - removed, FindingKind.ASKED_COUNT, "is to be removed and is not"),
+        (moved - case.to_move, FindingKind.UNASKED, "is moved; nobody asked for that"),
+        (removed - case.to_remove, FindingKind.UNASKED, "is removed; nobody asked for that"),
     ):
         for name in sorted(names):
             yield find(kind, False, [name], f"{{agents[0]}} {words}.")
     touched = [agent.id for agent in change.changed] + sorted(removed)
-    if asked.unmet and touched:
-        why = asked.unmet.replace("{", "{{").replace("}", "}}")
+    if case.unmet and touched:
+        why = case.unmet.replace("{", "{{").replace("}", "}}")
         words = f"The wish can't be met, and {{agents[0]}} is changed: {why}"
         yield find(FindingKind.UNASKED, False, touched, words)
 
 
-def check_heading(asked: Case) -> Iterator[Finding]:
+def check_heading(case: Case) -> Iterator[Finding]:
     """Vehicles against their lane; those that have crashed are told by `check_crash`.
 
     As its lane leads where nothing is said: what else would say so stands in the sentence.
     """
-    for party in asked.parties:
+    for party in case.parties:
         request = party.request
         if not isinstance(request, VehicleRequest) or request.spot.lane is None:
             continue
@@ -89,9 +89,9 @@ def check_heading(asked: Case) -> Iterator[Finding]:
             continue
         facing = request.facing or Facing.WITH_LANE
         wanted_deg = _FACING_DEG[facing] + request.turn_deg
-        wanted = Bounds(wanted_deg, wanted_deg, asked.tolerances.heading_deg)
+        wanted = Bounds(wanted_deg, wanted_deg, case.tolerances.heading_deg)
         for agent in party.agents:
-            band = asked.lanes.band(request.spot.lane, asked.ahead_m(agent))
+            band = case.lanes.band(request.spot.lane, case.ahead_m(agent))
             if band is None:
                 continue
             turn_rad = agent.heading_rad - band.tangent_rad
@@ -113,7 +113,7 @@ def unwrap_deg(turn_rad: float, near_deg: float) -> float:
     return near_deg + math.degrees(difference(turn_rad, math.radians(near_deg)))
 
 
-def check_walk(asked: Case) -> Iterator[Finding]:
+def check_walk(case: Case) -> Iterator[Finding]:
     """Side (a fault of logic), direction (of heading), crossing (of logic): the first one wrong.
 
     Of walks that cross as asked also where they end along the lane, and the gaps of a file.
@@ -121,32 +121,32 @@ def check_walk(asked: Case) -> Iterator[Finding]:
     Looking or walking away from the road is a fault of the heading, as in the paper; that such a
     walk crosses nothing follows from it.
     """
-    for party in asked.parties:
+    for party in case.parties:
         request = party.request
         if not isinstance(request, WalkRequest):
             continue
-        crossings = [_crossing(asked, agent, request.start) for agent in party.agents]
+        crossings = [_crossing(case, agent, request.start) for agent in party.agents]
         yield from crossings
         for agent, crossing in zip(party.agents, crossings, strict=True):
             end = end_of_walk(agent)
             if request.drift_m is None or end is None or crossing.is_fault:
                 continue
-            drift_m = asked.route.locate(*end).ahead_m - asked.ahead_m(agent)
-            wanted = Bounds(request.drift_m, request.drift_m, asked.tolerances.drift_m)
+            drift_m = case.route.locate(*end).ahead_m - case.ahead_m(agent)
+            wanted = Bounds(request.drift_m, request.drift_m, case.tolerances.drift_m)
             what = "The way of {agents[0]} along the ego's lane while it crosses"
             yield hold(FindingKind.ASKED_DISTANCE, [agent], what, drift_m, wanted)
         if party.is_exact and not any(crossing.is_fault for crossing in crossings):
-            yield from _in_file(asked, party.agents, request)
+            yield from _in_file(case, party.agents, request)
 
 
-def _crossing(asked: Case, agent: TrafficAgent, side: Side | None) -> Finding:
+def _crossing(case: Case, agent: TrafficAgent, side: Side | None) -> Finding:
     """The first thing that is wrong about a walk; where the side is open it is its own."""
-    place, end = asked.route.locate_agent(agent), end_of_walk(agent)
+    place, end = case.route.locate_agent(agent), end_of_walk(agent)
     if side is None:
         side = Side.LEFT if place.left_m >= 0.0 else Side.RIGHT
     # From here on, numbers to the side of the start are positive.
     from_m = place.left_m * side.sign
-    to_m = math.nan if end is None else asked.route.locate(*end).left_m * side.sign
+    to_m = math.nan if end is None else case.route.locate(*end).left_m * side.sign
     looks = math.sin(agent.heading_rad - place.tangent_rad) * side.sign
     goes_back = to_m - from_m > _ON_ROAD_M
     if from_m < -_ON_ROAD_M and goes_back:
@@ -161,15 +161,15 @@ def _crossing(asked: Case, agent: TrafficAgent, side: Side | None) -> Finding:
 
 
 def _in_file(
-    asked: Case, walkers: Sequence[TrafficAgent], request: WalkRequest
+    case: Case, walkers: Sequence[TrafficAgent], request: WalkRequest
 ) -> Iterator[Finding]:
     """Check each walker's distance behind the first one, who is furthest across."""
     if not request.behind or request.start is None:
         return
     sign = request.start.sign
-    first, *others = sorted(walkers, key=lambda agent: sign * asked.left_m(agent))
+    first, *others = sorted(walkers, key=lambda agent: sign * case.left_m(agent))
     if any(apart_m(*pair) < first.length_m for pair in combinations(walkers, 2)):
         return  # who stands in another is a fault of its own
     for other, gap in zip(others, request.behind, strict=False):
         what, pair = "The distance of {agents[0]} from {agents[1]}", [other, first]
-        yield hold(FindingKind.ASKED_SPACING, pair, what, apart_m(first, other), asked.gap(gap))
+        yield hold(FindingKind.ASKED_SPACING, pair, what, apart_m(first, other), case.gap(gap))

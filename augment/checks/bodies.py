@@ -84,13 +84,13 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
         )
 
 
-def _overlap_severity(one: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
+def _overlap_severity(body: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
     fine, doubtful = 0.0, SLIGHT_SHARE
-    if any(_is_door(a) and b.type in VEHICLES for a, b in ((one, other), (other, one))):
+    if any(_is_door(a) and b.type in VEHICLES for a, b in ((body, other), (other, body))):
         fine = 1.0
-    elif all(agent.type in VEHICLES and is_stopped(agent) for agent in (one, other)):
+    elif all(agent.type in VEHICLES and is_stopped(agent) for agent in (body, other)):
         fine, doubtful = CRASH_SHARE, GROSS_CRASH_SHARE
-    elif one.type in RIDERS and other.type in RIDERS:
+    elif body.type in RIDERS and other.type in RIDERS:
         doubtful = CROWD_SHARE
     if share <= fine:
         return Severity.FACT
@@ -133,18 +133,18 @@ def speed(situation: ChangedScene) -> Iterator[Finding]:
     Of who has a motion the highest one counts. A thing that can't move and does is wrong.
     """
     for agent in situation.changed:
-        known, speed_mps = USUAL_MPS, agent.speed_mps
+        speeds, speed_mps = USUAL_MPS, agent.speed_mps
         if agent.id in situation.planned:
-            known = _MOVED_MPS
+            speeds = _MOVED_MPS
             speed_mps = float(np.nanmax(situation.planned[agent.id].states[:, 3]))
-        usual_mps = known.get(agent.type, STOPPED_BELOW_MPS)
+        usual_mps = speeds.get(agent.type, STOPPED_BELOW_MPS)
         most_mps, under = usual_mps, situation.under[agent.id]
         if under is not None and agent.type in (AgentType.VEHICLE, AgentType.BUS):
             limit_mps = situation.ground.graph.lanes[under.lane_id].speed_limit_mps
             most_mps = min(usual_mps, OVER_LIMIT * limit_mps) if limit_mps else usual_mps
         if speed_mps <= most_mps:
             continue
-        is_wrong = agent.type not in known or speed_mps > FAR_OFF * usual_mps
+        is_wrong = agent.type not in speeds or speed_mps > FAR_OFF * usual_mps
         yield find(
             FindingKind.SPEED,
             Severity.WRONG if is_wrong else Severity.DOUBTFUL,

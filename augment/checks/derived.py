@@ -48,7 +48,7 @@ _LEADS = {
     ScenarioType.NUDGE: "Have the ego nudge around what stands at the side of its lane",
     ScenarioType.OVERTAKE: "Have the ego overtake what stands in its lane",
 }
-_MOVERS = tuple(one for one in AgentType if one.name in wish.Body.__members__)
+_MOVERS = tuple(kind for kind in AgentType if kind.name in wish.Body.__members__)
 _Wishes = Mapping[str, tuple[wish.MotionWish, TrafficAgent]]
 _FRONTLESS = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 _HEADLESS = (AgentType.TRAFFIC_CONE, AgentType.PEDESTRIAN)
@@ -94,9 +94,10 @@ def describe_change(
     if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
     unsaid = [
-        one.id
-        for one in change.changed
-        if (one.motion and one.id not in wishes) or (one.walk_to_m and not _crosses(one, lanes))
+        agent.id
+        for agent in change.changed
+        if (agent.motion and agent.id not in wishes)
+        or (agent.walk_to_m and not _crosses(agent, lanes))
     ]
     return sentence, wish.Intent(
         requests=requests,
@@ -156,14 +157,18 @@ def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
 
 
 def _wishes(change: Modification, scene: Scene) -> _Wishes:
-    cars = [one for one in apply(scene, change).agents if is_stopped(one)]
-    found = {agent.id: find_wish(agent, scene, cars) for agent in change.changed}
-    return {name: one for name, one in found.items() if one is not None}
+    cars = [agent for agent in apply(scene, change).agents if is_stopped(agent)]
+    wishes = {agent.id: find_wish(agent, scene, cars) for agent in change.changed}
+    return {
+        name: wish_or_none for name, wish_or_none in wishes.items() if wish_or_none is not None
+    }
 
 
 def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
-    added = sorted(change.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
-    doors = [wishes[one.id] for one in added if one.id in wishes and one.type not in _MOVERS]
+    added = sorted(change.added, key=lambda agent: lanes.route.locate_agent(agent).ahead_m)
+    doors = [
+        wishes[agent.id] for agent in added if agent.id in wishes and agent.type not in _MOVERS
+    ]
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
         motion = _find_motion(agent, wishes)
@@ -315,9 +320,9 @@ def _sentence(
     wishes: _Wishes,
 ) -> str:
     """The sentences from which a reader could put the same objects to the same places."""
-    added = sorted(change.added, key=lambda one: (one.x_m, one.y_m))
+    added = sorted(change.added, key=lambda agent: (agent.x_m, agent.y_m))
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
-    spots = ", ".join(_where(one, lanes) for one in cones)
+    spots = ", ".join(_where(cone, lanes) for cone in cones)
     parts = [f"{len(cones)} traffic cones: {spots}"] if len(cones) > 1 else []
     if len(cones) == 1:
         parts = [f"a traffic cone {spots}"]
@@ -336,7 +341,9 @@ def _sentence(
         way = " The ego is to go straight on."
     lead = "Change the scene" if kind is None else _LEADS[kind]
     if kind is ScenarioType.JAYWALKER and not any(
-        one.walk_to_m or one.id in wishes for one in others if one.type is AgentType.PEDESTRIAN
+        agent.walk_to_m or agent.id in wishes
+        for agent in others
+        if agent.type is AgentType.PEDESTRIAN
     ):
         lead = "Change the scene"  # nobody crosses
     return f"{lead}: {'; '.join(parts)}.{way}"

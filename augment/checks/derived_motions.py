@@ -38,7 +38,7 @@ def find_wish(
     if motion is None:
         return None
     here = agent.pose.beside(0.0)
-    cars = [one for one in others if math.dist(here, one.pose.beside(0.0)) < _DOOR_WITHIN_M]
+    cars = [agent for agent in others if math.dist(here, agent.pose.beside(0.0)) < _DOOR_WITHIN_M]
     for preset in _ORDER:
         is_door = preset is MotionPreset.DOOR_OPENING
         for who in cars if is_door else [replace(agent, motion=None)]:
@@ -66,8 +66,8 @@ def _numbers(preset: MotionPreset, agent: TrafficAgent, motion: PlannedMotion) -
     if isinstance(motion.path, LanePath) and own_mps + to_mps > 0.0:
         values["duration_s"] = 2.0 * motion.path.change_m / (own_mps + to_mps)
     start = None if preset is MotionPreset.EMERGENCY_STOP else motion.start
-    found = {name: values.get(name) or None for name in preset_numbers(preset)}
-    return PresetNumbers(start=start, **found)
+    numbers = {name: values.get(name) or None for name in preset_numbers(preset)}
+    return PresetNumbers(start=start, **numbers)
 
 
 def _wish(preset: MotionPreset, numbers: PresetNumbers, agent: TrafficAgent) -> MotionWish:

@@ -111,10 +111,10 @@ class Finding:
             names: What to call agents and lanes instead of their ids, such as the short names of
                 a prompt; an id that is not in it stays.
         """
-        known = names or {}
+        shown_names = names or {}
         return self.template.format(
-            agents=[known.get(agent, agent) for agent in self.agents],
-            lanes=[known.get(lane, lane) for lane in self.lanes],
+            agents=[shown_names.get(agent, agent) for agent in self.agents],
+            lanes=[shown_names.get(lane, lane) for lane in self.lanes],
             **self.measured,
         )
 

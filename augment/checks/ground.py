@@ -260,7 +260,7 @@ class ChangedScene:
     def planned(self) -> dict[str, Movement]:
         """The changed agents with a motion, by id; without one nobody's is worked out."""
         names = [agent.id for agent in self.changed if agent.motion is not None]
-        by_id = {one.agent.id: one for one in self.motion.others} if names else {}
+        by_id = {movement.agent.id: movement for movement in self.motion.others} if names else {}
         return {name: by_id[name] for name in names}
 
     @cached_property

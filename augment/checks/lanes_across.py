@@ -219,7 +219,7 @@ def _list_places(
         left_m = here.left_m - band.left_m
         side = -1.0 if choice is intents.LaneChoice.ONCOMING else 1.0
         there = route.graph.place(place.lane_id, place.s_m, side * left_m).pose
-        found = LanePlace(
+        spot = LanePlace(
             via=via,
             route=route,
             lane=choice,
@@ -228,7 +228,7 @@ def _list_places(
             off_m=max(0.0, abs(left_m) - band.width_m / 2.0),
             tangent_rad=band.tangent_rad,
         )
-        yield found, math.dist(point, (there.x_m, there.y_m))
+        yield spot, math.dist(point, (there.x_m, there.y_m))
 
 
 def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, ...]:
@@ -239,7 +239,7 @@ def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, .
         place = lanes.route.locate_agent(agent)
         if sign * place.ahead_m > 0.0 and _fits(lanes, pick, agent, place):
             agents.append((sign * place.ahead_m, agent.id, agent))
-    ordered = tuple(agent for _, _, agent in sorted(agents, key=lambda one: one[:2]))
+    ordered = tuple(agent for _, _, agent in sorted(agents, key=lambda entry: entry[:2]))
     return ordered if pick.every else ordered[pick.ordinal - 1 : pick.ordinal]
 
 
@@ -324,13 +324,13 @@ def resolve_spot(
 
 def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
     """Return in words what the intent names and the scene does not have."""
-    asked = (*intent.requests, *intent.moves)
-    spots = [one.spot for one in asked]
+    requests = (*intent.requests, *intent.moves)
+    spots = [request.spot for request in requests]
     picks = [spot.landmark for spot in spots if spot.landmark is not None]
     picks += [*(move.who for move in intent.moves), *intent.removals]
     ways = dict.fromkeys(spot.via for spot in spots if lanes.over(spot.via) is None)
     marks = [spot.mark for spot in spots if spot.mark is not None]
-    starts = [wish.start for one in asked if (wish := getattr(one, "motion", None))]
+    starts = [wish.start for request in requests if (wish := getattr(request, "motion", None))]
     marks += [start.mark for start in starts if start is not None and start.mark is not None]
     absent = [f"a way to {via}" for via in ways]
     absent += [str(pick) for pick in picks if not find_picked(lanes, pick)]

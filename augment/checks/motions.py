@@ -158,8 +158,10 @@ def motion_off_road(situation: ChangedScene) -> Iterator[Finding]:
         if len(there) < len(mover.states):
             left_m = np.hypot(*(there[:, :2] - there[-1, :2]).T)
             steps = [step for step in steps if left_m[step] > agent.length_m]
-        found = [(stray(ground, agent.type, _box_at(box, there[step])), step) for step in steps]
-        worst, step = max(found, key=lambda one: (one[0].over, one[0].off), default=(None, 0))
+        strays = [(stray(ground, agent.type, _box_at(box, there[step])), step) for step in steps]
+        worst, step = max(
+            strays, key=lambda entry: (entry[0].over, entry[0].off), default=(None, 0)
+        )
         if worst is None or worst.over < 2 or worst.over <= stray(ground, agent.type, box).over:
             continue
         yield find(
@@ -203,8 +205,8 @@ def motion_blocked(situation: ChangedScene) -> Iterator[Finding]:
 # Private
 
 
-def _apart_m(one: Movement, other: Movement) -> FloatArray:
-    return np.asarray(np.hypot(*(one.states[:, :2] - other.states[:, :2]).T))
+def _apart_m(movement: Movement, other: Movement) -> FloatArray:
+    return np.asarray(np.hypot(*(movement.states[:, :2] - other.states[:, :2]).T))
 
 
 def _first_step(situation: ChangedScene, mover: Movement) -> int | None:
@@ -250,18 +252,20 @@ def _ego_comes(situation: ChangedScene, mover: Movement) -> int:
     return nearest if nearest and apart_m[nearest] <= COMES_WITHIN_M else len(apart_m) - 1
 
 
-def _contact(one: Movement, other: Movement, until: int) -> int | None:
+def _contact(movement: Movement, other: Movement, until: int) -> int | None:
     """The first step at which two boxes share ground, but for a contact that lasts since t0."""
-    reach_m = sum(np.hypot(way.agent.length_m, way.agent.width_m) for way in (one, other)) / 2.0
-    near, parted = _apart_m(one, other)[: until + 1] < reach_m, False
+    reach_m = (
+        sum(np.hypot(way.agent.length_m, way.agent.width_m) for way in (movement, other)) / 2.0
+    )
+    near, parted = _apart_m(movement, other)[: until + 1] < reach_m, False
     for step, is_near in enumerate(near.tolist()):
-        touches = is_near and _depth_m(one, other, step) > GRAZED_M
+        touches = is_near and _depth_m(movement, other, step) > GRAZED_M
         if touches and parted:
             return step
         parted = parted or not touches
     return None
 
 
-def _depth_m(one: Movement, other: Movement, step: int) -> float:
-    boxes = (_box_at(way.agent.box, way.states[step]) for way in (one, other))
+def _depth_m(movement: Movement, other: Movement, step: int) -> float:
+    boxes = (_box_at(way.agent.box, way.states[step]) for way in (movement, other))
     return frames.overlap(*boxes).depth_m

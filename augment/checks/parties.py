@@ -363,9 +363,9 @@ def hold(
     return find(kind, wanted.holds(value), agents, words, value=value, off=off)
 
 
-def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
+def apart_m(agent: TrafficAgent, other: TrafficAgent) -> float:
     """Return the distance from centre to centre."""
-    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
+    return math.hypot(agent.x_m - other.x_m, agent.y_m - other.y_m)
 
 
 def meets_route(route: EgoRoute, agent: TrafficAgent) -> Point | None:

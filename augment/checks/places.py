@@ -201,13 +201,13 @@ def off_road(situation: ChangedScene) -> Iterator[Finding]:
     """
     ground = situation.ground
     for agent in () if ground.road.is_empty else situation.changed:
-        found = stray(ground, agent.type, situation.boxes[agent.id])
-        if found.over:
+        place = stray(ground, agent.type, situation.boxes[agent.id])
+        if place.over:
             yield find(
                 FindingKind.OFF_ROAD,
-                found.severity,
+                place.severity,
                 [agent],
                 name_stray(agent.type),
-                outside_share=found.outside_share,
-                gap_m=found.gap_m,
+                outside_share=place.outside_share,
+                gap_m=place.gap_m,
             )

@@ -29,12 +29,12 @@ _SETS_OUT_WITHIN_M = 2.0
 _HALVINGS = 12
 
 
-def check_purpose(asked: Case) -> Iterator[Finding]:
+def check_purpose(case: Case) -> Iterator[Finding]:
     """Hold what a scene alone tells of a purpose against its windows; drives tell the rest."""
-    purpose, change = asked.purpose, asked.modification
+    purpose, change = case.purpose, case.modification
     if purpose is None:
         return
-    situation, changed = ChangedScene.of(asked.ground, change), change.changed
+    situation, changed = ChangedScene.of(case.ground, change), change.changed
     if purpose.sight is not None:
         wanted = Bounds(purpose.sight.low_m, purpose.sight.high_m, 0.0)
         seen_m = measure_sight(situation)
@@ -155,7 +155,7 @@ def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:
 
 def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
     """Return the first step at which the ego sees any of its corners or its middle."""
-    screens = [one for one in motion.others if one.agent.type in HIDING]
+    screens = [movement for movement in motion.others if movement.agent.type in HIDING]
     for step, ((x_m, y_m), state) in enumerate(
         zip(motion.ego.states[:, :2].tolist(), walker.states, strict=True)
     ):
@@ -164,13 +164,17 @@ def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
         points = np.vstack([_corners(walker, state), state[:2]])
         eye = np.broadcast_to((x_m, y_m), points.shape)
         lines = np.asarray(shapely.linestrings(np.stack([eye, points], axis=1)))  # (5,)
-        boxes = [_corners(one, one.states[step]) for one in screens if one.is_present[step]]
+        boxes = [
+            _corners(movement, movement.states[step])
+            for movement in screens
+            if movement.is_present[step]
+        ]
         bodies = np.asarray(shapely.polygons(np.array(boxes).reshape(-1, 4, 2)))  # (B,)
         if not shapely.intersects(lines[:, None], bodies[None, :]).any(axis=1).all():
             return step
     return None
 
 
-def _corners(one: Movement, state: FloatArray) -> FloatArray:
+def _corners(movement: Movement, state: FloatArray) -> FloatArray:
     pose = Pose(x_m=float(state[0]), y_m=float(state[1]), heading_rad=float(state[2]))
-    return corners(pose, one.agent.length_m, one.agent.width_m)
+    return corners(pose, movement.agent.length_m, movement.agent.width_m)

@@ -62,9 +62,9 @@ def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ..
         InvalidModification: The modification does not fit the scene.
     """
     situation = ChangedScene.of(ground, modification)
-    found = [finding for check in CHECKS for finding in check(situation)]
+    findings = [finding for check in CHECKS for finding in check(situation)]
     order = {agent.id: number for number, agent in enumerate(situation.changed)}
-    return tuple(sorted(found, key=lambda finding: order[finding.agents[0]]))
+    return tuple(sorted(findings, key=lambda finding: order[finding.agents[0]]))
 
 
 def check_against_intent(
@@ -90,10 +90,10 @@ def check_against_intent(
     if intent is None or lanes is None:
         return alone
     asked = assign_parties(ground, modification, intent, lanes, tolerances)
-    held = [
+    remaining = [
         finding for check in ASKED_CHECKS for case in _by_way(asked) for finding in check(case)
     ]
-    return (*held, *_drop_answered(alone, held, asked))
+    return (*remaining, *_drop_answered(alone, remaining, asked))
 
 
 def _by_way(asked: Case) -> Iterator[Case]:
@@ -109,7 +109,7 @@ def _by_way(asked: Case) -> Iterator[Case]:
 
 
 def _drop_answered(
-    alone: Iterable[Finding], held: Iterable[Finding], asked: Case
+    alone: Iterable[Finding], findings: Iterable[Finding], case: Case
 ) -> Iterable[Finding]:
     """The findings of the checks that ask for nothing, now that it is known what was asked for.
 
@@ -118,16 +118,16 @@ def _drop_answered(
     place across it has been, or of what stands where that belongs which it is taken for. Where
     and how a thing stands that nobody asked for is no fault of its own.
     """
-    answering = {agent.id for agent in asked.modification.changed if asked.purpose is not None}
+    answering = {agent.id for agent in case.modification.changed if case.purpose is not None}
     placed = set(answering)
-    for party in asked.parties:
+    for party in case.parties:
         placed.update(agent.id for agent, _ in party.mistyped)
         if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None:
             answering.update(agent.id for agent in party.everyone)
-    for finding in held:
+    for finding in findings:
         if finding.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE):
             placed.update(finding.agents)
-    surplus = {agent.id for agent in asked.surplus}
+    surplus = {agent.id for agent in case.surplus}
     for finding in alone:
         name, is_doubtful = finding.agents[0], finding.severity is Severity.DOUBTFUL
         is_settled = (

@@ -139,7 +139,7 @@ def measure_wish(
         ]
     named = {match.agent_id for match in matches}
     missing += len(case.to_move - named)
-    surplus = tuple(one.id for one in modification.changed if one.id not in named)
+    surplus = tuple(agent.id for agent in modification.changed if agent.id not in named)
     return WishDistance(matches=tuple(matches), missing=missing, surplus=surplus)
 
 
@@ -256,7 +256,7 @@ class _Fitting:
 
     def _place_mover(self, request: wish.VehicleRequest, agent: TrafficAgent) -> Point:
         """Return where one belongs of whom only a motion is asked: where he was, or an arm."""
-        before = {one.id: one for one in self._lanes.route.scene.agents}.get(agent.id)
+        before = {agent.id: agent for agent in self._lanes.route.scene.agents}.get(agent.id)
         if before is not None:
             return before.x_m, before.y_m
         here = (agent.x_m, agent.y_m)

@@ -111,7 +111,7 @@ def find_nearest_cones(
     here = sorted(
         (lanes.route.locate(*point) for point in points.tolist()), key=attrgetter("ahead_m")
     )
-    stations = np.array([one.ahead_m for one in here])
+    stations = np.array([place.ahead_m for place in here])
     band = lanes.band(request.spot.lane or wish.LaneChoice.OWN, float(stations[0]))
     if band is None or request.shape is None:
         place = Place.of(request.spot, lanes, CONE_M)
@@ -119,7 +119,7 @@ def find_nearest_cones(
         there = points.copy()
         there[first] = place.nearest(tuple(points[first].tolist()))
         return there
-    lefts = [one.left_m - band.left_m for one in here]
+    lefts = [place.left_m - band.left_m for place in here]
     gaps_m = np.hypot(*np.diff(points, axis=0).T)
     gap_m = float(np.median(gaps_m)) if len(gaps_m) else 1.0
     best: FloatArray | None = None

@@ -280,7 +280,7 @@ def move_to(
 
 
 def _differs(agents: Agents, others: Agents) -> bool:
-    pairs = zip(*(sorted(one, key=lambda a: a.id) for one in (agents, others)), strict=True)
+    pairs = zip(*(sorted(side, key=lambda a: a.id) for side in (agents, others)), strict=True)
     return any(
         math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > _NOTICEABLE_M
         or abs(wrap(a.heading_rad - b.heading_rad)) > _NOTICEABLE_RAD

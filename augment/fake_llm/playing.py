@@ -71,9 +71,9 @@ class Character:
     never_stops: bool = False
     leans: bool = False
 
-    def answer(self, request: ChatRequest, known: KnownTasks = sight.knows_nothing) -> Answer:
+    def answer(self, request: ChatRequest, tasks: KnownTasks = sight.knows_nothing) -> Answer:
         """Answer from the request and the list of known tasks alone."""
-        heard = sight.read_conversation(request, known)
+        heard = sight.read_conversation(request, tasks)
         task = heard.task
         if heard.role is ModelRole.VIEWER:
             return _describe_picture(request), ()
@@ -120,12 +120,12 @@ class Character:
 
 
 def _rate(problems: list[Problem]) -> str:
-    found = "; ".join(problem["problem"] for problem in problems)
+    text = "; ".join(problem["problem"] for problem in problems)
     ratings = dict(zip(_RATINGS, (2, 3, 2) if problems else (5, 5, 5), strict=True))
     return _fence(
         "Summary: A road with the ego on it, and what the user wished for.\n\n"
         "Questions:\n1. Is everything where it was wished for?\n\n"
-        f"Answers:\n1. {found or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
+        f"Answers:\n1. {text or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
         "Review:",
         {"ratings": ratings, "feedback": problems},
     )
@@ -141,15 +141,15 @@ def review_problems(task: Task) -> list[Problem]:
     except CannotPlace:
         return []
     if len(changed) != len(right):
-        said = f"{len(changed)} agents were added or moved, {len(right)} were asked for."
-        return [_problem(said, "Count.")]
+        text = f"{len(changed)} agents were added or moved, {len(right)} were asked for."
+        return [_problem(text, "Count.")]
     some_move = any(agent.motion for agent in (*changed, *right))
     ways, right_ways = (
         _ways(task.scene, agents) if some_move else {} for agents in (changed, right)
     )
     problems = []
     for agent in changed:
-        meant = min(right, key=lambda one: _distance_m(one, agent))
+        meant = min(right, key=lambda candidate: _distance_m(candidate, agent))
         right.remove(meant)
         problem = _difference(agent, meant)
         if problem is None and some_move:
@@ -228,8 +228,8 @@ def _compare_pictures(request: ChatRequest, *, leans: bool) -> str:
     if leans and careless.is_unreadable(rng):
         return "They are both nice pictures of a road."
     half = len(pictures) // 2  # of what moves there are frames as well
-    one, other = (sum(map(len, pictures[half * side :][:half])) for side in (0, 1))
-    better = "equal" if one == other else "A" if one > other else "B"
+    first, other = (sum(map(len, pictures[half * side :][:half])) for side in (0, 1))
+    better = "equal" if first == other else "A" if first > other else "B"
     if leans and rng.random() < 0.5:
         better = "A"
     reason = "I am a stand-in without eyes; I compare how much is drawn."
@@ -248,8 +248,8 @@ def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
         action = f"Move it to ({meant.x_m:.1f}, {meant.y_m:.1f})."
         return _problem(f"{agent.id} is {gap_m:.1f} m from where it belongs.", action)
     if agent.type in _VEHICLES and turned > _TURNED_RAD:
-        said = f"{agent.id} is turned by {math.degrees(turned):.0f} degrees."
-        return _problem(said, f"Turn it to {meant.heading_rad:.3f} rad.")
+        text = f"{agent.id} is turned by {math.degrees(turned):.0f} degrees."
+        return _problem(text, f"Turn it to {meant.heading_rad:.3f} rad.")
     return None
 
 
@@ -258,7 +258,7 @@ def _ways(scene: Scene, agents: Sequence[TrafficAgent]) -> dict[str, FloatArray]
     names = {agent.id for agent in agents}
     others = tuple(agent for agent in scene.agents if agent.id not in names)
     motion = find_motion(replace(scene, agents=(*others, *agents)))
-    return {one.agent.id: one.states[:, :2] for one in motion.others}
+    return {movement.agent.id: movement.states[:, :2] for movement in motion.others}
 
 
 def _motion_difference(
@@ -270,17 +270,17 @@ def _motion_difference(
     if gap_m <= min(_FAR_M, 0.5 * float(np.nanmax(np.hypot(*right_gone_m.T)))):
         return None
     motion = json.dumps(motion_parts(meant.motion)) if meant.motion else "none"
-    said = f"{agent.id} gets up to {gap_m:.0f} m away from where it is to be at that moment."
-    return _problem(said, f"Its motion is to be {motion}.")
+    text = f"{agent.id} gets up to {gap_m:.0f} m away from where it is to be at that moment."
+    return _problem(text, f"Its motion is to be {motion}.")
 
 
-def _problem(said: str, action: str) -> Problem:
+def _problem(sentence: str, action: str) -> Problem:
     reason = "The wish, worked out along the lanes, says otherwise."
-    return {"problem": said, "reason": reason, "corrective_action": action}
+    return {"problem": sentence, "reason": reason, "corrective_action": action}
 
 
-def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
-    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
+def _distance_m(agent: TrafficAgent, other: TrafficAgent) -> float:
+    return math.hypot(agent.x_m - other.x_m, agent.y_m - other.y_m)
 
 
 # --- Calls of the function ---------------------------------------------------------------------

@@ -92,7 +92,7 @@ def _draw_changes(route: EgoRoute, purpose: Purpose, rng: random.Random) -> Iter
             continue
         first = len(route.scene.everyone) + 1
         yield Modification(
-            added=tuple(replace(one, id=f"Agent{n}") for n, one in enumerate(drawn, first))
+            added=tuple(replace(agent, id=f"Agent{n}") for n, agent in enumerate(drawn, first))
         )
 
 

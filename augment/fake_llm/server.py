@@ -228,8 +228,10 @@ def _cuts_context(request: wire.ChatRequest, server: FakeServer) -> wire.Respons
     if request.tokens <= WINDOW_TOKENS:
         return _good(request, server)
     last = request.messages[-1]
-    kept = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
-    text, _ = playing.GOOD.answer(request.model_copy(update={"messages": [kept]}), server.known)
+    shortened = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
+    text, _ = playing.GOOD.answer(
+        request.model_copy(update={"messages": [shortened]}), server.known
+    )
     return wire.completion(request, text, usage=(WINDOW_TOKENS, 9))
 
 

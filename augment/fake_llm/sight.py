@@ -92,16 +92,18 @@ def same_text(instruction: str) -> str:
     return " ".join(instruction.split())
 
 
-def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -> Heard:
+def read_conversation(request: ChatRequest, tasks: KnownTasks = knows_nothing) -> Heard:
     """Return the due answer's task and feedback; by default a modifier's."""
     messages = request.messages
     system = next((message.text for message in messages if message.role == "system"), "")
-    said = [(n, one.text) for n, one in enumerate(messages) if one.role == "user"]
-    asked = max((n for n, text in said if _INSTRUCTION.search(text)), default=0)
-    told = [n for n, text in said if n > asked and text.startswith(_FEEDBACK)]
+    user_texts = [
+        (n, message.text) for n, message in enumerate(messages) if message.role == "user"
+    ]
+    last_wish = max((n for n, text in user_texts if _INSTRUCTION.search(text)), default=0)
+    reviews = [n for n, text in user_texts if n > last_wish and text.startswith(_FEEDBACK)]
     results: list[list[float] | None] = []
     called = False
-    for message in messages[max(told, default=asked) :]:
+    for message in messages[max(reviews, default=last_wish) :]:
         is_written = message.text.startswith(_RESULT)
         called |= message.role == "tool" or is_written
         if message.role == "tool":
@@ -117,13 +119,13 @@ def read_conversation(request: ChatRequest, known: KnownTasks = knows_nothing) -
     asked_again = last.startswith(read_text("re_ask.md").partition("\n")[0])
     return Heard(
         role=_OPENINGS.get(system.partition("\n")[0], ModelRole.MODIFIER),
-        task=_task(request, known),
+        task=_task(request, tasks),
         tool=tool,
         may_call=offered and not over and not asked_again,
         is_native=native,
         results=tuple(results),
         called=called,
-        feedback=tuple(messages[number].text for number in told),
+        feedback=tuple(messages[number].text for number in reviews),
         seed=request.seed,
     )
 

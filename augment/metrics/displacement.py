@@ -140,16 +140,16 @@ class OverTime:
 
 def mean_over_time(displacements: Sequence[Displacement]) -> OverTime | None:
     """Return the means over all matched objects of changes that move, None without any."""
-    matches = chain.from_iterable(one.matches for one in displacements)
-    moving = [one for one in matches if one.average_m is not None]
-    starts_s = [abs(one.start_s) for one in moving if one.start_s is not None]
+    matches = chain.from_iterable(measured.matches for measured in displacements)
+    moving = [match for match in matches if match.average_m is not None]
+    starts_s = [abs(match.start_s) for match in moving if match.start_s is not None]
     if not moving:
         return None
     return OverTime(
         n=len(moving),
-        at_t0_m=float(np.mean([one.distance_m for one in moving])),
-        average_m=float(np.mean([one.average_m for one in moving])),
-        final_m=float(np.mean([one.final_m for one in moving])),
+        at_t0_m=float(np.mean([match.distance_m for match in moving])),
+        average_m=float(np.mean([match.average_m for match in moving])),
+        final_m=float(np.mean([match.final_m for match in moving])),
         start_s=float(np.mean(starts_s)) if starts_s else None,
     )
 
@@ -225,19 +225,19 @@ def displacement_from_wish(
 
 
 def _match(
-    wanted: list[TrafficAgent], found: list[TrafficAgent], object_class: ObjectClass
+    wanted: list[TrafficAgent], candidates: list[TrafficAgent], object_class: ObjectClass
 ) -> list[Match]:
     from scipy.optimize import linear_sum_assignment
 
     apart_m = np.hypot(
-        np.subtract.outer([one.x_m for one in wanted], [one.x_m for one in found]),
-        np.subtract.outer([one.y_m for one in wanted], [one.y_m for one in found]),
+        np.subtract.outer([agent.x_m for agent in wanted], [agent.x_m for agent in candidates]),
+        np.subtract.outer([agent.y_m for agent in wanted], [agent.y_m for agent in candidates]),
     )  # (R, G)
     rows, columns = linear_sum_assignment(apart_m * (1.0 + _EVENNESS_PER_M * apart_m))
     return [
         Match(
             reference=wanted[row].id,
-            generated=found[column].id,
+            generated=candidates[column].id,
             object_class=object_class,
             distance_m=float(apart_m[row, column]),
         )
@@ -251,17 +251,19 @@ def _follow(
     """The matches with their distances over time."""
     motions = [ground.motion_after(change, of_all=False) for change in (reference, generated)]
     compared = motions[0].times_s <= HORIZON_S + 1e-9
-    wanted, found = ({one.agent.id: one for one in motion.others} for motion in motions)
+    wanted, placed = (
+        {movement.agent.id: movement for movement in motion.others} for motion in motions
+    )
     followed = []
     for match in matches:
-        one, other = wanted[match.reference], found[match.generated]
+        movement, other = wanted[match.reference], placed[match.generated]
         average_m, final_m, start_s = match.distance_m, match.distance_m, None
-        if one.agent.motion is not None or other.agent.motion is not None:
-            apart_m = np.hypot(*(one.states[compared, :2] - other.states[compared, :2]).T)
+        if movement.agent.motion is not None or other.agent.motion is not None:
+            apart_m = np.hypot(*(movement.states[compared, :2] - other.states[compared, :2]).T)
             apart_m = apart_m[~np.isnan(apart_m)]
             average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
-            if one.started_s is not None and other.started_s is not None:
-                start_s = other.started_s - one.started_s
+            if movement.started_s is not None and other.started_s is not None:
+                start_s = other.started_s - movement.started_s
         followed.append(replace(match, average_m=average_m, final_m=final_m, start_s=start_s))
     return followed
 
@@ -320,7 +322,7 @@ def summarise(displacements: Sequence[Displacement]) -> Summary:
 def summarize_box(values_m: Sequence[float]) -> BoxSummary:
     """Return the box of at least one value."""
     values = np.sort(np.asarray(values_m, dtype=float))
-    q1, median, q3 = (float(one) for one in np.percentile(values, (25.0, 50.0, 75.0)))
+    q1, median, q3 = (float(value) for value in np.percentile(values, (25.0, 50.0, 75.0)))
     reach = WHISKER * (q3 - q1)
     inside = (values >= q1 - reach) & (values <= q3 + reach)
     # Interpolated quartiles may leave no value between a box's edge and its whisker's reach.
@@ -346,30 +348,30 @@ _ALIKE_M, _ALIKE_RAD = 0.15, math.radians(2.0)
 """Up to which differences two objects look the same, the limits included."""
 
 
-def are_alike(one: Modification, other: Modification) -> bool:
+def are_alike(first: Modification, other: Modification) -> bool:
     """Return whether every object of either change has a counterpart that looks the same.
 
     Place, size, end of a walk and way in a second are held against the distance; so are the
     metres, seconds and m/s of motions. What is moved and what is removed must be the same.
     """
-    moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
+    moved = [{agent.id: agent for agent in change.moved} for change in (first, other)]
     return (
-        set(one.removed) == set(other.removed)
+        set(first.removed) == set(other.removed)
         and moved[0].keys() == moved[1].keys()
         and all(look_alike(agent, moved[1][name]) for name, agent in moved[0].items())
-        and _all_matched(one.added, other.added)
+        and _all_matched(first.added, other.added)
     )
 
 
-def _all_matched(one: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> bool:
+def _all_matched(agents: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> bool:
     """Return whether a one-to-one matching of objects that look alike exists."""
     from scipy.optimize import linear_sum_assignment
 
-    if len(one) != len(other):
+    if len(agents) != len(other):
         return False
-    apart = np.array([[not look_alike(a, b) for b in other] for a in one])
-    rows, columns = linear_sum_assignment(apart.reshape(len(one), len(other)))
-    return not apart.reshape(len(one), len(other))[rows, columns].any()
+    apart = np.array([[not look_alike(a, b) for b in other] for a in agents])
+    rows, columns = linear_sum_assignment(apart.reshape(len(agents), len(other)))
+    return not apart.reshape(len(agents), len(other))[rows, columns].any()
 
 
 def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
@@ -391,14 +393,16 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     return max(gaps_m) <= _ALIKE_M + 1e-9 and abs(turn_rad) <= _ALIKE_RAD + 1e-9
 
 
-def _are_close(one: Any, other: Any) -> bool:
+def _are_close(value: Any, other: Any) -> bool:
     """Return whether two parts of documents differ in their numbers alone, and in these little."""
-    if type(one) is not type(other):
+    if type(value) is not type(other):
         return False
-    if isinstance(one, float):
-        return bool(abs(one - other) <= _ALIKE_M + 1e-9)
-    if isinstance(one, dict):
-        return one.keys() == other.keys() and all(_are_close(one[key], other[key]) for key in one)
-    if isinstance(one, tuple):
-        return len(one) == len(other) and all(map(_are_close, one, other))
-    return bool(one == other)
+    if isinstance(value, float):
+        return bool(abs(value - other) <= _ALIKE_M + 1e-9)
+    if isinstance(value, dict):
+        return value.keys() == other.keys() and all(
+            _are_close(value[key], other[key]) for key in value
+        )
+    if isinstance(value, tuple):
+        return len(value) == len(other) and all(map(_are_close, value, other))
+    return bool(value == other)

@@ -33,7 +33,7 @@ def first_guess(findings: Iterable[Finding]) -> frozenset[FaultClass]:
 
 
 def _names(faults: Iterable[Finding], fault: FaultClass) -> set[str]:
-    return {name for one in faults if one.fault is fault for name in one.agents}
+    return {name for finding in faults if finding.fault is fault for name in finding.agents}
 
 
 def _follows(finding: Finding, misplaced: set[str], turned: set[str]) -> bool:

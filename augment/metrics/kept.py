@@ -59,35 +59,35 @@ def find_kept_objects(
         reference_after: Of the follow-up.
     """
     alike = {
-        one.id
-        for one in reference_before.changed
-        if any(look_alike(one, other) for other in reference_after.changed)
+        agent.id
+        for agent in reference_before.changed
+        if any(look_alike(agent, other) for other in reference_after.changed)
     }
     matches = displacement(before, reference_before).matches
     to_keep = {match.generated for match in matches if match.reference in alike}
     steps = {step.reference: step for step in displacement(after, before).matches}
     old = {agent.id: agent for agent in before.changed}
     new = {agent.id: agent for agent in after.changed} if after else {}
-    found = []
+    objects = []
     for name in (agent.id for agent in before.changed if agent.id in to_keep):
         step = steps.get(name)
-        found.append(
+        objects.append(
             KeptObject(
                 id=name,
                 distance_m=None if step is None else step.distance_m,
                 is_kept=step is not None and look_alike(old[name], new[step.generated]),
             )
         )
-    return tuple(found)
+    return tuple(objects)
 
 
 def summarise_kept(objects: Collection[KeptObject]) -> KeptSummary | None:
     """Return their summary, None without any."""
-    distances_m = [one.distance_m for one in objects if one.distance_m is not None]
+    distances_m = [thing.distance_m for thing in objects if thing.distance_m is not None]
     if not objects:
         return None
     return KeptSummary(
         to_keep=len(objects),
-        kept=sum(one.is_kept for one in objects),
+        kept=sum(thing.is_kept for thing in objects),
         moved_mean_m=float(np.mean(distances_m)) if distances_m else None,
     )

@@ -62,7 +62,7 @@ def compare_all(
         shared = sorted(values[first].keys() & values[second].keys())
         if not shared:
             continue
-        differences = np.array([values[first][one] - values[second][one] for one in shared])
+        differences = np.array([values[first][index] - values[second][index] for index in shared])
         low_m, high_m = _interval(differences, np.random.default_rng(stream), rounds)
         comparisons.append(
             PairedComparison(
@@ -75,8 +75,10 @@ def compare_all(
                 p=find_p_by_signed_ranks(differences),
             )
         )
-    adjusted = adjust_holm([one.p for one in comparisons])
-    return tuple(replace(one, p_holm=p) for one, p in zip(comparisons, adjusted, strict=True))
+    adjusted = adjust_holm([comparison.p for comparison in comparisons])
+    return tuple(
+        replace(comparison, p_holm=p) for comparison, p in zip(comparisons, adjusted, strict=True)
+    )
 
 
 def _interval(
@@ -95,11 +97,11 @@ def _interval(
 
 def adjust_holm(p_values: Sequence[float | None]) -> list[float | None]:
     """Holm's step-down adjustment; None stays None and counts for nothing."""
-    known = sorted((p, index) for index, p in enumerate(p_values) if p is not None)
+    present = sorted((p, index) for index, p in enumerate(p_values) if p is not None)
     adjusted: list[float | None] = [None] * len(p_values)
     highest = 0.0
-    for rank, (p, index) in enumerate(known):
-        highest = max(highest, min(1.0, (len(known) - rank) * p))
+    for rank, (p, index) in enumerate(present):
+        highest = max(highest, min(1.0, (len(present) - rank) * p))
         adjusted[index] = highest
     return adjusted
 

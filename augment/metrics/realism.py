@@ -99,7 +99,9 @@ def measure_objects(situation: ChangedScene) -> list[PlacedObject]:
     """Measure everything that was changed."""
     if not situation.changed:
         return []
-    collided = {name for one in overlap(situation) if one.is_fault for name in one.agents}
+    collided = {
+        name for finding in overlap(situation) if finding.is_fault for name in finding.agents
+    }
     gaps_m = _gaps_m(situation)
     return [
         PlacedObject(
@@ -136,9 +138,9 @@ def measure_recorded(ground: Ground) -> list[PlacedObject]:
 def count_recorded(objects: Iterable[PlacedObject]) -> RecordedCounts:
     """Return the histograms of what was recorded."""
     return Counter(
-        (one.object_class, feature, number)
-        for one in objects
-        for feature, number in one.bins.items()
+        (thing.object_class, feature, number)
+        for thing in objects
+        for feature, number in thing.bins.items()
     )
 
 
@@ -152,19 +154,19 @@ def judge(objects: Sequence[PlacedObject], recorded: RecordedCounts) -> Realism:
     seen = Counter[ObjectClass]()
     for (object_class, feature, _), number in recorded.items():
         seen[object_class] += number * (feature is Feature.SPEED)  # which all objects have
-    known = [one for one in objects if seen[one.object_class] >= LEAST_RECORDED]
+    judgeable = [thing for thing in objects if seen[thing.object_class] >= LEAST_RECORDED]
     scores = {}
     for feature in Feature:
         logs = [
-            math.log(_share(recorded, one.object_class, feature, one.bins[feature]))
-            for one in known
-            if feature in one.bins
+            math.log(_share(recorded, thing.object_class, feature, thing.bins[feature]))
+            for thing in judgeable
+            if feature in thing.bins
         ]
         if logs:
             scores[feature.value] = math.exp(float(np.mean(logs)))
-    if known:
-        scores[COLLISION] = float(np.mean([not one.collides for one in known]))
-    return Realism(scores=scores, judged=len(known))
+    if judgeable:
+        scores[COLLISION] = float(np.mean([not thing.collides for thing in judgeable]))
+    return Realism(scores=scores, judged=len(judgeable))
 
 
 def place_at_random(

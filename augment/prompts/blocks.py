@@ -64,13 +64,13 @@ def validate(kind: type[_Kind], value: object) -> _Kind:
 def fault_sentence(fault: ErrorDetails) -> str:
     """Tell one fault of pydantic's: where it is and what is wrong, without what was written."""
     path = ".".join(ascii(part).strip("'")[:40] for part in fault["loc"])
-    said = fault["msg"].removeprefix("Value error, ")
+    text = fault["msg"].removeprefix("Value error, ")
     if fault["type"] == "union_tag_invalid":
-        path, said = f"{path}.kind", f"Input should be {fault['ctx']['expected_tags']}"
+        path, text = f"{path}.kind", f"Input should be {fault['ctx']['expected_tags']}"
     if fault["type"] == "dataclass_type":
-        said = "Input should be an object"
-    said = said.replace("tuple", "list").replace("Tuple", "List")  # as it is in JSON
-    return f"{path or 'the block'}: {said}"
+        text = "Input should be an object"
+    text = text.replace("tuple", "list").replace("Tuple", "List")  # as it is in JSON
+    return f"{path or 'the block'}: {text}"
 
 
 def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], bool]:

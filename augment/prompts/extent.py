@@ -176,8 +176,8 @@ def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
     """
     closed = shapely.LineString([*boundary_m, boundary_m[0]])
     simple = shapely.simplify(closed, tolerance_m, preserve_topology=False)
-    kept = shapely.get_coordinates(simple)[:-1]
-    return kept if len(kept) >= 3 else boundary_m
+    corners = shapely.get_coordinates(simple)[:-1]
+    return corners if len(corners) >= 3 else boundary_m
 
 
 # Private
@@ -189,17 +189,17 @@ def _find_reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, fl
     Dijkstra's search; a connector that is entered is left, too.
     """
     graph = route.graph
-    found: dict[str, tuple[float, float]] = {}
+    spans: dict[str, tuple[float, float]] = {}
     queue = [(0.0, within_m, route.lane_id, route.lane_s_m)]
     while queue:
         driven_m, ends_m, here, start_m = heapq.heappop(queue)
-        if here in found or driven_m > ends_m:
+        if here in spans or driven_m > ends_m:
             continue
         lane = graph.lane(here)
         leaves_m = driven_m + lane.centerline.length_m - start_m
         if isinstance(lane, LaneConnector) and driven_m <= within_m:
             ends_m = max(ends_m, leaves_m + PAST_M)
-        found[here] = (start_m, start_m + ends_m - driven_m)
+        spans[here] = (start_m, start_m + ends_m - driven_m)
         beside = (lane.left_neighbor, lane.right_neighbor) if isinstance(lane, Lane) else ()
         x_m, y_m = lane.centerline.position(start_m)
         for other in beside:
@@ -208,29 +208,29 @@ def _find_reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, fl
                 heapq.heappush(queue, (driven_m, ends_m, other, place.s_m))
         for following in graph.successors(here):
             heapq.heappush(queue, (leaves_m, ends_m, following, 0.0))
-    return found
+    return spans
 
 
-def _is_the_same(one: LaneConnector, other: LaneConnector) -> bool:
+def _is_the_same(connector: LaneConnector, other: LaneConnector) -> bool:
     """Return whether two connectors lead the same way, with the same lights, limits and turns."""
     facts = ("from_lane", "to_lane", "turn_type", "traffic_light", "speed_limit_mps")
-    if any(getattr(one, name) != getattr(other, name) for name in facts):
+    if any(getattr(connector, name) != getattr(other, name) for name in facts):
         return False
     shares = np.linspace(0.0, 1.0, 9)
     places = (
-        line.points_at(shares * line.length_m) for line in (one.centerline, other.centerline)
+        line.points_at(shares * line.length_m) for line in (connector.centerline, other.centerline)
     )
     return bool(np.hypot(*np.subtract(*places).T).max() <= SAME_WITHIN_M)
 
 
 def _cut(points: FloatArray, outside_m: FloatArray) -> FloatArray:
     """Return the part of a closed boundary where `outside_m`, given at each point, is <= 0."""
-    kept: list[FloatArray] = []
+    points_left: list[FloatArray] = []
     for index in range(len(points)):
         before, here = outside_m[index - 1], outside_m[index]
         if (before > 0.0) != (here > 0.0):
             share = before / (before - here)
-            kept.append(points[index - 1] + share * (points[index] - points[index - 1]))
+            points_left.append(points[index - 1] + share * (points[index] - points[index - 1]))
         if here <= 0.0:
-            kept.append(points[index])
-    return np.array(kept).reshape(-1, 2)
+            points_left.append(points[index])
+    return np.array(points_left).reshape(-1, 2)

@@ -124,10 +124,10 @@ def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) ->
     Only an answer that holds a block is told to keep its placement.
     """
     called = any(calls_in(answer, tool) for tool in PARAMETERS)
-    told = [*problems, read_text("re_ask_calls.md")] if called else problems
+    problem_texts = [*problems, read_text("re_ask_calls.md")] if called else problems
     keep = read_text("re_ask_keep.md") if names_changes(answer) else ""
-    asked = fill_text("re_ask.md", problems=_join_entries(told), keep=keep)
-    return (*messages, model_message(answer), make_user_message(asked))
+    text = fill_text("re_ask.md", problems=_join_entries(problem_texts), keep=keep)
+    return (*messages, model_message(answer), make_user_message(text))
 
 
 def block_messages(messages: Messages, answer: str) -> Messages:
@@ -227,16 +227,16 @@ def verdict_messages(
         f"{' '.join(question.split())} -> {answers.get(number, CANNOT_SEE)}"
         for number, question in enumerate(questions, start=1)
     ]
-    told = fill_text("engineer_answers.md", answers=quote(_number_entries(lines)))
-    return (*messages, make_user_message(told))
+    text = fill_text("engineer_answers.md", answers=quote(_number_entries(lines)))
+    return (*messages, make_user_message(text))
 
 
 def review_re_ask_messages(
     messages: Messages, answer: str, problems: Sequence[str], *, text: str = "review_re_ask.md"
 ) -> Messages:
     """Return the conversation so far, a reviewer's unreadable answer, and its faults."""
-    asked = fill_text(text, problems=_join_entries(problems))
-    return (*messages, model_message(answer), make_user_message(asked))
+    question = fill_text(text, problems=_join_entries(problems))
+    return (*messages, model_message(answer), make_user_message(question))
 
 
 def reader_messages(instruction: str) -> Messages:

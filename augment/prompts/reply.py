@@ -200,8 +200,8 @@ def read_reply(
     except ReplyUnreadable:
         if not refuses(answer):
             raise
-        said = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
-        return ReadReply(modification=Modification(), notes=said, is_refusal=True)
+        notes = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
+        return ReadReply(modification=Modification(), notes=notes, is_refusal=True)
     names = vectors.short_names(scene)
     if sections:
         _number_added(document, names)
@@ -424,20 +424,20 @@ def _number_added(document: dict[str, object], names: vectors.ShortNames) -> Non
 def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Modification:
     """Return the change in the scene's own ids; its faults are told in the short ones."""
     shown = vectors.with_short_ids(scene, names)
-    asked = Modification(
+    change = Modification(
         added=tuple(_agent(agent) for agent in block.add),
         moved=tuple(_agent(agent) for agent in block.move),
         removed=tuple(block.remove),
     )
     try:
-        check_motions(shown, asked)
+        check_motions(shown, change)
     except InvalidModification as error:
         raise ReplyUnreadable([str(error)]) from None
-    if {agent.id for agent in asked.added} & names.agents.keys():
+    if {agent.id for agent in change.added} & names.agents.keys():
         raise ReplyUnreadable(
             [f"an added agent's id is taken: number them from {names.next_agent}"]
         )
-    return vectors.with_scene_ids(asked, names)
+    return vectors.with_scene_ids(change, names)
 
 
 def _agent(agent: _Agent) -> TrafficAgent:

@@ -247,7 +247,7 @@ def changes_text(scene: entities.Scene, modification: entities.Modification) -> 
     """Write what was added, moved and removed, as three lists under their headings."""
     names = short_names(scene)
     added = {agent.id: _agent_vector(agent, names) for agent in modification.added}
-    moved = {names.agents[one.id]: _agent_vector(one, names) for one in modification.moved}
+    moved = {names.agents[agent.id]: _agent_vector(agent, names) for agent in modification.moved}
     removed = [names.agents[name] for name in modification.removed]
     return "\n\n".join(
         [
@@ -297,7 +297,7 @@ def scene_vectors(
         if len(boundary):
             areas[names.areas[area.id]] = [area.kind.value, _points(boundary)]
     shown = list_agents(scene, radius_m)
-    agents = {names.agents[one.id]: _agent_vector(one, names) for one in shown}
+    agents = {names.agents[agent.id]: _agent_vector(agent, names) for agent in shown}
     return {"Agents": agents, **road, "Areas": areas}
 
 
@@ -318,10 +318,10 @@ def compass(heading_rad: float) -> str:
 
 def _shorten(ids: Iterable[str], prefix: str) -> dict[str, str]:
     names = list(ids)
-    kept = {name for name in names if re.fullmatch(prefix + "[1-9][0-9]{0,4}", name, re.ASCII)}
+    valid = {name for name in names if re.fullmatch(prefix + "[1-9][0-9]{0,4}", name, re.ASCII)}
     free = (f"{prefix}{number}" for number in count(1))
-    fresh = (name for name in free if name not in kept)
-    return {name: name if name in kept else next(fresh) for name in names}
+    fresh = (name for name in free if name not in valid)
+    return {name: name if name in valid else next(fresh) for name in names}
 
 
 def _parse_number(short: str) -> int:
@@ -343,20 +343,20 @@ def _rename(value: Any, agents: Mapping[str, str], lanes: Mapping[str, str]) -> 
         return value
     changes = {}
     for part in fields(value):
-        given, is_lane = getattr(value, part.name), isinstance(value, AnyLane)
+        value_before, is_lane = getattr(value, part.name), isinstance(value, AnyLane)
         if part.name in _OF_LANES or (part.name == "id" and is_lane):
-            changes[part.name] = _lookup_name(given, lanes)
+            changes[part.name] = _lookup_name(value_before, lanes)
         elif part.name in _OF_AGENTS or part.name == "id":
-            changes[part.name] = _lookup_name(given, agents)
+            changes[part.name] = _lookup_name(value_before, agents)
         else:
-            changes[part.name] = _rename(given, agents, lanes)
+            changes[part.name] = _rename(value_before, agents, lanes)
     return replace(value, **changes)
 
 
-def _lookup_name(given: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any:
-    if isinstance(given, tuple):
-        return tuple(names.get(name, name) for name in given)
-    return given and names.get(given, given)
+def _lookup_name(value: str | tuple[str, ...] | None, names: Mapping[str, str]) -> Any:
+    if isinstance(value, tuple):
+        return tuple(names.get(name, name) for name in value)
+    return value and names.get(value, value)
 
 
 def motion_parts(motion: PlannedMotion) -> dict[str, object]:

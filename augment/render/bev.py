@@ -107,7 +107,7 @@ def lanes_near(scene: Scene, agents: tuple[TrafficAgent, ...]) -> list[AnyLane]:
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     gaps_m = {
         lane.id: min(
-            (lane.centerline.project(one.x_m, one.y_m).distance_m for one in agents),
+            (lane.centerline.project(agent.x_m, agent.y_m).distance_m for agent in agents),
             default=np.inf,
         )
         for lane in lanes
@@ -130,7 +130,7 @@ def _paint_scene(
     """Draw all of a picture but its labels; return the boxes in pixels that text keeps free of."""
     after = apply(scene, modification)
     changed = {agent.id for agent in modification.changed}
-    rest = replace(after, agents=tuple(one for one in after.agents if one.id not in changed))
+    rest = replace(after, agents=tuple(agent for agent in after.agents if agent.id not in changed))
     # The scale keeps away from who was there before the change, the same for every contestant.
     corner = road.scale_corner(scene, camera)
     ground = _draw_unchanged(rest, camera, corner).copy()
@@ -139,7 +139,11 @@ def _paint_scene(
     shown = plan_held(modification) if camera.is_filmed else modification
     draw_trails(ground, find_trails(scene, shown, recording))
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
-    lost = [one for one in modification.changed if not ground.shows(ground.at(one.x_m, one.y_m))]
+    lost = [
+        agent
+        for agent in modification.changed
+        if not ground.shows(ground.at(agent.x_m, agent.y_m))
+    ]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
     scale_px = road.scale_box(camera, corner)
     badges = place_badges(ground, lost, seen, taken=(scale_px,))
@@ -218,7 +222,7 @@ def _draw_over_boxes(ground: Canvas, scene: Scene, lane: AnyLane) -> None:
 def _closer(modification: Modification, camera: Camera) -> Camera | None:
     """Return a window around what was changed, None where nothing would be gained."""
     seen = [agent for agent in modification.changed if camera.shows(agent.box.corners_m)]
-    sizes_px = [max(one.length_m, one.width_m) * camera.px_per_m for one in seen]
+    sizes_px = [max(agent.length_m, agent.width_m) * camera.px_per_m for agent in seen]
     longest_px = min(sizes_px, default=SMALL_PX)
     if longest_px >= SMALL_PX:
         return None

@@ -130,7 +130,9 @@ def camera_for(
         changes: What the scenario's contestants made of it.
         recording: What was recorded after t0, for motions.
     """
-    moving = [one for one in (reference, *changes) if one is not None and one.has_motion]
+    moving = [
+        change for change in (reference, *changes) if change is not None and change.has_motion
+    ]
     spots = [
         spot
         for change in moving
@@ -161,7 +163,7 @@ def _camera_for(
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
     followed = [place for change in changes for place in _places(scene, change)]
-    places += [one for one in followed if _distance_m(one) <= FOLLOWED_M]
+    places += [place for place in followed if _distance_m(place) <= FOLLOWED_M]
     need = _widen(need, places, MAX_WIDTH_M)
     widest_m = max(PASSED_WIDTH_M, _width_m(need))
     return _best(_widen(need, [np.array(place) for place in passed], widest_m), scene)
@@ -234,7 +236,7 @@ def _best(need: FloatArray, scene: Scene) -> Camera:
 def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
     """Yield the points (N, 2) of each place that a change touches."""
     touched = {agent.id for agent in change.moved} | set(change.removed)
-    for agent in (*(one for one in scene.agents if one.id in touched), *change.changed):
+    for agent in (*(agent for agent in scene.agents if agent.id in touched), *change.changed):
         yield _footprint(agent)
 
 

@@ -206,13 +206,13 @@ def text_width_px(text: str, size_px: int) -> float:
     return float(_font(size_px).getlength(text))
 
 
-def overlap(one: Box, other: Box, gap_px: float = 0.0) -> bool:
+def overlap(box: Box, other: Box, gap_px: float = 0.0) -> bool:
     """Return whether two boxes come nearer to each other than a gap."""
     return (
-        one[0] < other[2] + gap_px
-        and other[0] < one[2] + gap_px
-        and one[1] < other[3] + gap_px
-        and other[1] < one[3] + gap_px
+        box[0] < other[2] + gap_px
+        and other[0] < box[2] + gap_px
+        and box[1] < other[3] + gap_px
+        and other[1] < box[3] + gap_px
     )
 
 

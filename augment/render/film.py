@@ -73,8 +73,8 @@ def make_film(
     changed = {agent.id for agent in modification.changed}
     styled = [(motion.ego, palette.EGO_MARK)]
     styled += [
-        (one, palette.CHANGED_MARK if one.agent.id in changed else palette.OTHER_MARK)
-        for one in motion.others
+        (movement, palette.CHANGED_MARK if movement.agent.id in changed else palette.OTHER_MARK)
+        for movement in motion.others
     ]
     movers: list[tuple[tuple[Any, ...], Entry]] = []
     for movement, style in styled:
@@ -82,7 +82,7 @@ def make_film(
             mark = json.dumps(_shapes(movement.agent, style, camera.px_per_m))
             movers.append((_order(movement.agent, style), [mark, first, last, values]))
     # By what they look like and where they are: their order tells nothing of their ids.
-    movers.sort(key=lambda one: (*one[0], one[1]))
+    movers.sort(key=lambda entry: (*entry[0], entry[1]))
     marks = sorted({entry[0] for _, entry in movers})
     document = {
         "window": camera.key,

@@ -124,11 +124,13 @@ def draw_labels(
             _label_at_a_line(ground, writer, agent.id, box)
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     by_id = {lane.id: lane for lane in lanes}
-    centres = [_middle(box) for one, box in zip(everyone, boxes, strict=True) if one.id in first]
+    centres = [
+        _middle(box) for agent, box in zip(everyone, boxes, strict=True) if agent.id in first
+    ]
     for lane_id in named:
         spots = sorted(
             _lane_spots(ground, by_id[lane_id], 20.0),
-            key=lambda spot: min((math.dist(spot, one) for one in centres), default=0.0),
+            key=lambda spot: min((math.dist(spot, centre) for centre in centres), default=0.0),
         )
         asides = ((0.0, 0.0), (0.0, 16.0), (0.0, -16.0), (30.0, 16.0), (-30.0, -16.0))
         beside = [(x + dx, y + dy) for dx, dy in asides for x, y in spots]

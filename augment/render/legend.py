@@ -161,7 +161,7 @@ def _map_entries(scene: Scene) -> Iterator[tuple[_Sample, str]]:
     yield _solid(palette.LANE_SOLID), "edge of a lane or of the road"
     if any(lane.left_neighbor or lane.right_neighbor for lane in scene.lanes):
         yield _between, "between lanes of one direction"
-    if any(one.traffic_light not in _DARK for one in scene.connectors):
+    if any(connector.traffic_light not in _DARK for connector in scene.connectors):
         yield _solid(palette.LIGHT_RED), "bar in red, yellow or green: light"
     yield _patch(palette.ROAD), "road"
     area_kinds = {area.kind for area in scene.areas}

@@ -74,7 +74,7 @@ def draw_trails(ground: Canvas, trails: Sequence[Trail]) -> None:
         elif len(line) > 1:
             ground.dashed(line, palette.TRAIL[0], 2.5, 9.0, 9.0)
     spots = [(number, spot) for trail in trails for number, spot in enumerate(trail.spots)]
-    for number, spot in sorted(spots, key=lambda one: -one[0]):
+    for number, spot in sorted(spots, key=lambda entry: -entry[0]):
         colour = palette.TRAIL[min(number, len(palette.TRAIL) - 1)]
         if spot.type is AgentType.PEDESTRIAN:
             radius_px = PERSON_PX / 2.0 - 3.0

@@ -114,9 +114,11 @@ def draw_signals(ground: Canvas, scene: Scene) -> None:
     for connectors in starts.values():
         if not ground.camera.shows(connectors[0].centerline.points_m[:1]):
             continue
-        ordered = sorted(connectors, key=lambda one: _LEFT_TO_RIGHT.index(one.turn_type))
+        ordered = sorted(
+            connectors, key=lambda connector: _LEFT_TO_RIGHT.index(connector.turn_type)
+        )
         # The straightest way leaves its lane most squarely, so the bar is laid across that one.
-        first = min(ordered, key=lambda one: one.turn_type is not TurnType.STRAIGHT)
+        first = min(ordered, key=lambda connector: connector.turn_type is not TurnType.STRAIGHT)
         start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
         states = list(dict.fromkeys(connector.traffic_light for connector in ordered))
         part_m = width_m / len(states)
@@ -156,7 +158,9 @@ def scale_corner(scene: Scene, camera: Camera) -> Corner:
     places = camera.to_pixels(np.array([[agent.x_m, agent.y_m] for agent in scene.everyone]))
     boxes = {corner: scale_box(camera, corner) for corner in corners}
     spots = [(x, y, x, y) for x, y in places.tolist() if min(x, y) > 0.0]
-    return min(corners, key=lambda one: sum(overlap(boxes[one], at, _NEAR_PX) for at in spots))
+    return min(
+        corners, key=lambda corner: sum(overlap(boxes[corner], at, _NEAR_PX) for at in spots)
+    )
 
 
 def scale_box(camera: Camera, corner: Corner) -> Box:
@@ -258,9 +262,9 @@ def _lane_lines(ground: Canvas, scene: Scene, strips: list[Strip]) -> None:
     # All solid lines come last. They lie a little inside their own lane, where there is road
     # beyond them: two lanes that meet head on get a double line.
     is_road = [_has_road_beyond(ground, line, side) for line, side in margins]
-    for (line, side), found in zip(margins, is_road, strict=True):
+    for (line, side), is_margin_road in zip(margins, is_road, strict=True):
         inner = ground.px(offset(resample_line(line, 2.0), -_INSET_M * side))
-        for first, last in runs(found):
+        for first, last in runs(is_margin_road):
             ground.stroke(inner[first : last + 2], palette.LANE_SOLID, 1.5)
 
 
@@ -314,10 +318,10 @@ def _is_on(lane: AnyLane, ego: TrafficAgent) -> bool:
     return place.distance_m < _OWN_ASIDE_M and abs(turn) < _OWN_TURN_RAD
 
 
-def _alike(one: Pose, other: Pose) -> bool:
+def _alike(pose: Pose, other: Pose) -> bool:
     """Return whether two chevrons say the same: connectors that part late run side by side."""
-    near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < 2.0
-    return near and abs(difference(one.heading_rad, other.heading_rad)) < math.radians(40.0)
+    near = math.hypot(pose.x_m - other.x_m, pose.y_m - other.y_m) < 2.0
+    return near and abs(difference(pose.heading_rad, other.heading_rad)) < math.radians(40.0)
 
 
 def _lamp(ground: Canvas, centre: FloatArray, state: TrafficLight) -> None:

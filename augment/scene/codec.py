@@ -40,7 +40,9 @@ def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
             yield f"ego.{name}", f"the ego is the origin of its frame: 0, got {value}"
     named = [("ego.id", ego.id)]
     for key in ("agents", "lanes", "connectors", "areas"):
-        named += [(path(key, i, "id"), one.id) for i, one in enumerate(getattr(scene, key))]
+        named += [
+            (path(key, i, "id"), element.id) for i, element in enumerate(getattr(scene, key))
+        ]
     yield from _find_doubled(named)
     yield from _second_egos(agents=scene.agents)
     yield from _motion_problems(agents=scene.agents)
@@ -90,11 +92,11 @@ def _motion_problems(**agents: Iterable[entities.TrafficAgent]) -> Iterator[Prob
 
 def _reference_problems(scene: entities.Scene) -> Iterator[Problem]:
     lanes = {lane.id for lane in scene.lanes}
-    known = lanes | {connector.id for connector in scene.connectors}
+    lane_names = lanes | {connector.id for connector in scene.connectors}
     on = [("ego.lane_id", scene.ego.lane_id)]
     on += [(path("agents", i, "lane_id"), agent.lane_id) for i, agent in enumerate(scene.agents)]
     for place, name in on:
-        if name is not None and name not in known:
+        if name is not None and name not in lane_names:
             yield place, f"{name!r} is not a lane or connector of this scene"
     for index, lane in enumerate(scene.lanes):
         beside = {"left_neighbor": lane.left_neighbor, "right_neighbor": lane.right_neighbor}
@@ -108,46 +110,48 @@ def _reference_problems(scene: entities.Scene) -> Iterator[Problem]:
     for index, connector in enumerate(scene.connectors):
         for key in ("from_lane", "to_lane"):
             name = getattr(connector, key)
-            if name is not None and (name not in known or name == connector.id):
+            if name is not None and (name not in lane_names or name == connector.id):
                 yield path("connectors", index, key), f"{name!r} is not a lane of this scene"
 
 
-def _recording_problems(given: Recording) -> Iterator[Problem]:
-    times_s = given.times_s.tolist()
+def _recording_problems(recording: Recording) -> Iterator[Problem]:
+    times_s = recording.times_s.tolist()
     if times_s[0] != 0.0:
         yield "times_s[0]", f"the first step is t0: 0, got {times_s[0]}"
     for index, (before, after) in enumerate(pairwise(times_s), start=1):
         if after <= before:
             yield path("times_s", index), f"{after} does not follow {before}"
-    if len(given.ego) and np.isnan(given.ego[0]).all():
+    if len(recording.ego) and np.isnan(recording.ego[0]).all():
         yield "ego[0]", "the ego is there at t0"
-    rows = [("ego", given.ego)]
-    rows += [(path("tracks", i, "states"), track.states) for i, track in enumerate(given.tracks)]
+    rows = [("ego", recording.ego)]
+    rows += [
+        (path("tracks", i, "states"), track.states) for i, track in enumerate(recording.tracks)
+    ]
     for place, states in rows:
         if len(states) != len(times_s):
             yield place, f"expected {len(times_s)} states, one a step, got {len(states)}"
     seen: set[str] = set()
-    for index, track in enumerate(given.tracks):
+    for index, track in enumerate(recording.tracks):
         if track.agent_id in seen:
             yield path("tracks", index, "agent_id"), f"{track.agent_id!r} has a track already"
         seen.add(track.agent_id)
 
 
 def _intent_problems(intent: Intent) -> Iterator[Problem]:
-    known: list[str] = []
+    anchors: list[str] = []
     for number, request in enumerate(intent.requests):
         at, anchor = f"requests[{number}]", request.spot.anchor
-        if anchor is not None and anchor not in known:
-            names = ", ".join(known) or "none"
+        if anchor is not None and anchor not in anchors:
+            names = ", ".join(anchors) or "none"
             text = f"{anchor!r} is the name of no earlier request; those before it: {names}"
             yield f"{at}.spot.anchor", text
-        if request.name and request.name in known:
+        if request.name and request.name in anchors:
             yield f"{at}.name", f"{request.name!r} is taken by an earlier request"
-        known += [request.name] if request.name else []
+        anchors += [request.name] if request.name else []
         further = {WalkRequest: "behind", CrashRequest: "others"}.get(type(request))
-        given = len(getattr(request, further)) if further else 0
-        if request.count is not None and given > request.count - 1:
-            text = f"tells of {given} further ones, but the count is {request.count}"
+        described = len(getattr(request, further)) if further else 0
+        if request.count is not None and described > request.count - 1:
+            text = f"tells of {described} further ones, but the count is {request.count}"
             yield f"{at}.{further}", text
 
 
@@ -251,7 +255,7 @@ class CatalogueEntry:
     notes: Text = ""
     intent: Annotated[
         Intent | None,
-        BeforeValidator(lambda given: given and intent_from_document(given)),
+        BeforeValidator(lambda document: document and intent_from_document(document)),
         PlainSerializer(lambda intent: intent and intent_to_document(intent)),
     ] = None
     reference: Annotated[

@@ -92,25 +92,25 @@ def spawn_traffic(
         nearest = graph.nearest(x_m, y_m)
         places += [] if nearest is None else [(graph.place(nearest[0], nearest[1].s_m).pose, mps)]
     rolls = scene.ego.speed_mps >= _ROLLS_MPS or scene.options.interplan is not None
-    kept: list[TrafficAgent] = []
+    spawned: list[TrafficAgent] = []
     for pose, mps in places:
         # Whoever has a speed gets the ego's recorded one, as interPlan's released code has it.
         speed_mps = max(scene.ego.speed_mps if mps and rolls else mps, _CREEPS_MPS)
         agent = _vehicle(graph, pose, speed_mps, next(boxes_m))
-        strips = [] if agent.lane_id in own else list(map(_strip, kept))
-        if not _meets(agent, [scene.ego, *kept]) and not _meets(_strip(agent), strips):
-            kept.append(agent)
-    return SpawnedTraffic(agents=keep_clear(kept), ego_mps=ego_mps)
+        strips = [] if agent.lane_id in own else list(map(_strip, spawned))
+        if not _meets(agent, [scene.ego, *spawned]) and not _meets(_strip(agent), strips):
+            spawned.append(agent)
+    return SpawnedTraffic(agents=keep_clear(spawned), ego_mps=ego_mps)
 
 
 def keep_clear(
     agents: Sequence[TrafficAgent], clear_of: Sequence[TrafficAgent] = ()
 ) -> tuple[TrafficAgent, ...]:
     """Return spawned vehicles that have 2 s at their speed to all of these, numbered anew."""
-    kept = [agent for agent in agents if not _meets(_strip(agent), clear_of)]
-    kept.sort(key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.x_m))
+    cleared = [agent for agent in agents if not _meets(_strip(agent), clear_of)]
+    cleared.sort(key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.x_m))
     return tuple(
-        replace(agent, id=f"Agent{number}") for number, agent in enumerate(kept, start=FIRST_ID)
+        replace(agent, id=f"Agent{number}") for number, agent in enumerate(cleared, start=FIRST_ID)
     )
 
 
@@ -184,10 +184,10 @@ def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
         for name in (way.from_lane, way.to_lane)
     )
     return tuple(
-        one.id
-        for one in graph.lanes.values()
-        if one is way
-        or (isinstance(one, LaneConnector) and one.from_lane in begins and one.to_lane in ends)
+        lane.id
+        for lane in graph.lanes.values()
+        if lane is way
+        or (isinstance(lane, LaneConnector) and lane.from_lane in begins and lane.to_lane in ends)
     )
 
 
@@ -226,7 +226,7 @@ def _fill(
     enough to stop behind the one before it.
     """
     lines = [graph.lane(name).centerline for name in _extend(scene, graph, lane_id)]
-    line = Polyline([point for one in lines for point in one.points_m.tolist()])
+    line = Polyline([point for part in lines for point in part.points_m.tolist()])
     ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
     is_egos = lane_id == find_ego_lane(scene, graph)
     limit_mps = graph.lane(lane_id).speed_limit_mps

@@ -272,7 +272,7 @@ class Scene:
     lanes: Annotated[tuple[Lane, ...], _MOST] = ()
     connectors: Annotated[tuple[LaneConnector, ...], _MOST] = ()
     areas: Annotated[tuple[Area, ...], _MOST] = ()
-    options: Annotated[SceneOptions, Field(exclude_if=lambda one: one == SceneOptions())] = (
+    options: Annotated[SceneOptions, Field(exclude_if=lambda value: value == SceneOptions())] = (
         SceneOptions()
     )
 
@@ -347,13 +347,13 @@ def apply(scene: Scene, modification: Modification) -> Scene:
     check_fits(scene, modification)
     moved = {agent.id: agent for agent in modification.moved}
     gone = set(modification.removed)
-    kept = tuple(moved.get(agent.id, agent) for agent in scene.agents if agent.id not in gone)
-    return replace(scene, agents=kept + modification.added)
+    agents = tuple(moved.get(agent.id, agent) for agent in scene.agents if agent.id not in gone)
+    return replace(scene, agents=agents + modification.added)
 
 
 def check_fits(scene: Scene, modification: Modification) -> None:
     """Raise InvalidModification unless every id of the modification fits the scene."""
-    known = {agent.id for agent in scene.agents}
+    ids = {agent.id for agent in scene.agents}
     touched = [agent.id for agent in modification.changed] + list(modification.removed)
     doubled = sorted({name for name in touched if touched.count(name) > 1})
     if doubled:
@@ -362,13 +362,13 @@ def check_fits(scene: Scene, modification: Modification) -> None:
         if agent.type is AgentType.EGO_VEHICLE:
             raise InvalidModification(f"{agent.id}: an added or moved agent can't be the ego")
     for agent in modification.added:
-        if agent.id in known or agent.id == scene.ego.id:
+        if agent.id in ids or agent.id == scene.ego.id:
             raise InvalidModification(f"{agent.id} is in the scene already; an added agent is new")
     for name in [agent.id for agent in modification.moved] + list(modification.removed):
         if name == scene.ego.id:
             raise InvalidModification(f"{name} is the ego, which stays where it is")
-        if name not in known:
-            allowed = ", ".join(sorted(known)) or "none"
+        if name not in ids:
+            allowed = ", ".join(sorted(ids)) or "none"
             raise InvalidModification(f"{name} is not in the scene; its agents: {allowed}")
 
 
@@ -400,9 +400,9 @@ _LABELS = {
 
 def in_type_order(names: Iterable[str]) -> list[str]:
     """Names of types, each once: interPlan's five in their order, then others by their slugs."""
-    given = set(names)
-    five = [one.value for one in ScenarioType if one.value in given]
-    return [*five, *sorted(given.difference(five))]
+    present = set(names)
+    five = [kind.value for kind in ScenarioType if kind.value in present]
+    return [*five, *sorted(present.difference(five))]
 
 
 class CatalogueSet(StrEnum):

@@ -225,7 +225,7 @@ class Spot:
         if self.distance is not None and self.relation is None:
             raise ValueError("a distance needs a relation: ahead or behind")
         starts = (self.anchor, self.landmark, self.mark, self.via)
-        if sum(one is not None for one in starts) > 1:
+        if sum(start is not None for start in starts) > 1:
             raise ValueError("a distance runs from an anchor, a landmark, a mark or over a lane")
         if self.landmark is not None and self.landmark.every:
             raise ValueError("a landmark is one road user, not every one")
@@ -251,7 +251,7 @@ def _check_motion(motion: MotionWish | None, who: str, *presets: MotionPreset) -
 _ON_FOOT = (MotionPreset.LATE_PEDESTRIAN,)
 _OF_DOORS = (MotionPreset.DOOR_OPENING,)
 _OPENS = MotionWish(preset=MotionPreset.DOOR_OPENING)
-_DRIVEN = tuple(one for one in MotionPreset if one not in (*_ON_FOOT, *_OF_DOORS))
+_DRIVEN = tuple(preset for preset in MotionPreset if preset not in (*_ON_FOOT, *_OF_DOORS))
 
 _Turned = TypeVar("_Turned", "VehicleRequest", "Move")
 

@@ -80,22 +80,22 @@ class Setting(StrEnum):
     BY_PARKED_RIGHT = "between parked vehicles on the right"
 
 
-def _fill_high(given: object) -> object:
+def _fill_high(document: object) -> object:
     """In a document the low end alone is one number."""
     for low, high in (("low_m", "high_m"), ("low", "high")):
-        if isinstance(given, dict) and low in given and given.get(high) is None:
-            return given | {high: given[low]}
-    return given
+        if isinstance(document, dict) and low in document and document.get(high) is None:
+            return document | {high: document[low]}
+    return document
 
 
 _Range = TypeVar("_Range", "Length", "Amount")
 
 
-def _check_order(given: _Range) -> _Range:
-    low, high = fields(given)[:2]
-    if getattr(given, high.name) < getattr(given, low.name):
+def _check_order(span: _Range) -> _Range:
+    low, high = fields(span)[:2]
+    if getattr(span, high.name) < getattr(span, low.name):
         raise ValueError(f"{high.name} is below {low.name}")
-    return given
+    return span
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -50,7 +50,7 @@ def list_statements(intent: intents.Intent) -> tuple[str, ...]:
         statements += [f"{move.who}: {fact}" for fact in facts]
     statements += [f"{removal}: goes" for removal in intent.removals]
     windows = {name: getattr(intent.purpose, name, None) for name in _PURPOSES}
-    statements += [_PURPOSES[name].format(one) for name, one in windows.items() if one]
+    statements += [_PURPOSES[name].format(value) for name, value in windows.items() if value]
     if intent.route in _ROUTES:
         statements.append(f"distances run along the way that turns {_ROUTES[intent.route]}")
     if intent.unmet:

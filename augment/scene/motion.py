@@ -118,17 +118,19 @@ def find_motion(
             others[agent.id] = _assume_movement(agent, times_s, graph)
     if recording is not None and with_later:
         taken = {agent.id for agent in scene.everyone}
-        others |= {one.agent.id: one for one in _later(recording, times_s, taken, replaced)}
+        others |= {
+            movement.agent.id: movement for movement in _later(recording, times_s, taken, replaced)
+        }
     others |= _plan_movements(scene, times_s, graph, {ego.agent.id: ego} | others)
     return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
 
 
 def with_movers_alone(scene: Scene, besides: Collection[str] = ()) -> Scene:
     """Return the scene with those alone on whom planned motions depend, and some besides."""
-    motions = [(one.id, one.motion) for one in scene.agents if one.motion is not None]
+    motions = [(agent.id, agent.motion) for agent in scene.agents if agent.motion is not None]
     names = {*besides, *(name for name, _ in motions)}
-    names |= {one.start.agent_id for _, one in motions if isinstance(one.start, AtPlace)}
-    return replace(scene, agents=tuple(one for one in scene.agents if one.id in names))
+    names |= {motion.start.agent_id for _, motion in motions if isinstance(motion.start, AtPlace)}
+    return replace(scene, agents=tuple(agent for agent in scene.agents if agent.id in names))
 
 
 # Private
@@ -138,19 +140,23 @@ def _plan_movements(
     scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
 ) -> dict[str, Movement]:
     """Return the agents with a motion or a walk, who watch everybody for their triggers."""
-    movers = [PlannedMover(one, graph) for one in scene.agents if one.motion or one.walk_to_m]
+    movers = [
+        PlannedMover(agent, graph) for agent in scene.agents if agent.motion or agent.walk_to_m
+    ]
     if not movers:
         return {}
     rows: dict[str, list[FloatArray]] = {mover.agent.id: [] for mover in movers}
     for step, time_s in enumerate(times_s.tolist()):
-        places = {name: one.states[step, :2].tolist() for name, one in moves.items()}
+        places = {name: movement.states[step, :2].tolist() for name, movement in moves.items()}
         for mover in movers:
             mover.advance(time_s)
             places[mover.agent.id] = mover.state()[:2].tolist()
         for mover in movers:
             mover.react(places)
             rows[mover.agent.id].append(mover.state())
-    return {one.agent.id: _carried_out(one, np.array(rows[one.agent.id])) for one in movers}
+    return {
+        mover.agent.id: _carried_out(mover, np.array(rows[mover.agent.id])) for mover in movers
+    }
 
 
 def _carried_out(mover: PlannedMover, states: FloatArray) -> Movement:
@@ -173,10 +179,10 @@ def _ego_movement(
     states, seen = read.states, np.flatnonzero(read.is_present)
     last = int(seen[-1])
     gaps = np.flatnonzero(~read.is_present[:last])
-    known = states[seen]
-    known[:, 2] = np.unwrap(known[:, 2])
+    visible = states[seen]
+    visible[:, 2] = np.unwrap(visible[:, 2])
     for column in range(4):
-        states[gaps, column] = np.interp(times_s[gaps], times_s[seen], known[:, column])
+        states[gaps, column] = np.interp(times_s[gaps], times_s[seen], visible[:, column])
     states[gaps, 2] = _wrap_angles(states[gaps, 2])
     if last + 1 < len(times_s):
         x_m, y_m, heading_rad, speed_mps = states[last].tolist()

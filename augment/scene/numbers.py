@@ -20,14 +20,14 @@ _DIGITS = 6
 
 def list_numbers(document: Mapping[str, Any]) -> dict[str, float]:
     """Return every number of a document as it stands, by its path; of a range its lower end."""
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
 
     def note(steps: tuple[int | str, ...], part: Any) -> Any:
-        found[path(*steps)] = float(part[_low_key(part)] if isinstance(part, dict) else part)
+        numbers[path(*steps)] = float(part[_low_key(part)] if isinstance(part, dict) else part)
         return part
 
     _map_numbers(document, note)
-    return found
+    return numbers
 
 
 def set_number(document: Mapping[str, Any], name: str, value: float) -> dict[str, Any]:
@@ -36,8 +36,8 @@ def set_number(document: Mapping[str, Any], name: str, value: float) -> dict[str
     Raises:
         UnknownName: There is no number at that path.
     """
-    known = list_numbers(document)
-    check_names("number", [name], known)
+    numbers = list_numbers(document)
+    check_names("number", [name], numbers)
     changed: dict[str, Any] = _map_numbers(
         document, lambda steps, part: _exact(part, value) if path(*steps) == name else part
     )

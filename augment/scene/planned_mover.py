@@ -271,12 +271,12 @@ def check_scene_motions(scene: Scene) -> None:
         InvalidModification: A path leads over lanes that don't follow each other, a trigger
             waits for nobody's arrival, or there are too many.
     """
-    motions = [(one, one.motion) for one in scene.agents if one.motion is not None]
+    motions = [(agent, agent.motion) for agent in scene.agents if agent.motion is not None]
     if not motions:
         return
     if len(motions) > MOST_OBJECTS:
         raise InvalidModification(f"{len(motions)} agents have a motion; at most {MOST_OBJECTS}")
-    graph, names = LaneGraph(scene), {one.id for one in scene.everyone}
+    graph, names = LaneGraph(scene), {agent.id for agent in scene.everyone}
     for agent, motion in motions:
         try:
             if isinstance(motion.path, LanePath):

@@ -153,7 +153,7 @@ def find_crossing(connector: LaneConnector, route: EgoRoute) -> Point | None:
     line = connector.centerline
     met = shapely.LineString(line.points_m).intersection(shapely.LineString(ahead.points_m))
     for x_m, y_m in shapely.get_coordinates(met).tolist():
-        heading_rad, ego_rad = (one.project(x_m, y_m).heading_rad for one in (line, ahead))
+        heading_rad, ego_rad = (line_of.project(x_m, y_m).heading_rad for line_of in (line, ahead))
         turn_rad = abs(difference(heading_rad, ego_rad))
         if _CROSSES_ABOVE_RAD < turn_rad < math.pi - _CROSSES_ABOVE_RAD:
             return _round((x_m, y_m))
@@ -215,8 +215,8 @@ class _Case:
 
     def number(self, name: str) -> float:
         """One that was said, else the usual one."""
-        said = getattr(self.numbers, name)
-        return float(getattr(USUAL[self.preset], name) if said is None else said)
+        stated = getattr(self.numbers, name)
+        return float(getattr(USUAL[self.preset], name) if stated is None else stated)
 
     @property
     def reached_mps(self) -> float:

@@ -129,9 +129,9 @@ class Codec(Generic[Value]):
         if not isinstance(document, dict):
             text = f"expected an object, got {type(document).__name__}"
             raise InvalidDocument(self.what, [("", text)])
-        wanted, given = self.frame["format"], document.get("format")
-        if given != wanted:
-            text = f"expected {wanted!r}, got {_shorten(given)}"
+        wanted, format_name = self.frame["format"], document.get("format")
+        if format_name != wanted:
+            text = f"expected {wanted!r}, got {_shorten(format_name)}"
             raise InvalidDocument(self.what, [("format", text)])
         version = document.get("version")
         if type(version) is not int or version != VERSION:

@@ -56,17 +56,23 @@ def find_trails(
     motion = find_motion(
         with_movers_alone(after), recording=recording, replaced=modification.replaced
     )
-    started = {one.agent.id: _trail_since(one.started_s, one.states) for one in motion.others}
-    waiting = {name for name, found in started.items() if found is None}
+    started = {
+        movement.agent.id: _trail_since(movement.started_s, movement.states)
+        for movement in motion.others
+    }
+    waiting = {name for name, trail in started.items() if trail is None}
     at_once = replace(
         after,
         agents=tuple(
-            replace(one, motion=replace(one.motion, start=AtTime()))
-            for one in after.agents
-            if one.motion is not None and one.id in waiting
+            replace(agent, motion=replace(agent.motion, start=AtTime()))
+            for agent in after.agents
+            if agent.motion is not None and agent.id in waiting
         ),
     )
-    would = {one.agent.id: one.states[: _STEPS + 1, :2] for one in find_motion(at_once).others}
+    would = {
+        movement.agent.id: movement.states[: _STEPS + 1, :2]
+        for movement in find_motion(at_once).others
+    }
     trails = []
     for agent in modification.changed:
         if agent.motion is None:

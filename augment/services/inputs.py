@@ -86,26 +86,26 @@ def input_field(
 def to_inputs(request: type) -> tuple[Input, ...]:
     """Return the inputs of a request, in the order of its fields."""
     return tuple(
-        Input(name=one.name, **one.metadata["input"])
-        for one in fields(request)
-        if "input" in one.metadata
+        Input(name=declared.name, **declared.metadata["input"])
+        for declared in fields(request)
+        if "input" in declared.metadata
     )
 
 
-def read_request(request: type[Request], given: Mapping[str, Any], **more: Any) -> Request:
+def read_request(request: type[Request], values: Mapping[str, Any], **more: Any) -> Request:
     """Return the request that the values of a form, a body or a command line make.
 
     Args:
         request: A dataclass with inputs.
-        given: Values by name; empty ones leave the default, other names are ignored.
+        values: Values by name; empty ones leave the default, other names are ignored.
         more: What else the request holds.
     """
-    return request(**read_values(to_inputs(request), given) | more)
+    return request(**read_values(to_inputs(request), values) | more)
 
 
-def read_values(inputs: Iterable[Input], given: Mapping[str, Any]) -> dict[str, Any]:
+def read_values(inputs: Iterable[Input], entered: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of these inputs that are not empty."""
-    values = {one.name: given.get(one.name) for one in inputs}
+    values = {declared.name: entered.get(declared.name) for declared in inputs}
     return {name: value for name, value in values.items() if value not in (None, "")}
 
 
@@ -116,11 +116,11 @@ def check_bounds(request: Any) -> None:
         InvalidDocument: Some are not.
     """
     problems = [
-        (one.name, f"goes from {one.least:g} to {one.most:g}, not {value:g}")
-        for one in to_inputs(type(request))
-        if one.least is not None and one.most is not None
-        if (value := getattr(request, one.name)) is not None
-        if value != value or not one.least <= value <= one.most  # NaN is not itself
+        (declared.name, f"goes from {declared.least:g} to {declared.most:g}, not {value:g}")
+        for declared in to_inputs(type(request))
+        if declared.least is not None and declared.most is not None
+        if (value := getattr(request, declared.name)) is not None
+        if value != value or not declared.least <= value <= declared.most  # NaN is not itself
     ]
     if problems:
         raise InvalidDocument("request", problems)
@@ -151,31 +151,31 @@ def add_options(parser: Any, inputs: Iterable[Input], *, is_any_required: bool =
             and is None then.
     """
     has_positional = False
-    for one in inputs:
-        is_required = one.is_required and is_any_required
-        is_positional = one.kind is InputKind.TEXT and is_required and not has_positional
+    for declared in inputs:
+        is_required = declared.is_required and is_any_required
+        is_positional = declared.kind is InputKind.TEXT and is_required and not has_positional
         has_positional |= is_positional
-        default = None if one.is_required or not is_any_required else one.default
-        words = one.explanation
+        default = None if declared.is_required or not is_any_required else declared.default
+        words = declared.explanation
         if default and not isinstance(default, bool):
             words += f" (default: {default})"
-        given: dict[str, Any] = {"help": words.replace("%", "%%")}
+        arguments: dict[str, Any] = {"help": words.replace("%", "%%")}
         if not is_positional:
-            given |= {"dest": one.name, "required": is_required, "default": default}
-        match one.kind:
+            arguments |= {"dest": declared.name, "required": is_required, "default": default}
+        match declared.kind:
             case InputKind.SWITCH:
-                given["action"] = BooleanOptionalAction
+                arguments["action"] = BooleanOptionalAction
             case InputKind.CHOICE:
-                given["choices"] = list(one.choices)
+                arguments["choices"] = list(declared.choices)
             case InputKind.LINES | InputKind.NAMES:
                 # An option that is given twice loses nothing; argparse extends only lists.
                 default = None if default is None else list(default)
-                given |= {"nargs": "+", "action": "extend", "default": default}
+                arguments |= {"nargs": "+", "action": "extend", "default": default}
             case InputKind.WHOLE | InputKind.NUMBER | InputKind.DECIMAL:
-                given["type"] = _NUMBERS[one.kind]
-                given["metavar"] = "PERCENT" if one.unit == "%" else "N"
-        flag = one.name.removeprefix("is_").replace("_", "-")
-        parser.add_argument(one.name if is_positional else f"--{flag}", **given)
+                arguments["type"] = _NUMBERS[declared.kind]
+                arguments["metavar"] = "PERCENT" if declared.unit == "%" else "N"
+        flag = declared.name.removeprefix("is_").replace("_", "-")
+        parser.add_argument(declared.name if is_positional else f"--{flag}", **arguments)
 
 
 _NUMBERS = {InputKind.WHOLE: int, InputKind.NUMBER: float, InputKind.DECIMAL: read_decimal}

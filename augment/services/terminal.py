@@ -65,8 +65,8 @@ class TerminalCommand(BaseCommand):
         return self._stdout
 
     @stdout.setter
-    def stdout(self, given: Any) -> None:
-        self._stdout = _wrap(given)
+    def stdout(self, stream: Any) -> None:
+        self._stdout = _wrap(stream)
 
     @property  # type: ignore[override]
     def stderr(self) -> TerminalOutput:
@@ -74,8 +74,8 @@ class TerminalCommand(BaseCommand):
         return self._stderr
 
     @stderr.setter
-    def stderr(self, given: Any) -> None:
-        self._stderr = _wrap(given)
+    def stderr(self, stream: Any) -> None:
+        self._stderr = _wrap(stream)
 
     def execute(self, *args: Any, **options: Any) -> str | None:
         """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
@@ -86,9 +86,9 @@ class TerminalCommand(BaseCommand):
             raise CommandError(f"{self.failure} {error}".lstrip()) from error
 
 
-def _wrap(given: OutputWrapper) -> TerminalOutput:
-    made = TerminalOutput(given._out, ending=given.ending)  # type: ignore[arg-type]
-    made.style_func = given.style_func
+def _wrap(stream: OutputWrapper) -> TerminalOutput:
+    made = TerminalOutput(stream._out, ending=stream.ending)  # type: ignore[arg-type]
+    made.style_func = stream.style_func
     return made
 
 

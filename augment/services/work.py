@@ -255,9 +255,9 @@ class WorkKind(ABC, Generic[Row]):
         """
         give_up_at = time.monotonic() + PATIENCE_S
         is_taken = False
-        while held := wait_out(partial(self.take, pk, worker=worker)):
+        while lease := wait_out(partial(self.take, pk, worker=worker)):
             is_taken = True
-            if self.work(held) or time.monotonic() > give_up_at:
+            if self.work(lease) or time.monotonic() > give_up_at:
                 break
         return is_taken
 
@@ -389,6 +389,6 @@ def change_all(rows: QuerySet[Any], **changes: Any) -> int:
     deadlock: a plain UPDATE takes them as they lie. A caller that also changes their job does so
     afterwards, as one that settles a single row does.
     """
-    held = rows.order_by("pk").select_for_update(no_key=True)
-    list(held.values_list("pk", flat=True))
+    locked = rows.order_by("pk").select_for_update(no_key=True)
+    list(locked.values_list("pk", flat=True))
     return rows.update(**changes)

@@ -31,12 +31,12 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
         CannotDrive: The path leads to nothing, or to something that is no planner.
     """
     check_names("offsets", [offsets], OFFSETS_M)
-    known: dict[str, Callable[[], Planner]] = {
+    planners: dict[str, Callable[[], Planner]] = {
         PDM_CLOSED: partial(PdmClosed, OFFSETS_M[offsets]),
         IDM: IdmPlanner,
     }
-    if name in known:
-        return known[name]()
+    if name in planners:
+        return planners[name]()
     paths = [path for path in allowed if "." in path]
     if name not in paths:
         raise UnknownName("planner", name, [*NAMED, *paths])

@@ -142,11 +142,11 @@ def foresee(objects: Objects, horizon_s: float) -> Forecast:
 def nearest(objects: Objects, place_m: FloatArray, radius_m: float = RADIUS_M) -> Objects:
     """Return those within the radius of a place (2,), of each kind the nearest `MOST`."""
     away = np.hypot(*(objects.boxes[:, :2] - place_m).T)
-    kept = np.zeros(len(objects), dtype=np.bool_)
+    is_kept = np.zeros(len(objects), dtype=np.bool_)
     for kind, most in MOST.items():
         rows = np.flatnonzero((objects.kinds == kind) & (away <= radius_m))
-        kept[rows[np.argsort(away[rows], kind="stable")[:most]]] = True
-    return objects.chosen(kept)
+        is_kept[rows[np.argsort(away[rows], kind="stable")[:most]]] = True
+    return objects.chosen(is_kept)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -209,8 +209,8 @@ class ParallelPaths:
         widest = float(np.abs(self._offsets).max()) + body.width_m / 2.0
         near = np.abs(middle[..., 1]) < widest + size
         near &= (middle[..., 0] > ego_m - _BEHIND_M) & (middle[..., 0] < ego_m + reach_m + size)
-        kept = np.flatnonzero(near.any(axis=0))
-        boxes, middle = boxes[:, kept], middle[:, kept]
+        columns = np.flatnonzero(near.any(axis=0))
+        boxes, middle = boxes[:, columns], middle[:, columns]
         edges = self._beside(shapes.corners(boxes))
         low, high = edges[..., 1].min(axis=-1), edges[..., 1].max(axis=-1)
         meets = low[:, None] <= self._offsets[:, None] + body.width_m / 2.0
@@ -220,7 +220,7 @@ class ParallelPaths:
         return Corridor(
             near_m=np.where(meets, begin, np.inf),
             middle_m=np.moveaxis(self.stations(middle[..., 0]), 0, 1),
-            speeds_mps=forecast.objects.speeds_mps[kept] * np.cos(boxes[..., 2] - heading),
+            speeds_mps=forecast.objects.speeds_mps[columns] * np.cos(boxes[..., 2] - heading),
         )
 
     def _beside(self, points_m: FloatArray) -> FloatArray:

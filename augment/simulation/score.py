@@ -170,15 +170,15 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
     Who touches the ego at the very start is left out: nobody drove there.
     """
     met: list[Collision] = []
-    known: set[str] = set()
+    hit_before: set[str] = set()
     astray = off_one_way(drive)
     for moment, objects in enumerate(drive.objects):
         touching = shapes.meet(
             np.broadcast_to(drive.boxes[moment], objects.boxes.shape), objects.boxes
         )
-        fresh = np.array([name not in known for name in objects.ids], dtype=bool)
+        fresh = np.array([name not in hit_before for name in objects.ids], dtype=bool)
         hit = objects.chosen(touching & fresh)
-        known.update(hit.ids)
+        hit_before.update(hit.ids)
         if not len(hit) or moment == 0:
             continue
         states = np.repeat(drive.states[moment : moment + 1], len(hit), axis=0)
@@ -367,11 +367,11 @@ def _ttc_series(drive: Drive, met: tuple[Collision, ...], *, only_relevant: bool
         state = drive.states[moment]
         if state[SPEED] <= _STILL_MPS or not len(objects):
             continue
-        kept = np.array([first.get(name, moment + 1) > moment for name in objects.ids])
+        is_counted = np.array([first.get(name, moment + 1) > moment for name in objects.ids])
         if only_relevant:
             angle = shapes.bearings(state[None], objects.boxes[:, :2])
-            kept &= (angle < AHEAD_RAD) | (loose[moment] & (angle <= BEHIND_RAD))
-        times[moment] = _first_meeting(drive.boxes[moment], state, objects.chosen(kept))
+            is_counted &= (angle < AHEAD_RAD) | (loose[moment] & (angle <= BEHIND_RAD))
+        times[moment] = _first_meeting(drive.boxes[moment], state, objects.chosen(is_counted))
     return times
 
 

@@ -64,12 +64,12 @@ def find_edges(values: Iterable[TriedValue]) -> tuple[tuple[float, float], ...]:
     Values that were not driven are left out.
     """
     driven = sorted(
-        (value for value in values if value.is_passed is not None), key=lambda one: one.value
+        (value for value in values if value.is_passed is not None), key=lambda value: value.value
     )
     return tuple(
-        (one.value, other.value) if one.is_passed else (other.value, one.value)
-        for one, other in pairwise(driven)
-        if one.is_passed != other.is_passed
+        (tried.value, other.value) if tried.is_passed else (other.value, tried.value)
+        for tried, other in pairwise(driven)
+        if tried.is_passed != other.is_passed
     )
 
 
@@ -78,11 +78,11 @@ def find_hardest(values: Sequence[TriedValue]) -> TriedValue | None:
 
     Of equal ones that furthest from all values that the planner passes, then the lowest.
     """
-    passed = [one.value for one in values if one.is_passed]
+    passed = [tried.value for tried in values if tried.is_passed]
 
-    def ease(one: TriedValue) -> tuple[float, float, float]:
-        nearest = min((abs(one.value - other) for other in passed), default=0.0)
-        return round(one.solution.score if one.solution else 0.0, 4), -nearest, one.value
+    def ease(tried: TriedValue) -> tuple[float, float, float]:
+        nearest = min((abs(tried.value - other) for other in passed), default=0.0)
+        return round(tried.solution.score if tried.solution else 0.0, 4), -nearest, tried.value
 
-    solved = [one for one in values if one.is_passed is False and one.solution is not None]
+    solved = [tried for tried in values if tried.is_passed is False and tried.solution is not None]
     return min(solved, key=ease, default=None)

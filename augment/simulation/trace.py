@@ -123,15 +123,15 @@ def _objects(setting: DriveSetting, drive: Drive) -> list[dict[str, Any]]:
 
 def _plans(drive: Drive) -> list[dict[str, Any]]:
     """Return proposals every half second: a line and a score for each."""
-    kept = []
+    plans = []
     for step in range(0, len(drive.plans), PLAN_EVERY):
         shown = drive.plans[step].proposals
         if shown is not None:
             lines = drive.body.boxes(shown.states)[:, ::LINE_EVERY, :2].round(1)
             scores = [round(float(score), 3) for score in shown.scores]
             flat = [line.ravel().tolist() for line in lines]
-            kept.append({"step": step, "chosen": shown.chosen, "scores": scores, "lines": flat})
-    return kept
+            plans.append({"step": step, "chosen": shown.chosen, "scores": scores, "lines": flat})
+    return plans
 
 
 def _road(drive: Drive) -> dict[str, Any]:

@@ -384,11 +384,11 @@ def _driver_table(
 
 def _hold_course(agents: Sequence[TrafficAgent], road: Road) -> list[StraightOn | LaneDrivers]:
     """Let agents go on as `find_motion` has them: along their lane, straight on, or standing."""
-    held = [(one, HeldCourse(one, road.graph)) for one in agents if one.speed_mps > 0.0]
-    held = [(agent, course) for agent, course in held if course.lane_id is not None]
-    driving = [agent for agent, _ in held]
+    courses = [(agent, HeldCourse(agent, road.graph)) for agent in agents if agent.speed_mps > 0.0]
+    courses = [(agent, course) for agent, course in courses if course.lane_id is not None]
+    driving = [agent for agent, _ in courses]
     straight_on = StraightOn([agent for agent in agents if agent not in driving])
-    return [straight_on, HeldDrivers(driving, [course for _, course in held])]
+    return [straight_on, HeldDrivers(driving, [course for _, course in courses])]
 
 
 def _set_moving(
@@ -404,8 +404,8 @@ def _set_moving(
     """
     standing = [agent for agent in agents if agent.speed_mps <= 0.0]
     moving = [agent for agent in agents if agent.speed_mps > 0.0]
-    driving = [one for one in moving if one.type in _ON_LANES and lane_under(road, one)]
-    straight_on = StraightOn([*standing, *(one for one in moving if one not in driving)])
+    driving = [agent for agent in moving if agent.type in _ON_LANES and lane_under(road, agent)]
+    straight_on = StraightOn([*standing, *(agent for agent in moving if agent not in driving)])
     if start_clear_of is not None:
         taken, clear = np.vstack([start_clear_of[None], to_objects(standing).boxes]), []
         for agent in driving:
@@ -434,13 +434,15 @@ class Traffic:
         own = [agent for agent in setting.after.agents if agent.id not in names]
         is_interplans = setting.scene.options.interplan is not None
         walking = [agent for agent in own if agent.walk_to_m is not None and is_interplans]
-        planned = [one for one in own if one.motion or (one.walk_to_m and not is_interplans)]
+        planned = [
+            agent for agent in own if agent.motion or (agent.walk_to_m and not is_interplans)
+        ]
         plain = [agent for agent in own if agent not in (*walking, *planned)]
         recorded = setting.recording.tracks if setting.recording and setting.replay else ()
         tracked = {track.agent_id for track in recorded} - setting.modification.replaced
-        answering = [one for one in plain if is_interplans or one.id in tracked]
+        answering = [agent for agent in plain if is_interplans or agent.id in tracked]
         self._movers: list[StraightOn | LaneDrivers | Walkers | PlannedMovers | Replay] = [
-            *_hold_course([one for one in plain if one not in answering], road),
+            *_hold_course([agent for agent in plain if agent not in answering], road),
             *_set_moving(answering, road, ego_box),
             Walkers(walking, road, ego_box),
             PlannedMovers(planned, road),

@@ -254,6 +254,6 @@ def complete_options(
 
 def recipe_with(recipe: Recipe, options: ContestantOptions) -> Recipe:
     """Return the recipe within the limits of these options."""
-    known = asdict(recipe.limits)
-    chosen = {name: getattr(options, name) for name in options.to_document() if name in known}
+    limits = asdict(recipe.limits)
+    chosen = {name: getattr(options, name) for name in options.to_document() if name in limits}
     return replace(recipe, limits=replace(recipe.limits, **chosen))

@@ -195,21 +195,21 @@ class _Work:
     def outcome(self) -> Outcome:
         """Return the outcome, also of a missing answer."""
         try:
-            kept, remark = self.modify_and_review()
+            best, remark = self.modify_and_review()
         except ReplyUnreadable as unreadable:
             reason = "; ".join(unreadable.problems)
             return Outcome(status=OutcomeStatus.UNREADABLE, reason=reason)
         except ModelRefused as refused:
             return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
         # After a follow-up an empty block may also take back what was placed before.
-        changes_nothing = kept.read.modification.is_empty and not self.task.begun
-        if kept.read.is_refusal or changes_nothing:
-            return Outcome(status=OutcomeStatus.REFUSED, reason=kept.read.notes or LEFT_ALONE)
+        changes_nothing = best.read.modification.is_empty and not self.task.begun
+        if best.read.is_refusal or changes_nothing:
+            return Outcome(status=OutcomeStatus.REFUSED, reason=best.read.notes or LEFT_ALONE)
         return Outcome(
             status=OutcomeStatus.DONE,
-            modification=kept.read.modification,
-            notes="\n\n".join(part for part in (kept.read.notes, remark) if part),
-            is_accepted=None if kept.verdict is None else kept.verdict.is_accepted,
+            modification=best.read.modification,
+            notes="\n\n".join(part for part in (best.read.notes, remark) if part),
+            is_accepted=None if best.verdict is None else best.verdict.is_accepted,
         )
 
     def modify_and_review(self) -> tuple[_Round, str]:
@@ -262,7 +262,7 @@ class _Work:
             if not refuses(reply.text):
                 messages, sections = fill.block_messages(messages, reply.text), reply.text
                 schema, reply = block_schema(scene, radius_m=radius_m), None
-        read, asked, answer = self.respondents.read(
+        read, asked_messages, answer = self.respondents.read(
             ModelRole.MODIFIER,
             messages,
             partial(read_reply, scene=scene, radius_m=radius_m, sections=sections),
@@ -271,7 +271,7 @@ class _Work:
             reply=reply,
             schema=schema,
         )
-        return read, (*asked, fill.model_message(answer.text))
+        return read, (*asked_messages, fill.model_message(answer.text))
 
     def _ask_with_tool(self, messages: Messages, form: Form) -> tuple[Messages, Reply]:
         """Return the conversation with all calls and their results, and the reply without calls.
@@ -309,7 +309,9 @@ class _Work:
             respondents=self.respondents,
             limits=self.recipe.limits,
             earlier=rounds[-1].read.modification if rounds else None,
-            told=tuple(entry for one in rounds if one.verdict for entry in one.verdict.feedback),
+            told=tuple(
+                entry for draft in rounds if draft.verdict for entry in draft.verdict.feedback
+            ),
             intent=self.task.intent,
         )
         head: dict[str, object] = {"round": len(rounds) + 1, "review": review.name}
@@ -327,23 +329,24 @@ class _Work:
 
         An unreviewed last round came after all the feedback and counts.
         """
-        kept = rounds[-1]
-        if self.recipe.keep is Keep.BEST and kept.verdict is not None:
-            kept = max(
-                rounds, key=lambda one: (one.verdict.score if one.verdict else (), one.number)
+        best = rounds[-1]
+        if self.recipe.keep is Keep.BEST and best.verdict is not None:
+            best = max(
+                rounds,
+                key=lambda draft: (draft.verdict.score if draft.verdict else (), draft.number),
             )
         accepted, judgement = None, ""
-        if kept.verdict is not None:
-            accepted, judgement = kept.verdict.is_accepted, f": {kept.verdict.summary}"
+        if best.verdict is not None:
+            accepted, judgement = best.verdict.is_accepted, f": {best.verdict.summary}"
         count = len(rounds)
         self.respondents.transcript.note(
             NoteKind.KEPT,
-            {"round": kept.number, "rounds": count, "accepted": accepted, "remark": fault},
+            {"round": best.number, "rounds": count, "accepted": accepted, "remark": fault},
         )
-        remark = f"{self.recipe.title}: round {kept.number} of {count} counts{judgement}."
+        remark = f"{self.recipe.title}: round {best.number} of {count} counts{judgement}."
         if accepted is False:
             remark += " No round was accepted."
-        return kept, f"{remark} {fault.rstrip('.')}." if fault else remark
+        return best, f"{remark} {fault.rstrip('.')}." if fault else remark
 
 
 @dataclass(slots=True, kw_only=True)
@@ -382,8 +385,8 @@ class _ToolDesk:
                 break
         if not results:
             return ()
-        told = fill.result_text(results, is_over=self.is_over)
-        return fill.model_message(reply.text), fill.make_user_message(told)
+        result = fill.result_text(results, is_over=self.is_over)
+        return fill.model_message(reply.text), fill.make_user_message(result)
 
     def _native_turns(self, reply: Reply) -> Messages:
         """Return the calls as they came and one message for each: all must have a result."""
@@ -395,8 +398,8 @@ class _ToolDesk:
             echoes.append(call if is_object else replace(call, arguments="{}"))
             result = self._answer(written)
             results.append(Message(speaker=Speaker.TOOL, text=result, answers=call.id))
-        said = Message(speaker=Speaker.ASSISTANT, text=reply.text, calls=tuple(echoes))
-        return said, *results
+        echo = Message(speaker=Speaker.ASSISTANT, text=reply.text, calls=tuple(echoes))
+        return echo, *results
 
     def _answer(self, call: WrittenCall) -> str:
         """Return the result of a call as JSON: a pose, or {"error": a sentence}."""
@@ -414,18 +417,18 @@ class _ToolDesk:
         return json.dumps(result, separators=(",", ":"))
 
     def _result(self, call: WrittenCall) -> object:
-        asked, most = (call.name, call.arguments, call.problem), self.limits
+        signature, most = (call.name, call.arguments, call.problem), self.limits
         problem = call.problem
         if self.is_over:
             problem = "no call is answered any more. Answer with what you have."
         elif len(self.earlier) >= most.calls:
             self.is_over = True
             problem = f"no call is left: {most.calls} are allowed. Answer with what you have."
-        elif self.earlier.count(asked) >= most.identical_calls:
+        elif self.earlier.count(signature) >= most.identical_calls:
             self.is_over = True
             problem = f"this was answered {most.identical_calls} times. Answer with what you have."
         elif not problem and call.name != self.name:
             problem = f"there is no function {call.name[:40]!r}; there is {self.name}"
         if not self.is_over:
-            self.earlier.append(asked)
+            self.earlier.append(signature)
         return {"error": problem} if problem else self.tool.answer(call.arguments)

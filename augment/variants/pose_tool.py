@@ -178,7 +178,9 @@ class PoseTool:
         pose, centre = last.pose_at(s_m, lateral_m), last.pose_at(s_m)
         # Who starts from its own place does not stand in its own way.
         taken_by = [
-            one for one in self._taken_by(pose, object_type) if not (is_own and one == start)
+            occupant
+            for occupant in self._taken_by(pose, object_type)
+            if not (is_own and occupant == start)
         ]
         free_m = self._nearest_free_m(pose_at, object_type, distance_m) if taken_by else None
         return PoseOnLane(
@@ -190,7 +192,7 @@ class PoseTool:
             lane_width_m=last.width_m,
             next_lanes=list(last.after),
             lanes_beside=self._beside(last, centre) or None,
-            route=[one.id for one in passed],
+            route=[lane.id for lane in passed],
             nearest_free_m=free_m,
             start_lateral_m=start_lateral_m,
             **self._side(centre, "left", math.pi / 2.0),
@@ -226,9 +228,9 @@ class PoseTool:
             name: value
             for name, value in answers[0].items()
             if name not in _OF_A_PLACE
-            and all(name in one and one[name] == value for one in answers)
+            and all(name in answer and answer[name] == value for answer in answers)
         }
-        own = [{name: one[name] for name in one if name not in shared} for one in answers]
+        own = [{name: answer[name] for name in answer if name not in shared} for answer in answers]
         return {"poses": own, **shared}
 
     @cached_property
@@ -240,7 +242,7 @@ class PoseTool:
     @cached_property
     def agents(self) -> dict[str, TrafficAgent]:
         """The shown agents by short id."""
-        return {one.id: one for one in vectors.list_agents(self._shown, self.radius_m)}
+        return {agent.id: agent for agent in vectors.list_agents(self._shown, self.radius_m)}
 
     @cached_property
     def _shown(self) -> Scene:
@@ -291,8 +293,8 @@ class PoseTool:
             raise ToolError(TOOL, str(fault)) from None
         motion = self._ground.motion_after(change, of_all=False)
         moved = motion.others[-1]
-        found: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
-        return found | ({"started_s": _round(moved.started_s)} if call.motion else {})
+        later: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
+        return later | ({"started_s": _round(moved.started_s)} if call.motion else {})
 
     def _at(self, after_s: float, moved: Movement, motion: Motion) -> dict[str, object]:
         """Return where one is at the step nearest to a moment, and how far from the ego."""
@@ -401,11 +403,11 @@ class PoseTool:
         """Return the shown lanes beside a place on a lane that a path may change to."""
         graph = self._ground.graph
         return [
-            one.lane_id
-            for one in graph.beside(centre.x_m, centre.y_m)
-            if one.beyond_m == 0.0
-            and one.lane_id in self.curves
-            and run_beside(graph, curve.whole.id, one.lane_id)
+            lane.lane_id
+            for lane in graph.beside(centre.x_m, centre.y_m)
+            if lane.beyond_m == 0.0
+            and lane.lane_id in self.curves
+            and run_beside(graph, curve.whole.id, lane.lane_id)
         ]
 
     def _side(self, centre: Pose, side: str, turn_rad: float) -> dict[str, Any]:
@@ -468,9 +470,9 @@ def _refuse_past_end(
     )
 
 
-def _unknown(kind: str, name: object, known: Iterable[str]) -> str:
+def _unknown(kind: str, name: object, choices: Iterable[str]) -> str:
     """Say that there is no such one, and which there are."""
-    listed = ", ".join([*known][:_MOST_LISTED])
+    listed = ", ".join([*choices][:_MOST_LISTED])
     return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."
 
 

@@ -54,8 +54,8 @@ class Recipe:
     @property
     def roles(self) -> tuple[ModelRole, ...]:
         """The roles that language models play in it."""
-        asked = self.review.asks if self.review else ()
-        return tuple(dict.fromkeys((ModelRole.MODIFIER, *asked)))
+        roles_asked = self.review.asks if self.review else ()
+        return tuple(dict.fromkeys((ModelRole.MODIFIER, *roles_asked)))
 
     @property
     def rounds(self) -> int:

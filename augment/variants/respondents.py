@@ -156,7 +156,7 @@ class Respondents:
             ModelFault: The wire broke for good.
         """
         ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE, schema=schema)
-        max_tokens, asked = self.max_tokens, 0
+        max_tokens, re_asked = self.max_tokens, 0
         reply, has_declined = reply or ask(messages), True
         while True:
             try:
@@ -170,13 +170,13 @@ class Respondents:
                 elif reply.reasoning and not reply.text:
                     problems.insert(0, "there are thoughts and no answer: write it as well")
                 has_declined = has_declined and declines(reply.text)
-                if asked == self.re_asks and has_declined:
+                if re_asked == self.re_asks and has_declined:
                     raise ModelRefused(reply.text.strip()) from None
-                if asked == self.re_asks:
+                if re_asked == self.re_asks:
                     raise errors.ReplyUnreadable(problems) from None
             messages = again(messages, reply.text, problems)
             max_tokens *= 2 if reply.is_cut_off else 1
-            asked += 1
+            re_asked += 1
             reply = ask(messages, max_tokens=max_tokens)
 
     def ask(

@@ -169,7 +169,7 @@ def review_picture(answer: ReviewedAnswer) -> Verdict:
     read = answer.respondents.read
     messages = _review_messages(ModelRole.ENGINEER, answer)
     with _unusable("a reviewer"):
-        questions, asked, reply = read(ModelRole.ENGINEER, messages, read_questions)
+        questions, talk_before, reply = read(ModelRole.ENGINEER, messages, read_questions)
         shown = pictures(answer.scene, answer.modification, width_px=answer.limits.picture_px)
         seen, _, _ = read(
             ModelRole.VIEWER,
@@ -177,7 +177,7 @@ def review_picture(answer: ReviewedAnswer) -> Verdict:
             partial(read_sight, count=len(questions)),
             again=partial(fill.review_re_ask_messages, text="viewer_re_ask.md"),
         )
-        talk = (*asked, fill.model_message(reply.text))
+        talk = (*talk_before, fill.model_message(reply.text))
         messages = fill.verdict_messages(talk, questions, seen)
         verdict, _, _ = read(ModelRole.ENGINEER, messages, read_verdict)
     accepted = not verdict.feedback
@@ -208,12 +208,12 @@ def review_geometry(answer: ReviewedAnswer) -> Verdict:
     insists = answer.modification == answer.earlier
     accepted = not wrong and (not doubtful or insists)
     names = short_names(answer.scene)
-    known = names.agents | names.lanes
+    shown_names = names.agents | names.lanes
     return Verdict(
         is_accepted=accepted,
         score=(-float(len(wrong)), -float(len(doubtful))),
         feedback=tuple(
-            f"{finding.severity.value.capitalize()}: {finding.sentence(known)}"
+            f"{finding.severity.value.capitalize()}: {finding.sentence(shown_names)}"
             for finding in (*wrong, *doubtful)
         ),
         is_measured=True,
@@ -227,7 +227,7 @@ def review_geometry(answer: ReviewedAnswer) -> Verdict:
                     "kind": finding.kind.value,
                     "severity": finding.severity.value,
                     "agents": list(finding.agents),
-                    "sentence": finding.sentence(known),
+                    "sentence": finding.sentence(shown_names),
                 }
                 for finding in findings
             ],

@@ -108,6 +108,6 @@ def call_ranges(recipe: Recipe) -> dict[ModelRole, CallRange]:
     a_round = again + (limits.calls + 1 if has_tool else 0) + by_schema
     usual = 1 + has_tool + by_schema
     calls = {ModelRole.MODIFIER: CallRange(least=1, usual=usual, most=rounds * a_round)}
-    for role, asked in Counter(recipe.review.asks if recipe.review else ()).items():
-        calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
+    for role, number in Counter(recipe.review.asks if recipe.review else ()).items():
+        calls[role] = CallRange(least=number, usual=number, most=number * rounds * again)
     return calls

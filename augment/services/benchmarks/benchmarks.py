@@ -83,8 +83,8 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
     slugs = resolve_scenarios(request.scenarios)
     with_others = Scenario.objects.select_related("paraphrase_of", "follows")
     with_others = with_others.annotate(place=F("base_scene__content_hash"))
-    found = with_others.in_bulk(slugs, field_name="slug")
-    rows = [found[slug] for slug in slugs]
+    by_slug = with_others.in_bulk(slugs, field_name="slug")
+    rows = [by_slug[slug] for slug in slugs]
     rows = [row for row in rows if row.follows is None or row.slug in request.scenarios]
     if not 1 <= len(rows) <= MOST_TASKS:
         raise Conflict(f"A benchmark holds 1 to {MOST_TASKS} scenarios; these are {len(rows)}.")
@@ -134,7 +134,9 @@ def list_remarks(row: Benchmark | None) -> tuple[str, ...]:
         "Test references are public: {} of {} come with the project or vary such.": public,
         "Variants of {} of {} test tasks are handed out with their references.": practice,
     }
-    counts = {text: tests.filter(scenario__origin__in=known) for text, known in remarks.items()}
+    counts = {
+        text: tests.filter(scenario__origin__in=origins) for text, origins in remarks.items()
+    }
     return tuple(text.format(len(rows), len(tests)) for text, rows in counts.items() if rows)
 
 
@@ -178,7 +180,7 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
     chosen = Scenario.objects.filter(slug__in=resolve_scenarios(request.scenarios))
     list(chosen.order_by("pk").select_for_update(of=("self",)).only("pk"))
     planned = plan_benchmark(request)
-    prefetch_related_objects([one.scenario for one in planned], "base_scene")
+    prefetch_related_objects([task.scenario for task in planned], "base_scene")
     last = Benchmark.objects.filter(slug=request.slug).aggregate(last=Max("version"))["last"]
     row = Benchmark(
         slug=request.slug,
@@ -208,13 +210,13 @@ def benchmark_set(row: Benchmark) -> BenchmarkSet:
         Conflict: Scenarios have changed since it was made.
     """
     items = row.items.select_related("scenario__base_scene", "scenario__paraphrase_of")
-    found = _make_set(row, items)
-    if checksum(found) != row.checksum:
+    benchmark = _make_set(row, items)
+    if checksum(benchmark) != row.checksum:
         raise Conflict(
             f"Scenarios of the benchmark {row} have changed since it was made, so that its "
             "checksum no longer fits. Bring them back as they were, or make a new version."
         )
-    return found
+    return benchmark
 
 
 def find_benchmark(name_or_code: str) -> Benchmark:

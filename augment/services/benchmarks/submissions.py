@@ -171,8 +171,8 @@ def submission_report(contestant: Contestant) -> SubmissionReport:
     Raises:
         Conflict: It is not in this installation.
     """
-    found = Submission.objects.filter(contestant=contestant).values_list("report", flat=True)
-    document = found.first()
+    reports = Submission.objects.filter(contestant=contestant).values_list("report", flat=True)
+    document = reports.first()
     if document is None:
         raise Conflict(f"The submission of “{contestant.slug}” is not in this installation.")
     return report_from_document(document)
@@ -187,7 +187,7 @@ def find_entry(contestant: Contestant, scenario: str, sample: int) -> SubmittedE
     report = submission_report(contestant)
     _require_answers(contestant, report, [scenario], sample)
     entries = report.entries
-    return next(one for one in entries if (one.task, one.sample) == (scenario, sample))
+    return next(entry for entry in entries if (entry.task, entry.sample) == (scenario, sample))
 
 
 def refuse_unanswered(contestant: Contestant, scenarios: Iterable[str], *, samples: int) -> None:
@@ -206,8 +206,8 @@ def _require_answers(
     if samples > n:
         text = f"“{contestant.slug}” has {n} sample{'s' * (n != 1)} a scenario, not {samples}."
         raise Conflict(text)
-    known = {entry.task for entry in report.entries}
-    strange = [slug for slug in scenarios if slug not in known]
+    answered = {entry.task for entry in report.entries}
+    strange = [slug for slug in scenarios if slug not in answered]
     if strange:
         raise Conflict(
             f"“{contestant.slug}” is a submission to {report.benchmark} version {report.version} "

@@ -30,8 +30,8 @@ def read_shard(text: str) -> tuple[int, int]:
     Raises:
         Conflict: It is none.
     """
-    found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
-    part, parts = map(int, found.groups()) if found else (1, 0)
+    match = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
+    part, parts = map(int, match.groups()) if match else (1, 0)
     if part > parts:
         raise Conflict(f"A shard is I/N with I from 1 to N, such as 2/8, not {text!r}.")
     return part, parts

@@ -106,7 +106,7 @@ class DrivingScores:
         """The scenario types that were driven, in their order."""
         every = self.lines[0].by_type if self.lines else ()
         means = {kind: [line.by_type[kind] for line in self.lines] for kind in every}
-        return [kind for kind, found in means.items() if any(mean is not None for mean in found)]
+        return [kind for kind, values in means.items() if any(mean is not None for mean in values)]
 
 
 def scores_of_job(
@@ -161,10 +161,10 @@ def clearance_text(least_distance_m: float | None) -> str:
 def options_driven(job: GenerationJob) -> list[Options]:
     """Return every way in which drives of a job were asked for, the latest first."""
     rows = Simulation.objects.filter(drives_of_job(job)).order_by("-pk")
-    asked = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive", "version"))
+    ways = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive", "version"))
     return [
         Options(planner=planner, offsets=offsets, is_reactive=reactive, version=version)
-        for planner, offsets, reactive, version in asked
+        for planner, offsets, reactive, version in ways
     ]
 
 
@@ -227,7 +227,7 @@ def _line(
         },
         least_clearance_m=min(clearances, default=None),
         close=sum(distance < CLOSE_M for distance in clearances),
-        collided=sum(any(one["at_fault"] for one in drive) for drive in collisions),
+        collided=sum(any(contact["at_fault"] for contact in drive) for drive in collisions),
         braked=sum(bool(_document(row).get("emergency_brake_steps")) for row in paired),
     )
 
@@ -250,7 +250,8 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
             mean=_mean([score for _, score, _ in done]),
             before=None,
             by_type={
-                kind: _mean([score for one, score, _ in done if one == kind]) for kind in kinds
+                kind: _mean([score for kind_done, score, _ in done if kind_done == kind])
+                for kind in kinds
             },
             least_clearance_m=None,
             close=None,

@@ -54,30 +54,30 @@ def import_results(
     rows = Augmentation.objects.filter(code__in=set(codes.values())).defer("modification")
     by_code = {row.code: row for row in rows}
     by_scenario = {name: by_code[code] for name, code in codes.items() if code in by_code}
-    found, strangers = [], []
+    imported, strangers = [], []
     for drive in drives:
         row = by_scenario.get(drive.scenario)
         if row is None:
             is_known = drive.scenario in scenarios
-            known = "its augmentation is not here" if is_known else f"not in {TOKENS}"
-            strangers.append(f"{drive.scenario} by {drive.planner}: {known}")
+            reason = "its augmentation is not here" if is_known else f"not in {TOKENS}"
+            strangers.append(f"{drive.scenario} by {drive.planner}: {reason}")
         else:
-            found.append((row, drive))
+            imported.append((row, drive))
     with transaction.atomic():
-        for row, drive in found:
+        for row, drive in imported:
             _keep(row, drive)
-        for pk, number in sorted(Counter(row.job_id for row, _ in found).items()):
+        for pk, number in sorted(Counter(row.job_id for row, _ in imported).items()):
             job = GenerationJob.objects.get(pk=pk)
             log_change(job, "import nuPlan results", actor, after={"results": number})
-    failed = sum(drive.score is None for _, drive in found)
-    return ImportedResults(kept=len(found), failed=failed, strangers=tuple(strangers))
+    failed = sum(drive.score is None for _, drive in imported)
+    return ImportedResults(kept=len(imported), failed=failed, strangers=tuple(strangers))
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
 def _check_once(drives: Sequence[NuplanDrive]) -> None:
-    counts = Counter((one.scenario, one.planner, one.is_interplan) for one in drives)
+    counts = Counter((drive.scenario, drive.planner, drive.is_interplan) for drive in drives)
     for (scenario, planner, _), number in counts.items():
         if number > 1:
             problem = f"is there {number} times for the planner {planner}; give one run of each"

@@ -175,12 +175,13 @@ def drive_document(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, An
         "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
         "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
         "collisions": [
-            {"object": one.object_id, "at_fault": one.at_fault} for one in score.collisions
+            {"object": contact.object_id, "at_fault": contact.at_fault}
+            for contact in score.collisions
         ],
         "criticality": criticality(drove, score.collisions),
         "metrics": {
-            kind.value: [asdict(metric) for metric in found.metrics]
-            for kind, found in scores.items()
+            kind.value: [asdict(metric) for metric in result.metrics]
+            for kind, result in scores.items()
         },
     }
 

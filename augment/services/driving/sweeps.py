@@ -127,8 +127,8 @@ def map_changes(
         InvalidDocument: The bounds make no values.
         Conflict: No value fits.
     """
-    known, scene, number = swept_numbers(scenario), load_scene(scenario), request.number
-    check_names("number", [number], known)
+    numbers, scene, number = swept_numbers(scenario), load_scene(scenario), request.number
+    check_names("number", [number], numbers)
     document, changes = _document(scenario, number), dict[float, Modification | AugmentError]()
     for value in request.values:
         try:

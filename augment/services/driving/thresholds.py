@@ -69,7 +69,9 @@ class SweepResult:
     @property
     def drivers(self) -> list[str]:
         """Drivers of each value, the planner under test first."""
-        return list(dict.fromkeys(driver_name(one) for line in self.lines for one in line.drives))
+        return list(
+            dict.fromkeys(driver_name(drive) for line in self.lines for drive in line.drives)
+        )
 
     @property
     def verdict(self) -> str:
@@ -133,8 +135,10 @@ def conclude_all() -> None:
 
 def tell_difference(before: Intent, after: Intent) -> str:
     """Return the statements of an intent that another one lacks."""
-    known = list_statements(before)
-    return "; ".join(one for one in list_statements(after) if one not in known)
+    statements = list_statements(before)
+    return "; ".join(
+        statement for statement in list_statements(after) if statement not in statements
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -146,7 +150,10 @@ def _line(sweep: Sweep, row: SweepValue, drives: list[Simulation]) -> SweepLine:
             driver=driver_name(drive),
             score=drive.nuplan_score or 0.0,
             is_lawful=is_lawful(
-                {one["name"]: one["value"] for one in drive.document["metrics"][ScoreKind.NUPLAN]}
+                {
+                    metric["name"]: metric["value"]
+                    for metric in drive.document["metrics"][ScoreKind.NUPLAN]
+                }
             ),
             is_tested=(drive.planner, drive.offsets) == (sweep.planner, sweep.offsets),
         )

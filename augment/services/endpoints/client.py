@@ -94,8 +94,8 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
             ModelFault: It can't do without something that the model lacks.
         """
         if request.model not in self._profiles:
-            known: ModelProfile = read_profile(endpoint=self._endpoint, model=request.model)
-            self._profiles[request.model] = known
+            profile: ModelProfile = read_profile(endpoint=self._endpoint, model=request.model)
+            self._profiles[request.model] = profile
         return self._profiles[request.model].fit(request)
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
@@ -117,10 +117,10 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
                 "%s at endpoint %s does not take %r and is not sent it any more: %s",
                 *(model, endpoint.label, parameter, refused),
             )
-            known = remember_refusal(endpoint=endpoint, model=model, parameter=parameter)
+            refusal = remember_refusal(endpoint=endpoint, model=model, parameter=parameter)
             if self._treatment is not None:
-                known = self._treatment.without(refused, endpoint=endpoint, model=model)
-            self._profiles[model] = known
+                refusal = self._treatment.without(refused, endpoint=endpoint, model=model)
+            self._profiles[model] = refusal
             raise
 
     def __exit__(self, *fault: object) -> None:

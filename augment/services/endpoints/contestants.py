@@ -71,7 +71,9 @@ class ContestantRequest:
         InputKind.CHOICE,
         "Variant",
         "FC has the paper’s function, a pose on a lane; FC-plus ours, with what lies around it.",
-        choices={name: f"{spell_variant(name)}: {one.title}" for name, one in RECIPES.items()},
+        choices={
+            name: f"{spell_variant(name)}: {recipe.title}" for name, recipe in RECIPES.items()
+        },
     )
     endpoint: str = input_field(InputKind.TEXT, "Label of an endpoint", most=80)
     model: str = input_field(InputKind.TEXT, "Model id on the endpoint", most=120)
@@ -111,7 +113,7 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
     title = request.name or _title(request.slug, recipe, options, own, others)
-    is_simulated = any(one.endpoint.is_simulated for one in (own, *others.values()))
+    is_simulated = any(respondent.endpoint.is_simulated for respondent in (own, *others.values()))
     columns: dict[str, Any] = {
         "name": one_line("name", title, what="contestant"),
         "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
@@ -119,8 +121,8 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
         "endpoint": own.endpoint,
         "model": own.model,
         "roles": {
-            role.value: {"endpoint": one.endpoint.label, "model": one.model}
-            for role, one in others.items()
+            role.value: {"endpoint": respondent.endpoint.label, "model": respondent.model}
+            for role, respondent in others.items()
         },
         "options": options.to_document(),
     }
@@ -149,7 +151,7 @@ def make_free_slug(words: str) -> str:
     stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
     taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
     numbered = (f"{stem}-{number}" for number in range(2, len(taken) + 3))
-    return next(one for one in (stem, *numbered) if one not in taken)
+    return next(free for free in (stem, *numbered) if free not in taken)
 
 
 def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelRole, Respondent]:

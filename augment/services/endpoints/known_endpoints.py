@@ -92,9 +92,9 @@ def add_endpoint(request: EndpointRequest, actor: User | None = None) -> Endpoin
     check_slug(request.label, what="endpoint", key="label")
     if Endpoint.objects.filter(label=request.label).exists():
         raise Conflict(f"There is an endpoint “{request.label}” already; choose another label.")
-    given = check_facts(request)
-    row = Endpoint.objects.create(**given)
-    log_change(row, "add", actor, after=_facts(row, given))
+    facts = check_facts(request)
+    row = Endpoint.objects.create(**facts)
+    log_change(row, "add", actor, after=_facts(row, facts))
     return row
 
 
@@ -109,9 +109,9 @@ def ensure_endpoint(request: EndpointRequest, actor: User | None = None) -> Endp
     row = Endpoint.objects.filter(label=request.label).first()
     if row is None:
         return add_endpoint(request, actor)
-    given = check_facts(request)
+    facts = check_facts(request)
     if any(
-        getattr(row, name) != given[name] for name in ("base_url", "key_variable", "is_simulated")
+        getattr(row, name) != facts[name] for name in ("base_url", "key_variable", "is_simulated")
     ):
         raise Conflict(
             f"Endpoint {row.label!r} is at {row.base_url} already; change it on its page or "
@@ -295,7 +295,9 @@ def _change(
     try:
         row.full_clean(validate_unique=False, validate_constraints=False)
     except ValidationError as error:
-        texts = [(name, str(text)) for name, said in error.message_dict.items() for text in said]
+        texts = [
+            (name, str(text)) for name, messages in error.message_dict.items() for text in messages
+        ]
         raise InvalidDocument(what, texts) from None
     row.save(update_fields=list(facts))
     if (after := _facts(row, facts)) != before:

@@ -206,12 +206,12 @@ class _Prober:
             if not self.profile.refused.issuperset(SchemaForm):
                 return replace(self.ask(question), cost_usd=None)
         calls = ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
-        said = str(cut) if cut else reply.text or reply.refusal or calls
+        text = str(cut) if cut else reply.text or reply.refusal or calls
         return ProbeFinding(
             ability=ability,
             # Any answer shows that the parameter is taken.
             has_it=ability in (Ability.ANSWERS, Ability.TEMPERATURE) or is_good,
-            note=_short("; ".join((said, *reply.remarks) if said else reply.remarks)),
+            note=_short("; ".join((text, *reply.remarks) if text else reply.remarks)),
             model_returned=reply.model,
             prompt_tokens=reply.prompt_tokens,
             completion_tokens=reply.completion_tokens,
@@ -248,8 +248,8 @@ def _list_chosen_values(row: EndpointModel) -> list[dict[str, Any]]:
     """Return the parameters that contestants send the model, each set of values once."""
     rows = Contestant.objects.filter(endpoint=row.endpoint, model=row.model, retired_at=None)
     chosen = [
-        {name: given[name] for name in sorted(SAMPLING & given.keys())}
-        for given in rows.values_list("options", flat=True)
+        {name: options[name] for name in sorted(SAMPLING & options.keys())}
+        for options in rows.values_list("options", flat=True)
     ]
     return [values for n, values in enumerate(chosen) if values and values not in chosen[:n]]
 

@@ -72,8 +72,10 @@ class Treatment:
             ModelFault: Earlier answers of this contestant were made with the parameter.
         """
         parameter = refused.parameter
-        asked = Respondent(endpoint=endpoint, model=model)
-        roles = [role for role, respondent in self.respondents.items() if respondent == asked]
+        respondent_asked = Respondent(endpoint=endpoint, model=model)
+        roles = [
+            role for role, respondent in self.respondents.items() if respondent == respondent_asked
+        ]
         answers = ModelCall.objects.filter(
             attempt__augmentation__contestant=self.contestant_pk,
             role__in=roles,
@@ -163,8 +165,12 @@ def read_respondents(contestant: Contestant) -> dict[ModelRole, Respondent]:
 
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """Return the models without a price that contestants ask, as "model at endpoint"."""
-    asked = {one for row in contestants for one in read_respondents(row).values()}
-    return sorted(str(one) for one in asked if find_price(one.facts) is None)
+    respondents = {
+        respondent for row in contestants for respondent in read_respondents(row).values()
+    }
+    return sorted(
+        str(respondent) for respondent in respondents if find_price(respondent.facts) is None
+    )
 
 
 def read_options(contestant: Contestant) -> ContestantOptions:
@@ -198,8 +204,10 @@ def list_unsent_options(contestant: Contestant) -> dict[str, list[str]]:
     if not chosen:
         return {}
     sends = contestant.sends or {
-        role.value: _profile_document(read_profile(endpoint=one.endpoint, model=one.model))
-        for role, one in read_respondents(contestant).items()
+        role.value: _profile_document(
+            read_profile(endpoint=respondent.endpoint, model=respondent.model)
+        )
+        for role, respondent in read_respondents(contestant).items()
     }
     refused = {role: sorted(chosen & set(sent["refused"])) for role, sent in sends.items()}
     return {role: names for role, names in sorted(refused.items()) if names}
@@ -231,8 +239,10 @@ def _fix(
     row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
     before = row.sends or {}
     new = {
-        role.value: _profile_document(read_profile(endpoint=one.endpoint, model=one.model))
-        for role, one in respondents.items()
+        role.value: _profile_document(
+            read_profile(endpoint=respondent.endpoint, model=respondent.model)
+        )
+        for role, respondent in respondents.items()
         if role.value not in before
     }
     row.sends = before | new
@@ -247,8 +257,8 @@ def _complete_options(contestant: Contestant) -> ContestantOptions:
     modifier = (contestant.sends or {}).get("modifier")
     if modifier is None:
         assert contestant.endpoint is not None
-        known = read_profile(endpoint=contestant.endpoint, model=contestant.model)
-        modifier = _profile_document(known)
+        profile = read_profile(endpoint=contestant.endpoint, model=contestant.model)
+        modifier = _profile_document(profile)
     return complete_options(
         options_from_document(contestant.options),
         find_recipe(contestant.variant),

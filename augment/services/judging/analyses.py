@@ -79,12 +79,12 @@ class AugmentationLine:
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample."""
     ids = list(job.augmentations.values_list("pk", flat=True))
-    found = read_findings(ids)
+    findings = read_findings(ids)
     for line in _lines(job):
-        if line.row.pk in found:
-            counts = Counter(finding.severity for finding in found[line.row.pk])
+        if line.row.pk in findings:
+            counts = Counter(finding.severity for finding in findings[line.row.pk])
             wrong, doubtful = counts[Severity.WRONG], counts[Severity.DOUBTFUL]
-            purpose = (one for one in found[line.row.pk] if one.kind is FindingKind.PURPOSE)
+            purpose = (one for one in findings[line.row.pk] if one.kind is FindingKind.PURPOSE)
             line = replace(line, wrong=wrong, doubtful=doubtful, purpose=tuple(purpose))
         yield line
 
@@ -126,10 +126,10 @@ def measure_job(job: GenerationJob) -> None:
 def read_answers(job: GenerationJob) -> Answers:
     """Return all outcomes of a job, measured, but those of the reference; one query."""
     answers: defaultdict[str, list[MeasuredRow]] = defaultdict(list)
-    for one in of_job(job):
-        is_reference = one.row.contestant.kind == Contestant.Kind.REFERENCE
-        if one.row.state in Augmentation.SHOWABLE and not is_reference:
-            answers[one.row.contestant.slug].append(one)
+    for measured_row in of_job(job):
+        is_reference = measured_row.row.contestant.kind == Contestant.Kind.REFERENCE
+        if measured_row.row.state in Augmentation.SHOWABLE and not is_reference:
+            answers[measured_row.row.contestant.slug].append(measured_row)
     return dict(sorted(answers.items()))
 
 
@@ -151,7 +151,7 @@ def measure_wordings(answers: Answers) -> list[Row]:
     """Return the spread within a wish of whoever answered some wish in several wordings."""
     lines = []
     for measured in answers.values():
-        scenarios = {one.row.scenario.slug: one.row.scenario for one in measured}
+        scenarios = {entry.row.scenario.slug: entry.row.scenario for entry in measured}
         wishes: defaultdict[int, list[float]] = defaultdict(list)
         for slug, value in _median_errors(measured).items():
             wishes[scenarios[slug].paraphrase_of_id or scenarios[slug].pk].append(value)
@@ -175,9 +175,9 @@ def count_refusals(answers: Answers) -> list[Row]:
     lines = []
     for measured in answers.values():
         counts = Counter(
-            (one.row.state == State.REFUSED, bool(intent.get("unmet")))
-            for one in measured
-            if (intent := one.row.scenario.intent) is not None
+            (entry.row.state == State.REFUSED, bool(intent.get("unmet")))
+            for entry in measured
+            if (intent := entry.row.scenario.intent) is not None
         )
         right, wrong, overlooked = counts[True, True], counts[True, False], counts[False, True]
         if right or wrong or overlooked:
@@ -205,13 +205,13 @@ ANALYSES: Mapping[str, Callable[[Answers], Sequence[Any]]] = {
 def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job with its displacement and cost, unchecked."""
     spent = sum_spending(Q(attempt__augmentation__job=job), by=AUGMENTATION)
-    for one in of_job(job):
-        spending = spent.get(one.row.pk)
+    for entry in of_job(job):
+        spending = spent.get(entry.row.pk)
         yield AugmentationLine(
-            row=one.row,
-            wish=one.wish,
-            displacement=one.displacement,
-            kept=one.kept_summary,
+            row=entry.row,
+            wish=entry.wish,
+            displacement=entry.displacement,
+            kept=entry.kept_summary,
             spending=spending,
         )
 
@@ -219,9 +219,9 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
 def _median_errors(measured: Sequence[MeasuredRow]) -> dict[str, float]:
     """Return by scenario the median over samples of the mean displacement in metres."""
     samples: defaultdict[str, list[float]] = defaultdict(list)
-    for one in measured:
-        if one.displacement is not None and one.displacement.matches:
-            samples[one.row.scenario.slug].append(fmean(one.displacement.errors_m))
+    for entry in measured:
+        if entry.displacement is not None and entry.displacement.matches:
+            samples[entry.row.scenario.slug].append(fmean(entry.displacement.errors_m))
     return {slug: median(values) for slug, values in sorted(samples.items())}
 
 
@@ -254,11 +254,11 @@ def _spread(name: str, values: Sequence[float | None]) -> Row:
 
     None where a sample has no value: the rest would be another comparison.
     """
-    known = [value for value in values if value is not None]
-    if len(known) < len(values):
+    present = [value for value in values if value is not None]
+    if len(present) < len(values):
         return dict.fromkeys((f"{name}_mean", f"{name}_sd", f"{name}_values"))
-    sd = stdev(known) if len(known) > 1 else None
-    return {f"{name}_mean": fmean(known), f"{name}_sd": sd, f"{name}_values": tuple(known)}
+    sd = stdev(present) if len(present) > 1 else None
+    return {f"{name}_mean": fmean(present), f"{name}_sd": sd, f"{name}_values": tuple(present)}
 
 
 def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:
@@ -269,5 +269,5 @@ def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:
 
 def _usd(lines: Sequence[AugmentationLine]) -> float | None:
     costs = [line.spending.usd for line in lines if line.spending is not None]
-    known = [cost for cost in costs if cost is not None]
-    return sum(known) if costs and len(known) == len(costs) else None
+    present = [cost for cost in costs if cost is not None]
+    return sum(present) if costs and len(present) == len(costs) else None

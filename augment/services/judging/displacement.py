@@ -132,18 +132,20 @@ def groups(measured: Iterable[MeasuredRow], *, by: By) -> list[Group]:
             are definite, as in the paper.
     """
     cells: defaultdict[tuple[int, str, str, str], list[MeasuredRow]] = defaultdict(list)
-    for one in measured:
-        counts = by is not By.VARIANT or one.row.scenario.type in PLACED_EXACTLY
-        if counts and one.displacement is not None:
-            rank, heading = _group_key(one.row, by)
-            contestant = one.row.contestant
-            cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(one)
+    for entry in measured:
+        counts = by is not By.VARIANT or entry.row.scenario.type in PLACED_EXACTLY
+        if counts and entry.displacement is not None:
+            rank, heading = _group_key(entry.row, by)
+            contestant = entry.row.contestant
+            cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(entry)
     return [
         Group(
             heading=_group_key(cell[0].row, by)[1],
             contestant=cell[0].row.contestant,
-            summary=summarise([one.displacement for one in cell if one.displacement is not None]),
-            kept=summarise_kept([thing for one in cell for thing in one.kept]),
+            summary=summarise(
+                [entry.displacement for entry in cell if entry.displacement is not None]
+            ),
+            kept=summarise_kept([thing for entry in cell for thing in entry.kept]),
             wish=summarise(wishes) if wishes else None,
         )
         for _, cell in sorted(cells.items())
@@ -159,8 +161,8 @@ def _group_key(row: Augmentation, by: By) -> tuple[int, str]:
         return rank, row.scenario.get_type_display()
     if by is By.CONTESTANT:
         return 0, row.contestant.name
-    known, variant = list(SPELLING), row.contestant.variant.lower()
-    rank = known.index(variant) if variant in known else len(known) + (not variant)
+    spellings, variant = list(SPELLING), row.contestant.variant.lower()
+    rank = spellings.index(variant) if variant in spellings else len(spellings) + (not variant)
     return rank, spell_variant(row.contestant.variant) or NO_VARIANT
 
 
@@ -173,23 +175,25 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
     is asked for, None without an intent. The matched ones come first, in the order in
     which they were matched. What has no displacement (see `Unmeasured`) has no objects.
     """
-    for one in _measure(_rows().filter(job=job)):
-        if one.displacement is None:
+    for entry in _measure(_rows().filter(job=job)):
+        if entry.displacement is None:
             continue
         wanted, placed = (
             {agent.id: agent for agent in change.changed} if change else {}
-            for change in (_read(one.row.scenario.reference), _read_answer(one.row))
+            for change in (_read(entry.row.scenario.reference), _read_answer(entry.row))
         )
-        found = one.displacement
-        wish_m = {match.generated: match.error_m for match in one.wish.matches} if one.wish else {}
+        distance = entry.displacement
+        wish_m = (
+            {match.generated: match.error_m for match in entry.wish.matches} if entry.wish else {}
+        )
         for standing, reference_id, generated_id, match in (
-            *(("matched", m.reference, m.generated, m) for m in found.matches),
-            *(("missing", name, "", None) for name in found.missing),
-            *(("surplus", "", name, None) for name in found.surplus),
+            *(("matched", m.reference, m.generated, m) for m in distance.matches),
+            *(("missing", name, "", None) for name in distance.missing),
+            *(("surplus", "", name, None) for name in distance.surplus),
         ):
             reference, generated = wanted.get(reference_id), placed.get(generated_id)
             yield {
-                "row": one.row,
+                "row": entry.row,
                 "object": standing,
                 "class": CLASS_OF[(wanted | placed)[reference_id or generated_id].type],
                 "reference": reference,
@@ -226,8 +230,8 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
     return tuple(
         (scenario, first, second)
         for scenario, sides in by_scenario.items()
-        for (first, one), (second, other) in combinations(sides, 2)
-        if are_alike(one, other)
+        for (first, pk), (second, other) in combinations(sides, 2)
+        if are_alike(pk, other)
     )
 
 
@@ -279,16 +283,18 @@ def _measure_row(
         return Distance(why_not=MissingReason.UNREADABLE_ROW)
     moves = answer is not None and (answer.has_motion or reference.has_motion)
     try:
-        found = displacement(answer, reference, standard_of(row).ground if moves else None)
+        distance = displacement(answer, reference, standard_of(row).ground if moves else None)
     except (InvalidDocument, InvalidModification):
         return Distance(why_not=MissingReason.UNFIT_MOTION)
     own = _read_shown(before) if before is not None else None
     earlier = None if before is None else standard_of(before).reference
-    kept: tuple[KeptObject, ...] = ()
+    kept_objects: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
         shown = _read_shown(row)
-        kept = find_kept_objects(own, shown, reference_before=earlier, reference_after=reference)
-    return Distance(displacement=found, kept=kept)
+        kept_objects = find_kept_objects(
+            own, shown, reference_before=earlier, reference_after=reference
+        )
+    return Distance(displacement=distance, kept=kept_objects)
 
 
 def _compute_wishes(ids: Collection[int]) -> dict[int, Displacement]:

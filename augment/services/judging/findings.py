@@ -68,7 +68,7 @@ class CheckedRow:
 
 def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     """Check all rows that can be checked; a scene is read once."""
-    found = {}
+    findings = {}
     changed = Augmentation.objects.filter(pk__in=ids).exclude(modification=None)
     for scenario, rows in rows_by_scenario(changed):
         try:
@@ -77,14 +77,14 @@ def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
             continue
         for row in rows:
             with suppress(InvalidDocument, InvalidModification):
-                found[row.pk] = _check(row, ground, intent)
-    return found
+                findings[row.pk] = _check(row, ground, intent)
+    return findings
 
 
 def read_findings(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     """Return the findings about rows that can be checked, those of their drives among them."""
-    found, driven = FINDINGS.of(ids), _check_drives(ids)
-    return {pk: _worst_first((*own, *driven.get(pk, ()))) for pk, own in found.items()}
+    findings, driven = FINDINGS.of(ids), _check_drives(ids)
+    return {pk: _worst_first((*own, *driven.get(pk, ()))) for pk, own in findings.items()}
 
 
 FINDINGS = Measure("findings", tuple[Finding, ...], _compute)
@@ -131,9 +131,11 @@ def check_edit(
         is_against_intent=intent is not None,
         presets=editing.motion_presets(scenario, modification),
         ways={
-            one.agent.id: one.states[one.is_present, :2][::_WAY_STEPS].round(2).tolist()
-            for one in (motion.others if motion else ())
-            if one.agent.motion is not None
+            movement.agent.id: movement.states[movement.is_present, :2][::_WAY_STEPS]
+            .round(2)
+            .tolist()
+            for movement in (motion.others if motion else ())
+            if movement.agent.motion is not None
         },
     )
 

@@ -119,13 +119,13 @@ def rows_by_scenario(
 def digest_rows(ids: Iterable[int]) -> dict[int, str]:
     """Return a digest of each that has an outcome, by its primary key; two queries."""
     rows = Augmentation.objects.filter(pk__in=list(ids), state__in=Augmentation.SHOWABLE)
-    found = list(rows.order_by("pk").values_list("pk", "scenario", *_ROW))
-    wanted = {scenario for _, scenario, *own in found for scenario in (scenario, own[-1])}
+    values = list(rows.order_by("pk").values_list("pk", "scenario", *_ROW))
+    wanted = {scenario for _, scenario, *own in values for scenario in (scenario, own[-1])}
     scenarios = Scenario.objects.filter(pk__in=wanted).order_by("pk")
     digests = {pk: _digest(own) for pk, *own in scenarios.values_list("pk", *_SCENARIO)}
     return {
         pk: _digest([pk, digests[scenario], digests.get(own[-1]), *own[:-1]])
-        for pk, scenario, *own in found
+        for pk, scenario, *own in values
     }
 
 

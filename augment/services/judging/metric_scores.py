@@ -61,12 +61,12 @@ def _distances(ids: Collection[int]) -> list[MetricScores]:
 def _checks(ids: Collection[int]) -> MetricScores:
     """Fewer wrong findings are better, then fewer doubtful ones; no answer is worst."""
     rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
-    found, scores = read_findings(ids), dict[str, float]()
+    findings, scores = read_findings(ids), dict[str, float]()
     for pk, code, state in rows.values_list("pk", "code", "state"):
         if state in UNREADABLE_OR_REFUSED:
             scores[str(code)] = -math.inf
-        elif pk in found:
-            counts = Counter(finding.severity for finding in found[pk])
+        elif pk in findings:
+            counts = Counter(finding.severity for finding in findings[pk])
             doubts = min(counts[Severity.DOUBTFUL], 99) / 100
             scores[str(code)] = -counts[Severity.WRONG] - doubts
     return MetricScores(name="Checks", by_code=scores)

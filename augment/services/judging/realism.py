@@ -112,17 +112,17 @@ def realism_of_job(job: GenerationJob) -> RealismTable:
         for scenario, group in answers.items()
     }
     surroundings = SURROUNDINGS.of(patterns.values())
-    found: defaultdict[tuple[Subject, int], list[_Beside]] = defaultdict(list)
+    beside: defaultdict[tuple[Subject, int], list[_Beside]] = defaultdict(list)
     for scenario, pattern in patterns.items():
         (recorded,) = surroundings[pattern][Subject.RECORDING]
         for subject, values in surroundings[pattern].items():
-            found[subject, 0] += [(value, recorded) for value in values]
+            beside[subject, 0] += [(value, recorded) for value in values]
         for row in answers[scenario]:
             if row.contestant.kind != Contestant.Kind.REFERENCE:
                 pair = (by_row.get(row.pk), recorded)
-                found[Subject.CONTESTANT, row.contestant_id].append(pair)
+                beside[Subject.CONTESTANT, row.contestant_id].append(pair)
     contestants = {row.contestant_id: row.contestant for row in rows}
-    lines = [_line(subject, contestants.get(pk), pairs) for (subject, pk), pairs in found.items()]
+    lines = [_line(subject, contestants.get(pk), pairs) for (subject, pk), pairs in beside.items()]
     scenes = min(BaseScene.objects.count(), MOST_SCENES)
     return RealismTable(job=job.name, lines=tuple(sorted(lines, key=_place)), scenes=scenes)
 
@@ -173,9 +173,9 @@ class _ScenarioRealism:
 
     def recording(self, pattern: Modification) -> metric.Realism | None:
         """Return that of what was recorded here, of the classes that the pattern changes."""
-        classes = {CLASS_OF[one.type] for one in pattern.changed}
+        classes = {CLASS_OF[agent.type] for agent in pattern.changed}
         objects = _read_objects(*_key(self._scenario.base_scene))
-        return self._judge([one for one in objects if one.object_class in classes])
+        return self._judge([thing for thing in objects if thing.object_class in classes])
 
     def random(self, pattern: Modification) -> list[metric.Realism | None]:
         """Return those of the pattern's objects anywhere; always the same for a scenario."""
@@ -202,27 +202,27 @@ def _name_learned_scenes() -> str:
 
 def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
     learned = _LearnedScenes()
-    found: dict[int, metric.Realism] = {}
+    realism: dict[int, metric.Realism] = {}
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
         judged = _ScenarioRealism(scenario, learned)
         values = {row.pk: judged.of(_read_change(row)) for row in rows}
-        found |= {pk: value for pk, value in values.items() if value is not None}
-    return found
+        realism |= {pk: value for pk, value in values.items() if value is not None}
+    return realism
 
 
 def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
     learned = _LearnedScenes()
-    found: dict[int, Surroundings] = {}
+    surroundings: dict[int, Surroundings] = {}
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
         judged, reference = _ScenarioRealism(scenario, learned), load_reference(scenario)
         for row in rows:
             pattern = reference or _read_change(row) or Modification()
-            found[row.pk] = {
+            surroundings[row.pk] = {
                 Subject.RECORDING: (judged.recording(pattern),),
                 Subject.REFERENCE: () if reference is None else (judged.of(reference),),
                 Subject.RANDOM: tuple(judged.random(pattern)),
             }
-    return found
+    return surroundings
 
 
 REALISM = Measure("realism", metric.Realism, _judge_rows, _name_learned_scenes)
@@ -250,22 +250,24 @@ def _read_change(row: Augmentation) -> Modification | None:
 
 
 def _line(
-    subject: Subject, contestant: Contestant | None, found: Sequence[_Beside]
+    subject: Subject, contestant: Contestant | None, pairs: Sequence[_Beside]
 ) -> RealismLine:
-    judged = [one for one, _ in found if one is not None]
-    recorded = [other.mean for one, other in found if one and other and other.mean is not None]
+    judged = [realism for realism, _ in pairs if realism is not None]
+    recorded = [
+        other.mean for realism, other in pairs if realism and other and other.mean is not None
+    ]
     return RealismLine(
         subject=subject,
         contestant=contestant,
         changes=len(judged),
-        left_out=len(found) - len(judged),
-        objects=sum(one.judged for one in judged),
+        left_out=len(pairs) - len(judged),
+        objects=sum(realism.judged for realism in judged),
         scores={
             name: fmean(values)
             for name in SCORES
-            if (values := [one.scores[name] for one in judged if name in one.scores])
+            if (values := [realism.scores[name] for realism in judged if name in realism.scores])
         },
-        mean=fmean([one.mean or 0.0 for one in judged]) if judged else None,
+        mean=fmean([realism.mean or 0.0 for realism in judged]) if judged else None,
         recorded=fmean(recorded) if recorded else None,
     )
 

@@ -311,7 +311,7 @@ class RowTranscript(CallTranscript):
         self._attempt = held.attempt
         self._notes = 0
         self._respondents = respondents
-        others = {role: one.endpoint for role, one in respondents.items()}
+        others = {role: respondent.endpoint for role, respondent in respondents.items()}
         endpoint = others[ModelRole.MODIFIER]
         super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key)
 

@@ -90,7 +90,7 @@ def refuse_impossible(
         )
     for row in who:
         if row.kind == Kind.SUBMISSION:
-            refuse_unanswered(row, [one.slug for one in where], samples=samples)
+            refuse_unanswered(row, [scenario.slug for scenario in where], samples=samples)
 
 
 def can_run(contestant: Contestant, where: Iterable[Scenario]) -> bool:
@@ -102,17 +102,17 @@ def can_run(contestant: Contestant, where: Iterable[Scenario]) -> bool:
     return True
 
 
-def resolve_contestants(given: Sequence[str]) -> list[str]:
+def resolve_contestants(slugs: Sequence[str]) -> list[str]:
     """Return the slugs; `all` stands for every contestant that runs everywhere and nobody retired.
 
     Raises:
         UnknownName: There is no contestant of that slug.
     """
-    if list(given) == [ALL]:
+    if list(slugs) == [ALL]:
         rows = Contestant.objects.filter(EVERYWHERE, retired_at=None)
         return list(rows.values_list("slug", flat=True))
-    check_names("contestant", given, sorted(Contestant.objects.values_list("slug", flat=True)))
-    return list(given)
+    check_names("contestant", slugs, sorted(Contestant.objects.values_list("slug", flat=True)))
+    return list(slugs)
 
 
 def find_job(name_or_code: str) -> GenerationJob:

@@ -61,10 +61,10 @@ def accept_submission(
 def _run(row: Submission, contestant: Contestant, actor: User) -> GenerationJob:
     scenarios = row.benchmark.items.order_by("position").values_list("scenario__slug", flat=True)
     assert row.summary is not None
-    asked = JobRequest(
+    request = JobRequest(
         name=f"{contestant.name}, {row.benchmark}"[:120],
         contestants=[contestant.slug],
         scenarios=list(scenarios),
         samples=min(row.summary["card"]["samples"], MOST_SAMPLES),
     )
-    return launch(asked, actor)
+    return launch(request, actor)

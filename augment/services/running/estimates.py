@@ -63,20 +63,20 @@ class JobEstimate:
     @property
     def tokens_in(self) -> int | None:
         """Tokens of the prompts, as far as known; None if none are."""
-        known = [line.tokens_in for line in self.lines if line.tokens_in is not None]
-        return sum(known) if known or not self.lines else None
+        counts = [line.tokens_in for line in self.lines if line.tokens_in is not None]
+        return sum(counts) if counts or not self.lines else None
 
     @property
     def tokens_out(self) -> int | None:
         """Tokens of the answers, as far as known; None if none are."""
-        known = [line.tokens_out for line in self.lines if line.tokens_out is not None]
-        return sum(known) if known or not self.lines else None
+        counts = [line.tokens_out for line in self.lines if line.tokens_out is not None]
+        return sum(counts) if counts or not self.lines else None
 
     @property
     def usd(self) -> Decimal | None:
         """The cost, likewise."""
-        known = [line.usd for line in self.lines if line.usd is not None]
-        return sum(known, Decimal(0)) if known or not self.lines else None
+        costs = [line.usd for line in self.lines if line.usd is not None]
+        return sum(costs, Decimal(0)) if costs or not self.lines else None
 
     @property
     def unpriced(self) -> tuple[ContestantEstimate, ...]:
@@ -116,7 +116,8 @@ def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEst
 def _line(row: Contestant, cells: int) -> ContestantEstimate:
     calls = call_ranges(recipe_with(find_recipe(row.variant), read_options(row))).values()
     least, usual, most = (
-        cells * sum(getattr(one, name) for one in calls) for name in ("least", "usual", "most")
+        cells * sum(getattr(call_range, name) for call_range in calls)
+        for name in ("least", "usual", "most")
     )
     plain = ContestantEstimate(
         slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most)

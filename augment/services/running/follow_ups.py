@@ -71,7 +71,7 @@ def ask_follow_up(
             name=f"Follow-up: {scenario.slug}, {answer.contestant.name}"[:120],
             contestants=[answer.contestant.slug],
             scenarios=[scenario.slug],
-            **{one.name: getattr(request, one.name) for one in fields(Caps)},
+            **{field.name: getattr(request, field.name) for field in fields(Caps)},
         ),
         actor,
         follows=answer,
@@ -105,21 +105,21 @@ def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
             f"There is no answer to go on from: {answer.contestant.name} on "
             f"{answer.scenario.slug} is {answer.get_state_display().lower()}."
         )
-    asked = ModelCall.objects.filter(
+    calls = ModelCall.objects.filter(
         attempt__augmentation=answer, role=ModelRole.MODIFIER, answer__isnull=False, fault=""
     ).order_by("attempt__number", "number")
-    last = asked.last()
+    last = calls.last()
     if last is None:
         raise Conflict("No language model gave this answer: there is nobody to be told more.")
     notes = TranscriptNote.objects.filter(attempt=last.attempt_id)
-    kept = notes.filter(kind=NoteKind.KEPT).first()
-    if kept is not None:
-        counted = notes.get(kind=NoteKind.ROUND, document__round=kept.document["round"])
-        last = asked.filter(attempt=last.attempt_id, number__lte=counted.after_call).last()
+    note = notes.filter(kind=NoteKind.KEPT).first()
+    if note is not None:
+        counted = notes.get(kind=NoteKind.ROUND, document__round=note.document["round"])
+        last = calls.filter(attempt=last.attempt_id, number__lte=counted.after_call).last()
     if last is None or last.removed_at is not None:
         raise Conflict("Its transcript was removed for its age: nobody can go on from it.")
-    said = (message_from_document(message) for message in last.request["messages"])
-    return (*said, model_message(last.answer or ""))
+    messages = (message_from_document(message) for message in last.request["messages"])
+    return (*messages, model_message(last.answer or ""))
 
 
 def steps_to(row: Augmentation) -> list[Augmentation]:

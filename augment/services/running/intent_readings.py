@@ -58,10 +58,10 @@ def read_intent(
     kind = Readings(client)
     with transaction.atomic():  # taken before any worker sees it
         reading = plan_reading(scenario=row, endpoint=find_endpoint(endpoint), model=model)
-        held = kind.take(reading.pk)
-    assert held is not None
+        lease = kind.take(reading.pk)
+    assert lease is not None
     try:
-        kind.work(held)
+        kind.work(lease)
     except BaseException:  # given back, it would be paid for by a worker that nobody asked
         given_back = kind.rows.filter(pk=reading.pk, state=State.RUNNING, claim=None)
         why = "It was interrupted."

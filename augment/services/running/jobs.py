@@ -123,7 +123,7 @@ def with_followed(scenarios: Iterable[Scenario]) -> list[Scenario]:
     """Return the scenarios, each behind those that it follows."""
     ordered: dict[int, Scenario] = {}
     for scenario in scenarios:
-        ordered |= {one.pk: one for one in (*scenario.followed, scenario)}
+        ordered |= {wish_row.pk: wish_row for wish_row in (*scenario.followed, scenario)}
     return list(ordered.values())
 
 
@@ -214,11 +214,11 @@ def open_again(job: GenerationJob) -> None:
     Raises:
         Conflict: The job was cancelled.
     """
-    kept = Case(
+    state = Case(
         When(state__in=GenerationJob.HELD, then=F("state")), default=Value(JobState.RUNNING)
     )
     not_cancelled = GenerationJob.objects.filter(pk=job.pk).exclude(state=JobState.CANCELLED)
-    if not not_cancelled.update(state=kept, finished_at=None):
+    if not not_cancelled.update(state=state, finished_at=None):
         raise Conflict(f"Job '{job.name}' was cancelled; launch a new one instead.")
     loosen_unanswered(job.contestants.all())
 

@@ -67,7 +67,7 @@ class JudgeRequest(Caps):
     question: str = input_field(
         InputKind.CHOICE,
         "Question",
-        choices={one.value: one.value.capitalize() for one in JudgeQuestion},
+        choices={question.value: question.value.capitalize() for question in JudgeQuestion},
         default=JudgeQuestion.INSTRUCTION.value,
     )
 
@@ -143,8 +143,8 @@ def plan_judge(
         **budget.cap_columns(request, unpriced),
     )
     PairJudgement.objects.bulk_create(PairJudgement(run=run, **pair._asdict()) for pair in pairs)
-    asked = {"model": run.model, "endpoint": endpoint.label, "pairs": len(pairs)}
-    log_change(run, "start", actor, after=asked | {"cap": budget.describe_caps(run)})
+    facts = {"model": run.model, "endpoint": endpoint.label, "pairs": len(pairs)}
+    log_change(run, "start", actor, after=facts | {"cap": budget.describe_caps(run)})
     return run
 
 

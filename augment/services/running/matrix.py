@@ -47,7 +47,7 @@ def make_matrix(models: Sequence[EndpointModel]) -> list[MatrixRow]:
     """Return variants down, models across."""
     return [
         MatrixRow(
-            label=spell_variant(recipe.slug), cells=tuple(_cell(recipe, known) for known in models)
+            label=spell_variant(recipe.slug), cells=tuple(_cell(recipe, model) for model in models)
         )
         for recipe in RECIPES.values()
     ]
@@ -91,15 +91,15 @@ def add_cells(rows: Sequence[Contestant], *, actor: User | None = None) -> list[
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _cell(recipe: Recipe, known: EndpointModel) -> MatrixCell:
-    endpoint = known.endpoint
+def _cell(recipe: Recipe, model: EndpointModel) -> MatrixCell:
+    endpoint = model.endpoint
     obstacle = find_key_obstacle(endpoint.key_variable, endpoint.base_url)
-    if not obstacle and ModelRole.VIEWER in recipe.roles and not known.vision:
+    if not obstacle and ModelRole.VIEWER in recipe.roles and not model.vision:
         obstacle = "needs vision, and it sees text alone"
-        if known.vision is None:
+        if model.vision is None:
             obstacle = "nobody knows whether it sees pictures: probe it"
-    key = SEPARATOR.join((recipe.slug, endpoint.label, known.model))
-    return MatrixCell(key=key, endpoint=endpoint.label, model=known.model, obstacle=obstacle)
+    key = SEPARATOR.join((recipe.slug, endpoint.label, model.model))
+    return MatrixCell(key=key, endpoint=endpoint.label, model=model.model, obstacle=obstacle)
 
 
 def _contestant(key: str, options: ContestantOptions) -> Contestant:

@@ -266,17 +266,17 @@ def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | N
     with ExitStack() as opened:
         clients = {
             site: opened.enter_context(open_client(site))
-            for site in {one.endpoint for one in respondents.values()}
+            for site in {respondent.endpoint for respondent in respondents.values()}
         }
         playing = {
             role: RespondentClient(
-                client=clients[one.endpoint],
-                model=one.model,
-                context_tokens=one.facts.context_tokens,
+                client=clients[respondent.endpoint],
+                model=respondent.model,
+                context_tokens=respondent.facts.context_tokens,
                 native_tools=role is ModelRole.MODIFIER
                 and options.protocol is ToolProtocol.NATIVE,
             )
-            for role, one in respondents.items()
+            for role, respondent in respondents.items()
         }
         modifier = playing.pop(ModelRole.MODIFIER)
         return pipeline.run(

@@ -194,10 +194,10 @@ def make_record(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
         "job": _columns(augmentation.job, ("code", "name", "is_fresh", "samples")),
         "totals": {name: _json(value) for name, value in asdict(sum_totals(tries)).items()},
         "attempts": [
-            _columns(one.attempt, _ATTEMPT)
-            | {"outcome": one.attempt.outcome or None}
-            | {"steps": [_step(step) for step in one.steps]}
-            for one in tries
+            _columns(attempt_record.attempt, _ATTEMPT)
+            | {"outcome": attempt_record.attempt.outcome or None}
+            | {"steps": [_step(step) for step in attempt_record.steps]}
+            for attempt_record in tries
         ],
         "images": sorted({name for call in _calls(tries) for name in images_in(call.request)}),
     }
@@ -233,7 +233,12 @@ def _steps(attempt: Attempt) -> Iterator[TranscriptStep]:
 
 
 def _calls(tries: list[Try]) -> list[ModelCall]:
-    return [step.call for one in tries for step in one.steps if step.call is not None]
+    return [
+        step.call
+        for attempt_record in tries
+        for step in attempt_record.steps
+        if step.call is not None
+    ]
 
 
 def _message(message: dict[str, Any]) -> SaidMessage:

@@ -76,15 +76,17 @@ def _read_rows(name: str, content: bytes, most: int) -> list[dict[str, Any]]:
 
 
 def _read_row(row: Mapping[str, Any]) -> NewScenario:
-    given = {name: value for name, value in row.items() if value not in (None, "")}
-    known, keep = (*NEEDED, *OPTIONAL), str(given.pop("keep_traffic", "")).strip().lower()
+    values = {name: value for name, value in row.items() if value not in (None, "")}
+    columns, keep = (*NEEDED, *OPTIONAL), str(values.pop("keep_traffic", "")).strip().lower()
     problems = [
-        (name, f"is no column; there are {', '.join(known)}") for name in row if name not in known
+        (name, f"is no column; there are {', '.join(columns)}")
+        for name in row
+        if name not in columns
     ]
-    problems += [(name, "is missing") for name in NEEDED if name not in given]
+    problems += [(name, "is missing") for name in NEEDED if name not in values]
     problems += [
         (name, f"{value!r} must be text")
-        for name, value in given.items()
+        for name, value in values.items()
         if name not in DOCUMENTS and not isinstance(value, str)
     ]
     if keep not in (*_NO, *_YES):
@@ -92,6 +94,6 @@ def _read_row(row: Mapping[str, Any]) -> NewScenario:
     if problems:
         raise InvalidDocument("scenario", problems)
     for name, what in DOCUMENTS.items():
-        if isinstance(given.get(name), str):
-            given[name] = parse_json(given[name].encode(), what=what, place=name)
-    return NewScenario(**given, keep_traffic=keep in _YES)
+        if isinstance(values.get(name), str):
+            values[name] = parse_json(values[name].encode(), what=what, place=name)
+    return NewScenario(**values, keep_traffic=keep in _YES)

@@ -39,9 +39,9 @@ Read = TypeVar("Read")
 # Files
 
 
-def set_folder(folder: Path, one: CatalogueSet) -> Path:
+def set_folder(folder: Path, chosen: CatalogueSet) -> Path:
     """Return where the files of a set lie within a catalogue's folder."""
-    return folder if one is CatalogueSet.PAPER else folder / one.value
+    return folder if chosen is CatalogueSet.PAPER else folder / chosen.value
 
 
 def read_catalogue(
@@ -85,7 +85,7 @@ def _read_files(
     folder: Path, parse: Callable[[object], Read], key: str, problems: Problems
 ) -> dict[str, Read]:
     """Return the content of a folder's files by name; faults go to the problems."""
-    found = {}
+    files = {}
     for file in sorted(folder.glob("*.json")):
         at = f"{folder.name}/{file.name}"
         try:
@@ -95,10 +95,10 @@ def _read_files(
             if name != file.stem:
                 text = f"expected {file.stem!r} as the file is called, got {name!r}"
                 raise InvalidDocument("catalogue", [(key, text)])
-            found[name] = made
+            files[name] = made
         except InvalidDocument as fault:
             problems += [(f"{at}: {path}" if path else at, text) for path, text in fault.problems]
-    return found
+    return files
 
 
 # Rows
@@ -168,7 +168,8 @@ def load_catalogue(
         place = folder or settings.BASE_DIR / "fixtures"
         sharing = _SHARED.get(which, ())
         scenes, entries = read_catalogue(
-            set_folder(place, which), scenes_from=[set_folder(place, one) for one in sharing]
+            set_folder(place, which),
+            scenes_from=[set_folder(place, other_set) for other_set in sharing],
         )
         scene_steps |= {name: _store_scene(scene, actor) for name, scene in scenes.items()}
         for entry in entries:
@@ -181,8 +182,8 @@ def load_catalogue(
             original = _find_newest(entry.slug)
             for number, wording in enumerate(entry.paraphrases, start=1):
                 slug, text = f"{entry.slug}-p{number}", wording.text
-                said = replace(entry, slug=slug, instruction=text, language=wording.language)
-                steps[slug] = _store_scenario(said, which, original, actor)
+                worded = replace(entry, slug=slug, instruction=text, language=wording.language)
+                steps[slug] = _store_scenario(worded, which, original, actor)
     return CatalogueReport(
         scenes=Counter(scene_steps.values()),
         scenarios=Counter(steps.values()),
@@ -226,7 +227,7 @@ def _store_scenario(
     if entry.follows:
         follows = _find_newest(entry.follows) or scene_rows.scenario_named(entry.follows)
     intent = None if entry.intent is None else codec.intent_to_document(entry.intent)
-    said: dict[str, Any] = {
+    columns: dict[str, Any] = {
         "type": entry.type.value,
         "instruction": entry.instruction.strip(),
         "reference": codec.modification_to_document(entry.reference),
@@ -244,7 +245,7 @@ def _store_scenario(
     if row is not None:
         if row == follows:
             raise Conflict(f"{row.slug!r} can't follow itself.")
-        wanted = own | said | {"base_scene": BaseScene.objects.get(slug=entry.scene)}
+        wanted = own | columns | {"base_scene": BaseScene.objects.get(slug=entry.scene)}
         wanted["follows"] = follows
         wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
         step = _update_scenario(row, wanted, actor)
@@ -257,7 +258,7 @@ def _store_scenario(
     new = scene_rows.NewScenario(
         scene=entry.scene,
         slug=slug,
-        **said,
+        **columns,
         intent_origin=IntentOrigin.AUTHORED,
         follows=follows.slug if follows else "",
     )

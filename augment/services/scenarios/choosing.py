@@ -13,7 +13,7 @@ from augment.services.scenarios.scenes import type_choices
 ALL, SET = "all", "set:"
 
 
-def resolve_scenarios(given: Sequence[str]) -> list[str]:
+def resolve_scenarios(words: Sequence[str]) -> list[str]:
     """Return the slugs, each once; words that are no slugs stand for several.
 
     `all`: every scenario; `catalogue`: the authored ones, `set:NAME` (or the name alone): those of
@@ -24,14 +24,14 @@ def resolve_scenarios(given: Sequence[str]) -> list[str]:
     Raises:
         UnknownName: There is no such scenario or set, or none of that pattern.
     """
-    known = list(Scenario.objects.values_list("slug", flat=True))
+    all_slugs = list(Scenario.objects.values_list("slug", flat=True))
     slugs: list[str] = []
-    for word in given:
+    for word in words:
         several = _several(word)
         if several is None:
-            matching = fnmatch.filter(known, word)
+            matching = fnmatch.filter(all_slugs, word)
             if not matching:
-                raise UnknownName("scenario", word, sorted(known))
+                raise UnknownName("scenario", word, sorted(all_slugs))
             slugs += matching
         else:
             slugs += several.values_list("slug", flat=True)
@@ -44,12 +44,12 @@ def types_named(names: Sequence[str]) -> tuple[str, ...]:
     Raises:
         UnknownName: There is no such type.
     """
-    known = [name for name, _ in type_choices()]
+    types = [name for name, _ in type_choices()]
     if list(names) == ["all"]:
-        return tuple(known)
+        return tuple(types)
     for name in names:
-        if name not in known:
-            raise UnknownName("scenario type", name, ["all", *known])
+        if name not in types:
+            raise UnknownName("scenario type", name, ["all", *types])
     return tuple(names)
 
 
@@ -61,7 +61,7 @@ def _several(word: str) -> QuerySet[Scenario] | None:
     if name in list(CatalogueSet):
         return authored.filter(paraphrase_of=None, catalogue_set=name)
     if word.startswith(SET):
-        raise UnknownName("set", name, [one.value for one in CatalogueSet])
+        raise UnknownName("set", name, [choice.value for choice in CatalogueSet])
     meanings = {
         ALL: offered,
         "paraphrases": authored.exclude(paraphrase_of=None),

@@ -33,7 +33,7 @@ from augment.scene.schema import CLOSED, Codec, Id, Real
 from augment.services.events import log_change
 from augment.services.scenarios import scenes
 
-PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
+PLACED = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 _SNAP_WITHIN_M = 15.0
 _AHEAD_M = 20.0
 _NUMBERS = {
@@ -97,12 +97,12 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
         "recorded": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=True)),
         "cleared": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {
-            one.value: dict(zip(("length_m", "width_m"), usual_size_m(scene, one), strict=True))
-            for one in PLACED
+            kind.value: dict(zip(("length_m", "width_m"), usual_size_m(scene, kind), strict=True))
+            for kind in PLACED
         },
         "presets": {
-            one.value: {"label": one.label, "number": _NUMBERS[preset_numbers(one)[0]]}
-            for one in MotionPreset
+            preset.value: {"label": preset.label, "number": _NUMBERS[preset_numbers(preset)[0]]}
+            for preset in MotionPreset
         },
     }
 
@@ -121,11 +121,11 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
         InvalidModification: It does not fit the scene.
     """
     ground = editable_ground(scenario)
-    given = codec.modification_from_document(document)
+    change = codec.modification_from_document(document)
     placed = replace(
-        given,
-        added=tuple(_on_its_lane(agent, ground.graph) for agent in given.added),
-        moved=tuple(_on_its_lane(agent, ground.graph) for agent in given.moved),
+        change,
+        added=tuple(_on_its_lane(agent, ground.graph) for agent in change.added),
+        moved=tuple(_on_its_lane(agent, ground.graph) for agent in change.moved),
     )
     placed = fit_boxes(ground.scene, placed)
     scenes.check_reference(ground.scene, placed)
@@ -154,13 +154,13 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     """
     graph = editable_ground(scenario).graph
     added, moved = (
-        tuple(_snap(one, graph) if one.id == agent_id else one for one in agents)
+        tuple(_snap(agent, graph) if agent.id == agent_id else agent for agent in agents)
         for agents in (modification.added, modification.moved)
     )
     return replace(modification, added=added, moved=moved)
 
 
-def give_preset(scenario: Scenario, change: Modification, given: object) -> Modification:
+def give_preset(scenario: Scenario, change: Modification, document_part: object) -> Modification:
     """Return the modification with one agent that does what is asked, or with a door that opens.
 
     Raises:
@@ -168,7 +168,7 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
         CannotPlace: The scene has not what the preset needs.
         UnknownName: There is no such agent.
     """
-    edit = _PRESET.from_parts(given)
+    edit = _PRESET.from_parts(document_part)
     after = apply(editable_ground(scenario).scene, change)
     agents = {agent.id: agent for agent in after.agents}
     check_names("agent", [edit.agent_id], agents)
@@ -178,27 +178,27 @@ def give_preset(scenario: Scenario, change: Modification, given: object) -> Modi
         numbers: dict[str, Any] = {"start": start, preset_numbers(edit.preset)[0]: edit.number}
         mover = with_preset(edit.preset, after, mover, PresetNumbers(**numbers))
         mover = replace(mover, id=mover.id or f"{edit.agent_id}-door")
-    is_recorded = any(one.id == mover.id for one in editable_ground(scenario).scene.agents)
+    is_recorded = any(agent.id == mover.id for agent in editable_ground(scenario).scene.agents)
     name = "moved" if is_recorded else "added"
-    others = [one for one in getattr(change, name) if one.id != mover.id]
+    others = [agent for agent in getattr(change, name) if agent.id != mover.id]
     return replace(change, **{name: (*others, mover)})
 
 
 def motion_presets(scenario: Scenario, change: Modification) -> dict[str, dict[str, Any]]:
     """Return by id which preset a motion is, with its numbers as `PresetEdit` has them."""
-    scene, found = editable_ground(scenario).scene, dict[str, dict[str, Any]]()
+    scene, presets = editable_ground(scenario).scene, dict[str, dict[str, Any]]()
     everyone = apply(scene, change).agents
     for agent in change.changed:
         wish = find_wish(agent, scene, everyone)
         if wish is not None:
             preset, near = wish[0].preset, wish[0].start and wish[0].start.ego_distance
             number: Amount | None = getattr(wish[0], preset_numbers(preset)[0])
-            found[agent.id] = {
+            presets[agent.id] = {
                 "preset": preset.value,
                 "within_m": near and near.low_m,
                 "number": number and number.low,
             }
-    return found
+    return presets
 
 
 def editable_ground(scenario: Scenario) -> Ground:

@@ -73,7 +73,7 @@ def import_interplan(
         read_yaml_file(_modification_file_in(folder), what=interplan_file.WHAT)
     )
     by_token = file.modification_details_dictionary
-    wanted = {token: one for token, one in by_token.items() if one.special_scenario}
+    wanted = {token: entry_of for token, entry_of in by_token.items() if entry_of.special_scenario}
     left_out = [
         f"base token {token}, without a special scenario"
         for token in by_token
@@ -86,11 +86,11 @@ def import_interplan(
     for number, path in enumerate(paths, start=1):
         try:
             by_token_m = UntrustedInput(path=path, format=NuPlan.name).vehicles(list(wanted))
-            found = f"{len(by_token_m)} base tokens"
+            outcome = f"{len(by_token_m)} base tokens"
             logs = {token: (path, sizes_m) for token, sizes_m in by_token_m.items()} | logs
         except InvalidDocument as fault:
-            found = str(fault)
-        yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
+            outcome = str(fault)
+        yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {outcome}")
     for token, details in wanted.items():
         if token in logs:
             yield from _keep_token(token, file, *logs[token], actor)
@@ -138,8 +138,8 @@ def _keep_token(
     scene = replace(without_traffic(reading.scene), options=rules)
     for index, entry in (details.special_scenario or {}).items():
         try:
-            kept = _verbatim(file, token, index, entry)
-            yield _keep_entry(row, scene, entry, kept, vehicles_m, actor)
+            verbatim = _verbatim(file, token, index, entry)
+            yield _keep_entry(row, scene, entry, verbatim, vehicles_m, actor)
         except AugmentError as fault:
             yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {fault}")
 
@@ -169,19 +169,19 @@ def _keep_entry(
     row: BaseScene,
     scene: Scene,
     entry: interplan_file.SpecialScenario,
-    kept: dict[str, Any],
+    verbatim: dict[str, Any],
     vehicles_m: _Sizes,
     actor: User | None,
 ) -> ImportStep:
-    token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
-    name = f"{token}-s{kept['index']}"
-    details = interplan_file.Details.model_validate(kept["details"])
+    token, slug = row.source_item, f"{row.slug}-s{verbatim['index']}"
+    name = f"{token}-s{verbatim['index']}"
+    details = interplan_file.Details.model_validate(verbatim["details"])
     spawned, built = interplan_file.surround(
         entry, details, scene, token=token, vehicles_m=vehicles_m
     )
-    kept["built"] = built.model_dump(mode="json", exclude_none=True)
-    scene = interplan_file.follow_rules(scene, kept)
-    reference, losses = interplan_file.read_entry(token, kept["index"], entry, scene)
+    verbatim["built"] = built.model_dump(mode="json", exclude_none=True)
+    scene = interplan_file.follow_rules(scene, verbatim)
+    reference, losses = interplan_file.read_entry(token, verbatim["index"], entry, scene)
     if built.boxes_m is None:
         losses.append("the boxes of vehicles, since a recorded one has no size")
     left_out = f"; left out: {', '.join(losses)}" if losses else ""
@@ -191,7 +191,7 @@ def _keep_entry(
     # Walkers and cones are put there by interPlan whoever may meet them.
     stopped = [agent for agent in reference.added if agent.type in (_VEHICLE, _BUS)]
     traffic = keep_clear(spawned.agents, stopped)
-    goal_m = interplan_file.goal_place(kept, goal or "", scene)
+    goal_m = interplan_file.goal_place(verbatim, goal or "", scene)
     options = replace(scene.options, density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
     instruction, intent = describe_change(entry.type, reference, driven)
@@ -206,7 +206,7 @@ def _keep_entry(
         density=density,
         goal=goal or "",
         traffic=traffic,
-        interplan=kept,
+        interplan=verbatim,
     )
     add_scenario(new, actor=actor)
     return ImportStep(StepKind.NEW, f"{name}: {slug}{left_out}")

@@ -56,18 +56,20 @@ def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    kept, camera = scenario.original_image, camera or load_camera(scenario)
-    if kept and camera_key(kept) == camera.key and default_storage.exists(kept):
-        return kept
+    stored, camera = scenario.original_image, camera or load_camera(scenario)
+    if stored and camera_key(stored) == camera.key and default_storage.exists(stored):
+        return stored
     scene = load_scene(scenario)
     name = draw_picture(scenario, Modification(), camera)
     noted = {camera.key: {"image": name, "view": picture_view(camera)}}
     before = camera_for(scene, load_reference(scenario))
-    if camera_key(kept) == before.key:  # of before windows were noted
-        noted |= {before.key: {"image": kept, "view": picture_view(before)}}
+    if camera_key(stored) == before.key:  # of before windows were noted
+        noted |= {before.key: {"image": stored, "view": picture_view(before)}}
     with transaction.atomic():
-        held = Scenario.objects.select_for_update(no_key=True).only("windows").get(pk=scenario.pk)
-        scenario.windows = held.windows | noted
+        locked = (
+            Scenario.objects.select_for_update(no_key=True).only("windows").get(pk=scenario.pk)
+        )
+        scenario.windows = locked.windows | noted
         scenario.original_image = name
         scenario.save(update_fields=["original_image", "windows"])
     return name
@@ -94,7 +96,11 @@ def _window_around(scenario: Scenario, documents: Iterable[dict[str, Any] | None
         codec.modification_from_document(document) for document in documents if document
     )
     reference = load_reference(scenario)
-    moves = any(one.has_motion for one in (reference, *changes) if one is not None)
+    moves = any(
+        modification.has_motion
+        for modification in (reference, *changes)
+        if modification is not None
+    )
     recording = load_recording(scenario) if moves else None
     return camera_for(load_scene(scenario), reference, changes, recording)
 
@@ -390,10 +396,10 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
         if not checks.filter(modification=document).exists():
             image = draw_picture(row, change, load_camera(row))
             drawn.append(Augmentation(scenario=row, modification=document, image=image))
-    kept = _keep_checks(drawn, actor) if drawn else []
-    for made in kept:
+    made_checks = _keep_checks(drawn, actor) if drawn else []
+    for made in made_checks:
         redraw(made.scenario)
-    return kept
+    return made_checks
 
 
 @transaction.atomic

@@ -44,7 +44,7 @@ def preview_prompt(
         UnknownName: No such variant or role.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
-    check_names("role", [role], [one.value for one in ModelRole])
+    check_names("role", [role], [role_choice.value for role_choice in ModelRole])
     recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
     if role not in recipe.roles:
         played = ", ".join(recipe.roles)

@@ -41,13 +41,13 @@ def type_choices() -> list[tuple[str, str]]:
     """Every type with its label: the five in their order, then one's own by their slugs."""
     own = Scenario.objects.exclude(type_label="").order_by("type")
     labels = dict(own.values_list("type", "type_label"))
-    return [*((one.value, one.label) for one in ScenarioType), *labels.items()]
+    return [*((kind.value, kind.label) for kind in ScenarioType), *labels.items()]
 
 
 def type_label(name: str) -> str:
     """Return the label of a type; an unknown type is its own label."""
-    known = find_type(name)
-    return known.label if known else dict(type_choices()).get(name, name)
+    found_type = find_type(name)
+    return found_type.label if found_type else dict(type_choices()).get(name, name)
 
 
 def find_type(name: str) -> ScenarioType | None:
@@ -67,8 +67,8 @@ def label_for(name: str) -> str:
         if name in list(kind):
             return kind(name).label
     if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
-        known = ", ".join(one.value for one in ScenarioType)
-        rule = f"one of {known}, or up to {LONGEST_TYPE} lower-case letters, digits, _ or -"
+        types = ", ".join(kind.value for kind in ScenarioType)
+        rule = f"one of {types}, or up to {LONGEST_TYPE} lower-case letters, digits, _ or -"
         raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
     before = Scenario.objects.filter(type=name).values_list("type_label", flat=True)
     return before.first() or re.sub(r"[_-]", " ", name).capitalize()
@@ -197,14 +197,14 @@ def add_variant(
         intent: With these numbers, None where nobody has written it down.
         actor: Who did it.
     """
-    kept = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
+    copied = ("base_scene", "type", "type_label", "keep_traffic", "traffic_density", "goal")
     more = ("spawned", "interplan", "language", "follows", "origin")
     variant = Scenario(
         slug=_number_slug(scenario.slug),
         instruction=shorten(f"{scenario.instruction} ({difference})", INSTRUCTION_LENGTH),
         reference=codec.modification_to_document(reference),
         instruction_is_generated=True,
-        **{name: getattr(scenario, name) for name in (*kept, *more)},
+        **{name: getattr(scenario, name) for name in (*copied, *more)},
     )
     if intent is not None:
         variant.intent = codec.intent_to_document(intent)
@@ -229,8 +229,8 @@ def _new_scenario(scene: BaseScene, type: str, slug: str | None, follows: str) -
         return Scenario(slug=slug or _free_slug(scene, type), base_scene=scene)
     first = scene.scenarios.filter(slug=follows).first()
     if first is None:
-        known = list(scene.scenarios.values_list("slug", flat=True))
-        raise UnknownName(f"scenario of the scene “{scene.slug}”", follows, known)
+        slugs = list(scene.scenarios.values_list("slug", flat=True))
+        raise UnknownName(f"scenario of the scene “{scene.slug}”", follows, slugs)
     slug = slug or _number_slug(f"{first.slug}-then")
     return Scenario(slug=slug, base_scene=scene, follows=first)
 
@@ -341,9 +341,9 @@ def _set_surroundings(
     """Keep them and the reference; spawned traffic stays whatever becomes of the reference."""
     choices = {"density": (density, [*entities.TrafficDensity]), "goal": (goal, [*GOALS])}
     problems = [
-        (name, f"{given!r} must be one of {', '.join(known)}")
-        for name, (given, known) in choices.items()
-        if given and given not in known
+        (name, f"{value!r} must be one of {', '.join(allowed)}")
+        for name, (value, allowed) in choices.items()
+        if value and value not in allowed
     ]
     if problems:
         raise InvalidDocument("scenario", problems)
@@ -464,11 +464,11 @@ def check_reference(scene: entities.Scene, modification: entities.Modification) 
         InvalidDocument: An agent names a lane that the scene does not have.
     """
     check_motions(scene, modification)
-    known = LaneGraph(scene).lanes
+    lanes = LaneGraph(scene).lanes
     problems = [
         (f"{agent.id}.lane_id", f"{agent.lane_id!r} is not a lane or connector of the scene")
         for agent in modification.changed
-        if agent.lane_id is not None and agent.lane_id not in known
+        if agent.lane_id is not None and agent.lane_id not in lanes
     ]
     if problems:
         raise InvalidDocument("modification", problems)

@@ -158,7 +158,7 @@ class Uploads(WorkKind[SceneUpload]):
                 raise InvalidDocument("recording", [("", "holds no moment with an ego")])
             _, reading = source.read(item=None, frame=None, name="preview")
         meant, offered = reading.moment, moments[:MOST_STOPS]
-        if all((one.item, one.frame) != (meant.item, meant.frame) for one in offered):
+        if all((moment.item, moment.frame) != (meant.item, meant.frame) for moment in offered):
             offered.insert(0, meant)
         shown, _ = UploadMoment.objects.update_or_create(
             upload=row,
@@ -178,12 +178,12 @@ UPLOADS = Uploads()
 def _parts(moments: Sequence[Moment]) -> list[dict[str, Any]]:
     """Return the moments by their items; those of one recording are one part without a name."""
     items = {moment.item for moment in moments}
-    is_one = len(items) == len(moments) and all(one.time_s is not None for one in moments)
+    is_one = len(items) == len(moments) and all(moment.time_s is not None for moment in moments)
     parts: dict[str, list[dict[str, Any]]] = {}
-    for one in moments:
-        time_s = None if one.time_s is None else round(one.time_s, 2)
-        stop = {"item": one.item or "", "frame": one.frame, "time_s": time_s}
-        parts.setdefault("" if is_one else one.item or "", []).append(stop)
+    for stop_moment in moments:
+        time_s = None if stop_moment.time_s is None else round(stop_moment.time_s, 2)
+        stop = {"item": stop_moment.item or "", "frame": stop_moment.frame, "time_s": time_s}
+        parts.setdefault("" if is_one else stop_moment.item or "", []).append(stop)
     return [{"name": name, "stops": stops} for name, stops in parts.items()]
 
 
@@ -219,8 +219,8 @@ def ask_for_moment(
         return row
     free = UploadMoment.objects.filter(pk=row.pk, claim=None)
     free = free.exclude(state__in=(MomentState.KEEPING, MomentState.KEPT))
-    asked = {"state": MomentState.KEEPING, "slug": slug, "reason": "", "sent_at": None}
-    if not free.update(**asked, asked_by=actor):
+    update = {"state": MomentState.KEEPING, "slug": slug, "reason": "", "sent_at": None}
+    if not free.update(**update, asked_by=actor):
         raise Conflict("This moment can't be kept now: look at its state.")
     row.refresh_from_db()
     return row
@@ -243,13 +243,13 @@ class Moments(WorkKind[UploadMoment]):
             if is_new:
                 return Settlement(state=MomentState.DRAWN, columns=_preview(row, reading))
             path = Path(row.upload.name)
-            kept, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
-            draw_scene(kept.pk)  # whoever keeps it looks at it next
+            scene, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
+            draw_scene(scene.pk)  # whoever keeps it looks at it next
         except AugmentError as error:
             if is_new:
                 raise
             return Settlement(state=MomentState.DRAWN, reason=str(error))
-        return Settlement(state=MomentState.KEPT, columns={"scene": kept})
+        return Settlement(state=MomentState.KEPT, columns={"scene": scene})
 
 
 MOMENTS = Moments()
