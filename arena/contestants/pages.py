@@ -128,7 +128,7 @@ def contestants_page(request: HttpRequest) -> HttpResponse:
     listing = read_listing(request, {"kind": ("Kind", kinds), "offered": ("In forms", offered)})
     rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
     rows = listing.narrow(rows, "name", "slug", "variant", "model", "endpoint__label", by=["kind"])
-    if chosen := listing.chosen("offered"):
+    if chosen := listing.find_choice("offered"):
         rows = rows.filter(retired_at__isnull=chosen == "active")
     rows = rows.annotate(made=Count("augmentations")).order_by("name", "pk")
     page = read_page(request, rows, size=CONTESTANTS_AT_ONCE)

@@ -61,7 +61,7 @@ def show_options(
     lines = [
         {
             "label": option.label,
-            "value": option.shown(options[option.name]),
+            "value": option.show(options[option.name]),
             "is_chosen": option.name in contestant.options,
             "left_out": [role for role, names in lacking.items() if option.name in names],
         }

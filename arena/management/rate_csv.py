@@ -272,7 +272,7 @@ def _write_json(rated: RatedCsv) -> str:
 
 def _pairs(board: Leaderboard, separation: Separation) -> list[dict[str, Any]]:
     """Pairs with p-values adjusted for all of them."""
-    pairs = separation.judged([line.name for line in board.lines])
+    pairs = separation.judge_pairs([line.name for line in board.lines])
     return [
         {
             **{name: getattr(pair, name) for name in ("a", "b", "difference", "lower", "upper")},

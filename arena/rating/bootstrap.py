@@ -70,7 +70,7 @@ class Rounds:
         wins += ties
         return cls(games=losses, scores=wins, ties=of_all)
 
-    def chosen(self, rounds: IntArray) -> Self:
+    def select(self, rounds: IntArray) -> Self:
         """Some of the rounds, by their numbers."""
         if len(rounds) == len(self.ties):
             return self
@@ -257,11 +257,11 @@ def rate_rounds(
     rated: list[RatedRounds] = []
     for block in blocks:
         is_fine = are_determined(met, block.games, block.scores)
-        rated.append(RatedRounds.of_values(refit(block.chosen(np.flatnonzero(is_fine)), None)))
+        rated.append(RatedRounds.of_values(refit(block.select(np.flatnonzero(is_fine)), None)))
         left = np.flatnonzero(~is_fine)
         at_once = max(1, _NUMBERS_OF_COMPONENTS // size**2)
         for first in range(0, len(left), at_once):
-            rounds = block.chosen(left[first : first + at_once])
+            rounds = block.select(left[first : first + at_once])
             reached = chains_in_sets(met, rounds.games, rounds.scores)
             together = reached & reached.transpose(0, 2, 1)
             inside = together[:, counts.low, counts.high].T

@@ -175,7 +175,7 @@ def _rate_rounds(
             games, scores = rounds.games, rounds.scores
             return to_elo(fit(met, games, scores, start=point.answer, together=together))
         is_fine = (rounds.ties > 0) & (rounds.ties < rounds.games.sum(axis=0))
-        fine = rounds.chosen(np.flatnonzero(is_fine))
+        fine = rounds.select(np.flatnonzero(is_fine))
         inside = None if together is None else together[is_fine]
         values = np.full((met.contestants, len(is_fine)), np.nan)
         values[:, is_fine] = fit(

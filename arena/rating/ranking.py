@@ -163,7 +163,7 @@ class Separation:
     difference: FloatArray
     half: FloatArray
 
-    def judged(self, names: Sequence[str]) -> tuple[PairP, ...]:
+    def judge_pairs(self, names: Sequence[str]) -> tuple[PairP, ...]:
         """Return every pair that was judged, by the names of the C contestants."""
         low, high = np.triu_indices(len(names), 1)
         is_compared = ~np.isnan(self.p_value[low, high])

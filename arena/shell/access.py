@@ -48,14 +48,12 @@ def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
 
     def wrap(view: View[P]) -> View[P]:
         @wraps(view)
-        def guarded(
-            request: HttpRequest, /, *args: P.args, **kwargs: P.kwargs
-        ) -> HttpResponseBase:
+        def guard(request: HttpRequest, /, *args: P.args, **kwargs: P.kwargs) -> HttpResponseBase:
             if top_role(request.user) not in roles:
                 raise PermissionDenied
             return _answer_once(request, partial(view, request, *args, **kwargs))
 
-        return guarded
+        return guard
 
     return wrap
 

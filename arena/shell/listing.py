@@ -62,7 +62,7 @@ class Listing:
         """Return whether the list may leave something out."""
         return bool(self.search or any(choice.chosen for choice in self.choices))
 
-    def chosen(self, name: str) -> str:
+    def find_choice(self, name: str) -> str:
         """Return the value of a filter."""
         return next((choice.chosen for choice in self.choices if choice.name == name), "")
 
@@ -77,7 +77,7 @@ class Listing:
         matches = Q()
         for column in columns:
             matches |= Q(**{f"{column}__icontains": self.search})
-        chosen = {name: self.chosen(name) for name in by if self.chosen(name)}
+        chosen = {name: self.find_choice(name) for name in by if self.find_choice(name)}
         return rows.filter(matches if self.search else Q(), **chosen)
 
 

@@ -158,7 +158,7 @@ def audit_page(request: HttpRequest) -> HttpResponse:
         request, {"actor": ("By", people), "verb": ("What", verbs), "object_kind": ("To", kinds)}
     )
     rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
-    if actor := listing.chosen("actor"):
+    if actor := listing.find_choice("actor"):
         rows = rows.filter(actor__person__code=actor)
     rows = listing.narrow(rows, "object_code", by=["verb", "object_kind"])
     page = read_page(request, rows, size=ACTS_AT_ONCE)

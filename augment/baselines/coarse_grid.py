@@ -161,7 +161,7 @@ class _Places:
         self, code: Code, others: Sequence[TrafficAgent], rng: np.random.Generator
     ) -> TrafficAgent | None:
         """Return a vehicle at a place of its code, None where every draw met somebody else."""
-        allowed = self._allowed_by(code)
+        allowed = self._list_allowed(code)
         for _ in range(_DRAWS):
             index = int(rng.choice(allowed))
             x_m, y_m = self._points[index].round(3).tolist()
@@ -173,7 +173,7 @@ class _Places:
                 return vehicle
         return None
 
-    def _allowed_by(self, code: Code) -> NDArray[np.intp]:
+    def _list_allowed(self, code: Code) -> NDArray[np.intp]:
         """Return the indices of the places that a code leaves open.
 
         Until some place is left, its side is given up, its direction, both, all but the bin, and

@@ -30,7 +30,7 @@ def give_motion(
     numbers = presets.PresetNumbers(start=_trigger(wish.start, ground.lanes, rng))
     for name in presets.preset_numbers(wish.preset):
         if (amount := getattr(wish, name)) is not None:
-            numbers = replace(numbers, **{name: round(amount.drawn(rng), 2)})
+            numbers = replace(numbers, **{name: round(amount.draw(rng), 2)})
     mover = presets.with_preset(wish.preset, ground.scene, agent, numbers)
     if agent.walk_to_m is None or mover.motion is None:
         return mover
@@ -81,9 +81,9 @@ def _trigger(
     if wish is None:
         return None
     if wish.after_s is not None:
-        return planned_motion.AtTime(after_s=round(wish.after_s.drawn(rng), 2))
+        return planned_motion.AtTime(after_s=round(wish.after_s.draw(rng), 2))
     within_m = (
-        planned_motion.REACHED_M if wish.ego_distance is None else wish.ego_distance.drawn(rng)
+        planned_motion.REACHED_M if wish.ego_distance is None else wish.ego_distance.draw(rng)
     )
     within_m = round(within_m, 2)
     if wish.mark is None:

@@ -45,7 +45,7 @@ def place_walkers(
         if request.is_file:
             behind_m, along_m = along_m, 0.0
             if 0 < index <= len(request.behind):
-                behind_m = request.behind[index - 1].drawn(rng)
+                behind_m = request.behind[index - 1].draw(rng)
         walker = _walker(request, ground, distance_m + along_m, behind_m)
         wish = request.motion
         if wish is not None:
@@ -100,7 +100,7 @@ def place_cones(
     Raises:
         CannotPlace: The lanes end before the last cone, or there is no such lane.
     """
-    spacing_m = CONE_SPACING_M if request.spacing is None else request.spacing.drawn(rng)
+    spacing_m = CONE_SPACING_M if request.spacing is None else request.spacing.draw(rng)
     if spacing_m < 2.0 * _EDGE_M:
         raise CannotPlace(f"Cones {spacing_m:g} m apart would stand in each other.")
     lane = request.spot.lane

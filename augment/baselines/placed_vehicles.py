@@ -92,7 +92,7 @@ def place_vehicles(
         return (give_motion(wish, ground, vehicle, rng),)
     apart_m = _size_m(body)[0] + BUMPER_GAP_M
     if request.spacing is not None:
-        apart_m = request.spacing.drawn(rng)
+        apart_m = request.spacing.draw(rng)
     d_m = _offset_m(request, ground, ground.beside(distance_m, lane), rng)
     turn_rad = _FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
     added = []
@@ -102,7 +102,7 @@ def place_vehicles(
         on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
         agent = build_agent(
             _agent_type(body),
-            place.pose.turned(turn_rad),
+            place.pose.turn(turn_rad),
             place.lane_id if on_lane else None,
             _size_m(body),
             speed_mps=request.speed_mps or 0.0,
@@ -127,7 +127,7 @@ def _offset_m(
     half_lane_m = ground.lane(place).width_m / 2.0
     half_box_m = _size_m(request.body)[1] / 2.0
     if lateral.offset is not None:
-        size_m = lateral.offset.drawn(rng)
+        size_m = lateral.offset.draw(rng)
         is_beside = lateral.nearness is Nearness.OUTSIDE
         if size_m > half_lane_m + half_box_m and not is_beside:
             raise CannotPlace(f"An offset of {size_m:.1f} m leaves the lane.")
@@ -179,7 +179,7 @@ def _in_a_row(
             gap_m: float, from_m: float = along_m, left_m: float = left_m, rad: float = turn_rad
         ) -> Pose:
             place = ground.beside(from_m + gap_m, request.spot.lane)
-            return ground.graph.place(place.lane_id, place.s_m, left_m).pose.turned(rad)
+            return ground.graph.place(place.lane_id, place.s_m, left_m).pose.turn(rad)
 
         gap_m = _touching_m(request.body, poses[-1], pose_at) if poses else 0.0
         poses.append(pose_at(gap_m))
@@ -197,10 +197,10 @@ def _chain_poses(
     """Each where the intent puts it against the one before; of the last ones nothing is said."""
     centre = ground.beside(distance_m, request.spot.lane)
     spot = ground.graph.place(centre.lane_id, centre.s_m, left_m).pose
-    poses = [spot.turned(_FACING_RAD[request.facing or Facing.WITH_LANE])]
+    poses = [spot.turn(_FACING_RAD[request.facing or Facing.WITH_LANE])]
     unsaid = (request.count or 0) - 1 - len(request.others)
     for other in [*request.others, *[CrashedCar()] * unsaid]:
-        gap_m = None if other.gap is None else other.gap.drawn(rng)
+        gap_m = None if other.gap is None else other.gap.draw(rng)
         choices = _choices(request.body, other, poses, spot.heading_rad, gap_m)
         ordered = [pose for _, pose in sorted(choices, key=lambda choice: choice[0])]
         if not ordered:

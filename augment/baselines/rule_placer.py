@@ -150,7 +150,7 @@ class _Fitting:
         for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
         wanted = request.spot.distance or intents.Length(low_m=0.0, high_m=0.0)
-        asked_m = wanted.drawn(self._rng)
+        asked_m = wanted.draw(self._rng)
         asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
         spans_m = list_stations(request.spot, self._place.over(request.spot.via).lanes)
         is_open = wanted.is_range or (request.spot.distance is None and of is None)

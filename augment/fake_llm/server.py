@@ -158,13 +158,13 @@ def _unknown(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
 
 
 def _as(character: playing.Character) -> Behaviour:
-    def played(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
+    def play(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
         text, calls = _answer_probe(request) or character.answer(request, server.known)
         if request.response_format is not None and not calls:
             text = _by_schema(text)
         return wire.completion(request, text or None, calls=calls)
 
-    return played
+    return play
 
 
 def _answer_probe(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:

@@ -212,7 +212,7 @@ class Log:
             names=names,
         )
 
-    def put_ego(self, place: str, frame: int) -> "Log":
+    def place_ego(self, place: str, frame: int) -> "Log":
         """Return the log with an ego that stands on a lane at a frame, in place of its own.
 
         Args:
@@ -283,7 +283,7 @@ class Reader(ABC):
         Args:
             path: The file or folder.
             item: See `Moment`; None for the first. After it, or alone, "@LANE,S" puts an ego on a
-                lane of a recording, see `Log.put_ego`.
+                lane of a recording, see `Log.place_ego`.
             frame: See `Moment`; None for the one that the format means.
             name: The scene's slug.
 
@@ -340,7 +340,7 @@ class LogReader(Reader):
         if log is None:
             raise fault_at("item", f"{str(item or 'a first part')[:60]!r} is not there")
         frame = log.frame if frame is None else frame
-        log = log.put_ego(place, frame) if is_put else log
+        log = log.place_ego(place, frame) if is_put else log
         return log.reading_at(frame, name, self.reach_m)
 
 

@@ -51,7 +51,7 @@ class Pose:
         x_m, y_m = self.to_parent(np.array([[0.0, left_m]]))[0].tolist()
         return x_m, y_m
 
-    def turned(self, turn_rad: float) -> Pose:
+    def turn(self, turn_rad: float) -> Pose:
         """Return the pose turned on the spot, to the left."""
         return replace(self, heading_rad=wrap(self.heading_rad + turn_rad))
 

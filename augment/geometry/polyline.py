@@ -116,7 +116,7 @@ class Polyline:
             beyond_m=abs(past_m) if is_past_end else 0.0,
         )
 
-    def resampled(self, spacing_m: float) -> Polyline:
+    def resample(self, spacing_m: float) -> Polyline:
         """Points every `spacing_m` from the start; the last point is kept whatever is left."""
         stations = np.arange(0.0, self.length_m, spacing_m)
         if self.length_m - stations[-1] < 1e-6:

@@ -105,7 +105,7 @@ class Watch:
             self._still_wanted()
         return max(min(self._ends_at, self._looks_at) - now, _SHORTEST_S)
 
-    def left_s(self, most_s: float) -> float:
+    def remaining_s(self, most_s: float) -> float:
         """Return how long one step may take that can't be interrupted; raises as above."""
         self.wait_s()
         return max(min(self._ends_at - self._clock(), most_s), _SHORTEST_S)
@@ -268,7 +268,7 @@ class _Network:
 
         problem: Exception = OSError(f"{host} has no address")
         for address in self._addresses(host):
-            limit_s = _WATCH.get().left_s(CONNECT_TIMEOUT_S)
+            limit_s = _WATCH.get().remaining_s(CONNECT_TIMEOUT_S)
             try:
                 backend = httpcore2.SyncBackend()
                 return _Stream(backend.connect_tcp(address, port, timeout=limit_s))
@@ -288,7 +288,7 @@ class _Network:
                 addresses.set_exception(error)
 
         Thread(target=look, name="look up a name", daemon=True).start()
-        return addresses.result(_WATCH.get().left_s(CONNECT_TIMEOUT_S))
+        return addresses.result(_WATCH.get().remaining_s(CONNECT_TIMEOUT_S))
 
 
 class _Stream:
@@ -314,7 +314,7 @@ class _Stream:
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         """Send all of it."""
         watch = _WATCH.get()
-        limit_s = watch.left_s(float("inf"))
+        limit_s = watch.remaining_s(float("inf"))
         watch.has_written = True
         self._stream.write(buffer, limit_s)
 
@@ -325,5 +325,5 @@ class _Stream:
         timeout: float | None = None,
     ) -> _Stream:
         """Return the same connection, encrypted."""
-        limit_s = _WATCH.get().left_s(CONNECT_TIMEOUT_S)
+        limit_s = _WATCH.get().remaining_s(CONNECT_TIMEOUT_S)
         return _Stream(self._stream.start_tls(ssl_context, server_hostname, limit_s))

@@ -71,7 +71,7 @@ class Extent:
         """Return whether a line comes within `CROSSED_M` of the ego's possible ways."""
         if self.routes_m is None:
             return True
-        points = line.resampled(_ROUTE_EVERY_M).points_m
+        points = line.resample(_ROUTE_EVERY_M).points_m
         gaps = points[:, None, :] - self.routes_m[None, :, :]
         return bool((gaps * gaps).sum(axis=2).min() <= CROSSED_M**2)
 
@@ -119,7 +119,7 @@ def find_extent(scene: Scene, radius_m: float) -> Extent:
     ]
     behind = max(0.0, route.ego_s_m - BEHIND_M)
     lines.append(route.line.between(behind, route.ego_s_m + _ROUTE_EVERY_M))
-    points = np.vstack([line.resampled(_ROUTE_EVERY_M).points_m for line in lines])
+    points = np.vstack([line.resample(_ROUTE_EVERY_M).points_m for line in lines])
     near = np.hypot(*points.T) <= radius_m + BESIDE_M
     return Extent(radius_m=radius_m, routes_m=points[near])
 

@@ -287,7 +287,7 @@ def scene_vectors(
         if lanes is LaneFormat.BEZIER:
             coordinates: object = control_points(bezier_lane(line))
         else:
-            coordinates = _points(line.resampled(SPACING_M).points_m)
+            coordinates = _points(line.resample(SPACING_M).points_m)
         kind = "Lanes" if isinstance(lane, entities.Lane) else "Lane connectors"
         road[kind][short] = [*facts, _metres(lane.width_m), limit_mps, coordinates]
     extent = find_extent(scene, radius_m)

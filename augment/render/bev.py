@@ -213,10 +213,10 @@ def _draw_over_boxes(ground: Canvas, scene: Scene, lane: AnyLane) -> None:
     if isinstance(lane, LaneConnector):
         colour = palette.CONNECTOR
         for side in sides(lane):
-            ground.dashed(ground.px(side), palette.INK, 1.2, 2.0, 4.0)
+            ground.draw_dashes(ground.px(side), palette.INK, 1.2, 2.0, 4.0)
     line = ground.px(lane.centerline.points_m)
-    ground.dashed(line, palette.PAPER, 3.6, 7.0, 8.0)
-    ground.dashed(line, colour, 1.8, 7.0, 8.0)
+    ground.draw_dashes(line, palette.PAPER, 3.6, 7.0, 8.0)
+    ground.draw_dashes(line, colour, 1.8, 7.0, 8.0)
 
 
 def _closer(modification: Modification, camera: Camera) -> Camera | None:

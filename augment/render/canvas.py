@@ -94,7 +94,7 @@ class Canvas:
             for x, y in _sharp_turns(points).tolist():
                 self.disc((x, y), width / 2.0, colour)
 
-    def dashed(
+    def draw_dashes(
         self, points: FloatArray, colour: Colour, width: float, on: float, off: float
     ) -> None:
         """Draw a dashed line through points (P, 2); what lies outside costs nothing."""
@@ -160,12 +160,12 @@ class Canvas:
 
     def png(self) -> bytes:
         """Return the finished picture: the same drawing gives the same bytes, and no metadata."""
-        finished = self._finished()
+        finished = self._finish_image()
         if np.asarray(finished).max() < _FIRST_OF_TRAILS:
             finished.putpalette(_FLAT_PALETTE[: 3 * _FIRST_OF_TRAILS])
         return _pack(finished)
 
-    def _finished(self) -> Image.Image:
+    def _finish_image(self) -> Image.Image:
         finished = self.copy()
         for write in self._texts:
             write(finished)
@@ -173,7 +173,7 @@ class Canvas:
 
     def _halve(self) -> Image.Image:
         """One pixel for each four, blended, in full colour: for those who pay by the pixel."""
-        return self._finished().convert("RGB").reduce(DENSITY)
+        return self._finish_image().convert("RGB").reduce(DENSITY)
 
     def _smooth(self, at: Spot, text: str, size: int, anchor: str) -> None:
         """Write ink with soft edges: its steps towards paper are colours of the palette."""

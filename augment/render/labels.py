@@ -91,7 +91,7 @@ def draw_ghosts(ground: Canvas, scene: Scene, modification: Modification) -> Non
     for agent in scene.agents:
         if agent.id in gone:
             box = agent.box.corners_m
-            ground.dashed(ground.px(np.vstack([box, box[:1]])), palette.GHOST, 1.5, 5.0, 4.0)
+            ground.draw_dashes(ground.px(np.vstack([box, box[:1]])), palette.GHOST, 1.5, 5.0, 4.0)
 
 
 def draw_labels(

@@ -216,7 +216,9 @@ def _line_px(canvas: Canvas, at_m: Spot, half_px: float = 24.0) -> FloatArray:
 
 
 def _dashes(colour: Colour, on_px: float, off_px: float) -> _Sample:
-    return lambda canvas, at_m: canvas.dashed(_line_px(canvas, at_m), colour, 1.6, on_px, off_px)
+    return lambda canvas, at_m: canvas.draw_dashes(
+        _line_px(canvas, at_m), colour, 1.6, on_px, off_px
+    )
 
 
 def _solid(colour: Colour) -> _Sample:
@@ -231,7 +233,7 @@ def _patch(colour: Colour) -> _Sample:
 
 def _between(canvas: Canvas, at_m: Spot) -> None:
     _patch(palette.ROAD)(canvas, at_m)
-    canvas.dashed(_line_px(canvas, at_m, 16.0), palette.LANE_LINE, 3.0, 8.0, 6.0)
+    canvas.draw_dashes(_line_px(canvas, at_m, 16.0), palette.LANE_LINE, 3.0, 8.0, 6.0)
 
 
 # --- Keys ----------------------------------------------------------------------------

@@ -59,8 +59,8 @@ def draw_walks(ground: Canvas, walkers: list[tuple[TrafficAgent, MarkStyle]]) ->
         line = ground.px(np.array([[agent.x_m, agent.y_m], agent.walk_to_m]))
         line = _move_apart(line, drawn)
         drawn.append(line)
-        ground.dashed(line, palette.PAPER, 5.5, 9.5, 3.5)
-        ground.dashed(line, style.fill, 2.5, 8.0, 5.0)
+        ground.draw_dashes(line, palette.PAPER, 5.5, 9.5, 3.5)
+        ground.draw_dashes(line, style.fill, 2.5, 8.0, 5.0)
         _arrow_head(ground, line, palette.PAPER, 10.0)
         _arrow_head(ground, line, style.fill, 7.0)
 
@@ -72,7 +72,7 @@ def draw_trails(ground: Canvas, trails: Sequence[Trail]) -> None:
         if len(line) > 1 and trail.sets_out:
             ground.stroke(line, palette.TRAIL[2], 1.5)
         elif len(line) > 1:
-            ground.dashed(line, palette.TRAIL[0], 2.5, 9.0, 9.0)
+            ground.draw_dashes(line, palette.TRAIL[0], 2.5, 9.0, 9.0)
     spots = [(number, spot) for trail in trails for number, spot in enumerate(trail.spots)]
     for number, spot in sorted(spots, key=lambda entry: -entry[0]):
         colour = palette.TRAIL[min(number, len(palette.TRAIL) - 1)]

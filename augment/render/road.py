@@ -139,7 +139,7 @@ def draw_goal(ground: Canvas, scene: Scene) -> None:
     end_m = min(route.line.length_m, route.ego_s_m + _GOAL_TO_M)
     way = route.line.between(route.ego_s_m + _GOAL_FROM_M, end_m)
     dash_px = 1.5 * ground.camera.px_per_m
-    ground.dashed(ground.px(way.points_m), palette.EGO_MARK.fill, 2.0, dash_px, dash_px)
+    ground.draw_dashes(ground.px(way.points_m), palette.EGO_MARK.fill, 2.0, dash_px, dash_px)
 
 
 def raster(low_m: float, high_m: float) -> list[float]:
@@ -258,7 +258,7 @@ def _lane_lines(ground: Canvas, scene: Scene, strips: list[Strip]) -> None:
             # The neighbour on the right draws the common line, but this one does not know of it.
             dashed.append(right)
         for line in dashed:
-            ground.dashed(ground.px(line), palette.LANE_LINE, width_px, dash_px, dash_px)
+            ground.draw_dashes(ground.px(line), palette.LANE_LINE, width_px, dash_px, dash_px)
     # All solid lines come last. They lie a little inside their own lane, where there is road
     # beyond them: two lanes that meet head on get a double line.
     is_road = [_has_road_beyond(ground, line, side) for line, side in margins]
@@ -297,7 +297,7 @@ def _centrelines(ground: Canvas, scene: Scene, lanes: list[AnyLane]) -> None:
             ground.stroke(ground.px(line.points_m), palette.CONNECTOR, 1.0)
             continue
         colour, width = (palette.OWN_LANE, 1.8) if lane.id in own else (palette.OTHER_LANE, 1.4)
-        ground.dashed(ground.px(line.points_m), colour, width, 1.2 * scale, 1.3 * scale)
+        ground.draw_dashes(ground.px(line.points_m), colour, width, 1.2 * scale, 1.3 * scale)
         count = max(1, round(line.length_m / _CHEVRON_EVERY_M))
         for index in range(count):
             pose = line.pose_at((index + 0.5) * line.length_m / count)

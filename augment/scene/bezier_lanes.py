@@ -41,7 +41,7 @@ class Tolerance:
     position_m: float = 0.092
     heading_rad: float = math.radians(2.9)
 
-    def loosened(self, factor: float) -> "Tolerance":
+    def loosen(self, factor: float) -> "Tolerance":
         """Return so many times as much."""
         return Tolerance(factor * self.position_m, factor * self.heading_rad)
 
@@ -51,7 +51,7 @@ class Tolerance:
         return float((np.array([piece.error for piece in pieces]) / limits).max())
 
 
-STRAIGHT = Tolerance().loosened(0.75)
+STRAIGHT = Tolerance().loosen(0.75)
 """What is within three quarters of it of a straight line is written as one."""
 
 

@@ -114,7 +114,7 @@ class Length:
         """True if a value has to be drawn from it."""
         return self.high_m > self.low_m
 
-    def drawn(self, rng: Generator) -> float:
+    def draw(self, rng: Generator) -> float:
         """Return a length of the range, evenly drawn."""
         return float(rng.uniform(self.low_m, self.high_m))
 
@@ -135,7 +135,7 @@ class Amount:
     _takes_one_number = model_validator(mode="before")(_fill_high)
     _is_ordered = model_validator(mode="after")(_check_order)
 
-    def drawn(self, rng: Generator) -> float:
+    def draw(self, rng: Generator) -> float:
         """Return a number of the range, evenly drawn."""
         return float(rng.uniform(self.low, self.high))
 

@@ -155,11 +155,11 @@ def _plan_movements(
             mover.react(places)
             rows[mover.agent.id].append(mover.state())
     return {
-        mover.agent.id: _carried_out(mover, np.array(rows[mover.agent.id])) for mover in movers
+        mover.agent.id: _to_movement(mover, np.array(rows[mover.agent.id])) for mover in movers
     }
 
 
-def _carried_out(mover: PlannedMover, states: FloatArray) -> Movement:
+def _to_movement(mover: PlannedMover, states: FloatArray) -> Movement:
     """A motion or a walk with its states; a walk that leads nowhere, or never begins, stands."""
     agent, started_s, source = mover.agent, mover.started_s, MotionSource.PLANNED
     if agent.motion is None:

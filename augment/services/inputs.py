@@ -56,7 +56,7 @@ class Input:
         """The label with the unit."""
         return f"{self.label}, {self.unit}" if self.unit else self.label
 
-    def shown(self, value: Any) -> str:
+    def show(self, value: Any) -> str:
         """Return a value as a page shows it."""
         if self.kind is InputKind.SWITCH:
             return "yes" if value else "no"

@@ -91,7 +91,7 @@ class PdmClosed:
     def plan(self, situation: planning.Situation) -> planning.Plan:
         """Roll out, simulate and judge proposals, and continue the best, or brake."""
         ego, body, paths = situation.ego, self._body, self._paths
-        forecast = planning.foresee(self._seen(situation), WHOLE_STEPS * STEP_S)
+        forecast = planning.foresee(self._see(situation), WHOLE_STEPS * STEP_S)
         ego_m = self._road.centreline.station_of(ego)
         limit = self._road.limit_at(ego_m)
         targets = SPEED_SHARES * (planning.FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
@@ -117,7 +117,7 @@ class PdmClosed:
         stations = np.concatenate([begun[path, policy], goes_on[path, policy, 1:]])
         return planning.Plan(poses=paths.paths[path].poses(stations), proposals=shown)
 
-    def _seen(self, situation: planning.Situation) -> Objects:
+    def _see(self, situation: planning.Situation) -> Objects:
         """The objects that count: near, and not touching the ego since some step."""
         box = self._body.boxes(situation.ego)
         near = planning.nearest(situation.objects, box[:2])
@@ -168,7 +168,7 @@ class PdmClosed:
                     station, corridor, step // planning.STEPS_A_SLICE, reaches_m
                 )
             gap = near - station - self._body.front_m
-            pull = PROPOSAL_IDM.clipped(speed, targets_mps, gap, leader)
+            pull = PROPOSAL_IDM.clip(speed, targets_mps, gap, leader)
             station = station + speed * STEP_S
             speed = np.maximum(speed + pull * STEP_S, 0.0)
             stations.append(station)

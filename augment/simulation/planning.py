@@ -117,7 +117,7 @@ class Idm:
         free = (speed / np.maximum(target, 1e-9)) ** self.exponent
         return self.max_acceleration_mps2 * (1.0 - free - (wished / gap) ** 2)
 
-    def clipped(
+    def clip(
         self, speed: FloatArray, target: FloatArray, gap: FloatArray, leader_speed: FloatArray
     ) -> FloatArray:
         """Return the law with the gap held at the minimum gap, within the driver's limits."""
@@ -273,7 +273,7 @@ class IdmPlanner:
             gap = rear_m - station - self._body.front_m
             limit = self._road.limit_at(station) if self._target is None else self._target
             wish = FALLBACK_LIMIT_MPS if math.isnan(limit) else limit
-            pull = PLANNER_IDM.clipped(*(np.array(part) for part in (speed, wish, gap, leader)))
+            pull = PLANNER_IDM.clip(*(np.array(part) for part in (speed, wish, gap, leader)))
             station += speed * STEP_S
             speed = max(0.0, speed + float(pull) * STEP_S)
             rear_m += leader * STEP_S

@@ -271,7 +271,7 @@ class LaneDrivers:
         """Go one step on, given all objects of this moment with the ego among them."""
         gap, leader_speed = self._leaders(everybody)
         wishes = self._at(self.stations)[:, 3]
-        pull = TRAFFIC_IDM.clipped(self.speeds, wishes, gap, leader_speed)
+        pull = TRAFFIC_IDM.clip(self.speeds, wishes, gap, leader_speed)
         self.stations = self.stations + self.speeds * STEP_S
         self.speeds = np.maximum(self.speeds + pull * STEP_S, 0.0)
         self._sweep_s = SWEEP_S

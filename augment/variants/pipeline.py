@@ -248,7 +248,7 @@ class _Work:
             messages = fill.regenerate_messages(
                 messages, verdict.feedback, is_measured=verdict.is_measured
             )
-        return self._kept(rounds, fault)
+        return self._choose_round(rounds, fault)
 
     def _draft(self, messages: Messages, form: Form) -> tuple[ReadReply, Messages]:
         """Return one answer, read, and the conversation up to and including it."""
@@ -324,7 +324,7 @@ class _Work:
         note(head | verdict.document)
         return verdict, ""
 
-    def _kept(self, rounds: list[_Round], fault: str) -> tuple[_Round, str]:
+    def _choose_round(self, rounds: list[_Round], fault: str) -> tuple[_Round, str]:
         """Return the round that counts, and a remark about it.
 
         An unreviewed last round came after all the feedback and counts.

@@ -61,7 +61,7 @@ def list_poses(here: Scene) -> Iterator[Pose]:
     for number, (share, line) in enumerate((share, one) for share in SHARES for one in lines):
         pose = line.pose_at(share * line.length_m, LEFT_M[number % len(LEFT_M)])
         if math.hypot(pose.x_m, pose.y_m) < 60.0:
-            yield pose.turned(TURNED_RAD[number % len(TURNED_RAD)])
+            yield pose.turn(TURNED_RAD[number % len(TURNED_RAD)])
 
 
 def draw_objects(here: Scene, most: int) -> Iterator[TrafficAgent]:

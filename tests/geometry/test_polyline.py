@@ -23,8 +23,8 @@ def test_a_line_is_read_by_its_arc_length_left_is_positive_and_its_ends_go_strai
 
 
 def test_resampling_keeps_both_ends() -> None:
-    assert ELL.resampled(8.0).points_m.tolist() == [[0, 0], [8, 0], [10, 6], [10, 10]]
-    assert len(ELL.resampled(5.0).points_m) == 5
+    assert ELL.resample(8.0).points_m.tolist() == [[0, 0], [8, 0], [10, 6], [10, 10]]
+    assert len(ELL.resample(5.0).points_m) == 5
 
 
 @given(s=st.floats(0.5, 110.0), d=st.floats(-1.7, 1.7))

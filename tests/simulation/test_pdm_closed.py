@@ -245,7 +245,7 @@ def test_nothing_changes_at_the_steady_gap(driver: Idm, speed: float) -> None:
 def test_a_free_road_pulls_with_all_that_is_left() -> None:
     free = np.array(np.inf)
     for speed, pull in [(0.0, 1.0), (5.0, 1.0 - 0.5**4), (10.0, 0.0)]:
-        found = TRAFFIC_IDM.clipped(np.array(speed), np.array(10.0), free, np.array(0.0))
+        found = TRAFFIC_IDM.clip(np.array(speed), np.array(10.0), free, np.array(0.0))
         assert found == pytest.approx(pull)
 
 

@@ -40,7 +40,7 @@ def jobs_page(request: HttpRequest) -> HttpResponse:
     listing = read_listing(request, choices)
     rows = GenerationJob.objects.select_related("launched_by__person")
     rows = listing.narrow(rows, "name", by=["state"]).order_by("-created_at", "-pk")
-    if listing.chosen("by"):
+    if listing.find_choice("by"):
         rows = rows.filter(launched_by=get_user(request))
     page = read_page(request, rows, size=JOBS_AT_ONCE)
     counted = progress.count_each(list(page.object_list))

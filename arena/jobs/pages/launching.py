@@ -109,7 +109,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         rows = [*named.select_related("endpoint"), *self.cells_chosen]
         return list({row.slug: row for row in rows}.values())
 
-    def estimated(self) -> JobEstimate | None:
+    def find_estimate(self) -> JobEstimate | None:
         """Return the job's estimate from the fields chosen so far, without a name or caps."""
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
@@ -181,7 +181,7 @@ def _show_estimate(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     """Show the form as it came in, with what the job would use; nothing is launched."""
     more: dict[str, Any] = {}
     with refusals_in(form):
-        more = {"estimate": form.estimated(), "cap_usd": form.cleaned_data.get("cap_usd")}
+        more = {"estimate": form.find_estimate(), "cap_usd": form.cleaned_data.get("cap_usd")}
     return _page(request, form, **more)
 
 

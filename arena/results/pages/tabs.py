@@ -208,7 +208,7 @@ _DISTANCES = {"wish": "distance to the wish", "displacement": "displacement"}
 
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distances to the wishes and from the references."""
-    lines = _keyed(table, {line.slug: line for line in snapshot.results.displacement})
+    lines = _key_rows(table, {line.slug: line for line in snapshot.results.displacement})
     drawn = make_scatters(snapshot, table)
     return {
         "lines": lines,
@@ -237,7 +237,7 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against money, by class of model."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
-    lines = _keyed(table, {line.slug: line for line in snapshot.results.cost})
+    lines = _key_rows(table, {line.slug: line for line in snapshot.results.cost})
     return {
         "lines": [
             line
@@ -295,7 +295,7 @@ def _mark(share: Estimate) -> PlacedInterval | None:
     return PlacedInterval(lower=lower, rating=value, upper=upper)
 
 
-def _keyed(table: LeaderboardTable, values: Mapping[str, Any]) -> list[Context]:
+def _key_rows(table: LeaderboardTable, values: Mapping[str, Any]) -> list[Context]:
     """Return each contestant's results, with its key in the charts."""
     return [
         {"key": key, "row": row, "found": values[row.slug]}

@@ -71,7 +71,7 @@ def board_remarks(board: Leaderboard, arrays: VoteArrays, *more_warnings: str) -
         order=tuple(line.name for line in board.standings),
         parts={line.name: line.part for line in board.lines if line.part >= 0},
         above=None if board.is_few else above,
-        p_values=None if judged is None or board.is_few else judged.judged(names),
+        p_values=None if judged is None or board.is_few else judged.judge_pairs(names),
         seems_above=above if board.is_few else None,
     )
 

@@ -60,7 +60,7 @@ class ScenarioForm(forms.Form):
         super().__init__(*args, **kwargs)
         offer(self, "type", [("", "As the drawing looks"), *scenes.type_choices()])
 
-    def wanted(self) -> dict[str, Any]:
+    def to_values(self) -> dict[str, Any]:
         """Return the scenario's fields from a valid form.
 
         Raises:
@@ -102,7 +102,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = ScenarioForm(request.POST or usual)
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
-            wanted = form.wanted()
+            wanted = form.to_values()
             if original is not None and not wanted["derives"]:
                 wanted |= {"intent": original.intent, "intent_origin": original.intent_origin}
             reference = editing.reference_document(
@@ -146,7 +146,7 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = ScenarioForm(request.POST or _form_values(scenario))
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
-            content = scenes.ScenarioContent(**form.wanted())
+            content = scenes.ScenarioContent(**form.to_values())
             services.change_scenario(scenario, content, actor=get_user(request))
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, f"“{scenario.slug}” is changed.")

@@ -44,7 +44,7 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     chosen = queries.set_asked(request.GET.get("set"))
     choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    scenarios = queries.list_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
+    scenarios = queries.list_scenarios(chosen, is_retired=bool(listing.find_choice("offered")))
     scenarios = scenarios.filter(paraphrase_of=None)
     scenarios = listing.narrow(scenarios, "slug", "instruction", "base_scene__slug", by=["type"])
     page = read_page(request, scenarios, size=SCENARIOS_AT_ONCE)

@@ -59,7 +59,7 @@ def studies_page(request: HttpRequest) -> HttpResponse:
     listing = read_listing(request, {"state": ("State", states)})
     rows = listing.narrow(queries.list_studies(), "name", by=["state"])
     page = read_page(request, rows, size=STUDIES_AT_ONCE)
-    shows_drafts = page.number == 1 and listing.chosen("state") in ("", DRAFT)
+    shows_drafts = page.number == 1 and listing.find_choice("state") in ("", DRAFT)
     context = {
         "studies": queries.count_progress(page.object_list),
         "drafts": list(queries.find_drafts(listing.search)) if shows_drafts else [],
@@ -88,7 +88,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "shows_links": any(line.may_be_invited or line.invitation for line in lines),
         "contestants": study.contestants.all(),
         "rules": [
-            (field.label, field.shown(getattr(study_plan, field.name)))
+            (field.label, field.show(getattr(study_plan, field.name)))
             for field in PLAN_INPUTS
             if field.kind not in long
         ],

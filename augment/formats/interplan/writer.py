@@ -67,7 +67,7 @@ def write(cells: Sequence[Cell]) -> Output:
     by_token: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
     runs: list[NuplanScenario] = []
     for entry, index in zip(entries, _list_numbers(entries), strict=True):
-        by_token[entry.token][index] = entry.written()
+        by_token[entry.token][index] = entry.to_entry()
         losses += entry.report.losses
         name = f"{entry.token}-s{index}"
         comments.append(f"{name} {entry.cell.scene.name}: {entry.cell.name}")
@@ -144,7 +144,7 @@ class _Entry:
             name=cell.name,
         )
 
-    def written(self) -> dict[str, Any]:
+    def to_entry(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
         entry = dict(self.source.entry)
         config = interplan.format_suffix(self.cell.scene.options, entry.pop("config", None) or "")
