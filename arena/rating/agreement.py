@@ -228,6 +228,7 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
     if not len(hits):
         return Estimate(value=None)
     value = float(hits.mean())
+    # One expert on one scenario: in both kinds of clusters, so taken off once.
     cells = _variance(hits, expert * (scenario.max() + 1) + scenario)
     sides = [_variance(hits, of) for of in (expert, scenario) if len(np.unique(of)) > 1]
     fewest = min((side.clusters for side in sides), default=1)
@@ -237,6 +238,7 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
     variance = max(variance, LEAST * cells.value)
     if fewest == 1 or variance < _NOTHING:
         return Estimate(value=value)
+    # The derivative of the logit of p is 1 / (p (1 - p)).
     half = float(t_quantile(fewest - 1)) * math.sqrt(variance) / (value * (1.0 - value))
     middle = float(logit(value))
     lower, upper = expit([middle - half, middle + half]).tolist()
@@ -312,6 +314,7 @@ def _opinion(votes: _NumberedVotes, rater: NamedRater) -> tuple[FloatArray, Floa
 
 def _other_experts(votes: _NumberedVotes) -> tuple[FloatArray, FloatArray]:
     """(V,) the mean of what the other experts prefer in each vote's pair, and of their ties."""
+    # The expert's own votes on a pair, which are taken off all votes on it.
     own = votes.pair_of * (int(votes.expert.max()) + 1) + votes.expert
     _, own = np.unique(own, return_inverse=True)
 
@@ -340,6 +343,7 @@ def _line(
     if scenario_type:
         is_asked &= np.array(votes.types) == scenario_type
     is_known = is_asked & ~np.isnan(lean)
+    # 1 where both name the same, 1/2 for a tie, 0 for the opposite; means lie between.
     hits = 0.5 + 0.5 * votes.sign[is_known] * lean[is_known]
     expert, scenario = votes.expert[is_known], votes.scenario[is_known]
     ties = round(float(tied[is_known].sum()))

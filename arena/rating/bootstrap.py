@@ -35,6 +35,7 @@ from arena.rating.rules import Unit
 
 _NUMBERS_AT_ONCE = 1_000_000
 """How many numbers a block of rounds may hold; more only costs memory."""
+# How many truth values of (n, C, C) closures may be held at once.
 _NUMBERS_OF_COMPONENTS = 4_000_000
 _SHORT_SIGMAS, _TAIL_SIGMAS = 2.0, 7.5
 """How many standard deviations Poisson draws fall short of the votes, so that 2 in 100 rounds get
@@ -42,6 +43,7 @@ too many; and where their distributions end."""
 _CELLS = 4096
 """Of the table of a distribution, a power of two."""
 FEWEST_ROUNDS = 200
+# Numbers that all test rounds together may touch before fewer than asked for are drawn.
 _WORK = 6_000_000
 
 
@@ -62,6 +64,7 @@ class Rounds:
     @classmethod
     def of_outcomes(cls, drawn: FloatArray) -> Self:
         """Return those in which low won, neither or high won so often: (3 P, B), overwritten."""
+        # Views (P, B) of `drawn`: losses become games and wins the score of low, in place.
         wins, ties, losses = drawn.reshape(3, -1, drawn.shape[1])
         of_all = ties.sum(axis=0)
         losses += wins
@@ -95,16 +98,20 @@ def resample(
         seed: The same seed gives the same rounds.
     """
     if unit is Unit.VOTE:  # votes of one pair and outcome are alike: draw counts of them
+        # (3 P,): all pairs' wins of low, then their ties, then their losses.
         seen = counts.outcomes.T.ravel()
         draw_votes = _vote_draws(seen, np.random.default_rng(seed))
         yield from (Rounds.of_outcomes(draw_votes(size)) for size in _blocks(rounds, len(seen)))
         return
     pairs = len(counts.low)
+    # (R,) in the order that `of_outcomes` reads: wins of low by pair, then ties, then losses.
     place = counts.outcome_of * pairs + counts.pair_of
+    # Sorted by place, the rows of one count are one run, and reduceat adds each run at once.
     order = np.argsort(place, kind="stable")
     outcomes, starts = np.unique(place[order], return_index=True)
     clusters = [(draw, of_row[order]) for draw, of_row in _cluster_draws(votes, unit, seed)]
     for size in _blocks(rounds, len(votes)):
+        # (R, B): votes of the row, times how often its expert and its scenario are drawn.
         weight = np.repeat(votes.count[order, None].astype(np.float64), size, axis=1)
         for draw, of_row in clusters:
             weight *= draw(size)[of_row]
@@ -134,32 +141,40 @@ def _vote_draws(seen: IntArray, rng: np.random.Generator) -> Callable[[int], Flo
     one lookup in a table of even cells; where a cell holds several, a second number decides.
     """
     total = int(seen.sum())
+    # Kinds that were seen equally often share one of D distributions: (D,), and (K,) which.
     different, row = np.unique(seen, return_inverse=True)
+    # The sum of all counts has the deviation sqrt(total): the means fall short by two of them.
     means = different * (1.0 - min(1.0, _SHORT_SIGMAS / np.sqrt(total)))
     spread = _TAIL_SIGMAS * np.sqrt(means) + 20.0
     lowest = np.maximum(means - spread, 0.0).astype(np.int64)
     sizes = (means + spread).astype(np.int64) - lowest
     ends = np.cumsum(sizes)
+    # The counts of all D distributions one after the other, from `lowest` of each on.
     values = np.arange(ends[-1]) + np.repeat(lowest - ends + sizes, sizes)
     mean = np.repeat(np.maximum(means, 1e-300), sizes)
+    # m^k e^-m / k! by logarithms, as k! and m^k overflow.
     chances = np.exp(values * np.log(mean) - mean - gammaln(values + 1.0))
     # All distributions are one: that of row d goes from d to d + 1.
     below = np.cumsum(chances / np.repeat(np.add.reduceat(chances, ends - sizes), sizes))
     end = np.repeat(np.arange(1.0, len(ends) + 1.0), sizes)
     below = np.clip(below, end - 1.0, end)  # sums are rounded
     below[ends - 1] = end[ends - 1]
+    # Cells wholly within one value's interval hold that value and need no search.
     last_cell = np.ceil(below * _CELLS).astype(np.int64)
     value_of_cell = np.repeat(values.astype(np.float64), np.diff(last_cell, prepend=0))
     value_of_cell[last_cell - 1] = -1.0  # where one value ends and the next may begin
     row *= _CELLS
+    # (votes,) the kind of each single vote, for those that are drawn singly.
     kind_of = np.repeat(np.arange(len(seen)), seen)
 
     def draw_poisson(rounds: int) -> FloatArray:
         size = len(row) * rounds  # 16 bits of chance each, four to a number
         bits = rng.bit_generator.random_raw(size // 4 + 1).view(np.uint16)[:size]
+        # (K, B): the low bits are an even cell, as _CELLS is a power of two.
         cell = row[:, None] + (bits.reshape(-1, rounds) & (_CELLS - 1))
         drawn = value_of_cell.take(cell)
         is_open = np.flatnonzero(drawn < 0.0)
+        # Even within the cell as well: the whole is uniform from d to d + 1.
         exact = (cell.ravel()[is_open] + rng.random(len(is_open))) / _CELLS
         drawn.ravel()[is_open] = values[np.searchsorted(below, exact, side="right")]
         return drawn
@@ -170,6 +185,7 @@ def _vote_draws(seen: IntArray, rng: np.random.Generator) -> Callable[[int], Flo
             drawn[:, over] = draw_poisson(len(over))
         missing = missing.astype(np.int64)
         singly = kind_of[rng.integers(0, total, size=missing.sum())]
+        # Flat places of (K, B); `add.at`, because one may be drawn several times in a round.
         place = singly * rounds + np.repeat(np.arange(rounds), missing)
         np.add.at(drawn.reshape(-1), place, 1.0)
         return drawn
@@ -181,6 +197,7 @@ def _cluster_draws(
     votes: Comparisons, unit: Unit, seed: int
 ) -> Sequence[tuple[Callable[[int], NDArray[np.float32]], IntArray]]:
     """For each kind of cluster what draws further rounds of it, and (R,) which one a row is in."""
+    # A stream of its own for each kind: experts are drawn alike with and without scenarios.
     children = dict(zip(Unit.TWO_WAY.kinds, np.random.SeedSequence(seed).spawn(2), strict=True))
     draws = []
     for kind in unit.kinds:
@@ -192,6 +209,7 @@ def _cluster_draws(
 
 def _draw_clusters(rng: np.random.Generator, clusters: int, rounds: int) -> NDArray[np.float32]:
     """(G, B) how often each cluster is drawn."""
+    # Flat places cluster * B + round; round by round, so that no size of blocks changes them.
     place = rng.integers(0, clusters, size=(rounds, clusters)).T * rounds
     place += np.arange(rounds)
     drawn = np.bincount(place.ravel(), minlength=clusters * rounds)
@@ -264,6 +282,7 @@ def rate_rounds(
             rounds = block.select(left[first : first + at_once])
             reached = chains_in_sets(met, rounds.games, rounds.scores)
             together = reached & reached.transpose(0, 2, 1)
+            # (P, n): only comparisons within a component have a finite fit (Ford 1957).
             inside = together[:, counts.low, counts.high].T
             inner = replace(rounds, games=rounds.games * inside, scores=rounds.scores * inside)
             rated.append(_place_components(reached, refit(inner, together), by_votes))
@@ -283,11 +302,14 @@ def _place_components(reached: BoolArray, values: FloatArray, by_votes: IntArray
         by_votes: (C,) contestants, most votes first; of components of one size the one with
             whoever has the most votes is the main one.
     """
+    # (N, C, C) who are in one component; its row sums (N, C) are the components' sizes.
     mutual = reached & reached.transpose(0, 2, 1)
     size = mutual.sum(axis=2)
+    # (N,) somebody of the largest component: argmax takes the first of equals, by votes.
     leader = by_votes[np.argmax(size[:, by_votes], axis=1)]
     every = np.arange(len(reached))
     in_main = mutual[every, leader] & (size[every, leader] > 1)[:, None] & ~np.isnan(values.T)
+    # (N, C) who scored against the leader through a chain, and whom the leader scored against.
     above, below = reached[every, :, leader], reached[every, leader, :]
     side = np.where(in_main, 0, above.astype(np.int8) - below.astype(np.int8))
     side[~in_main.any(axis=1)] = 0
@@ -314,6 +336,7 @@ def place_on_one_scale(rating: FloatArray, rounds: RatedRounds) -> tuple[FloatAr
     reference = missing <= MOST_DEGENERATE * rounds.values.shape[1]
     if reference.sum() < 2:
         reference = np.ones(len(rating), dtype=bool)
+    # (C, B) those by whom a round is laid on the data: one shift a round, by their mean gap.
     joined = rounds.in_main & reference[:, None]
     number = joined.sum(axis=0)
     gap = np.where(joined, rating[:, None] - rounds.values, 0.0).sum(axis=0)
@@ -342,6 +365,7 @@ def _quantile(values: FloatArray, share: float) -> FloatArray:
     """(C,) as numpy interpolates it; NaN where one of the two neighbours is infinite."""
     place = (values.shape[1] - 1) * share
     first, last = int(np.floor(place)), int(np.ceil(place))
+    # Only the two neighbours of the quantile must be in their places: no full sort.
     ordered = np.partition(values, [first, last], axis=1)
     low, high = ordered[:, first], ordered[:, last]
     finite = np.isfinite(low) & np.isfinite(high)

@@ -63,6 +63,7 @@ class Chains:
     def main_parts(self) -> list[int]:
         """Return the largest part of each group, the highest of these; none of one alone."""
         group_of_part = self.group_of[[members[0] for members in self.parts]]
+        # The last key counts first: by group, then the largest, then whom the fewest reach.
         order = np.lexsort([self.reaches.sum(axis=0), -self.sizes, group_of_part])
         _, first = np.unique(group_of_part[order], return_index=True)
         return [part for part in order[first].tolist() if self.sizes[part] > 1]
@@ -78,6 +79,7 @@ def chains_among(contestants: int, counts: PairCounts, *, together: bool = False
     """
     met = Meetings(contestants, counts)
     scored = _find_scored(met, counts.games[:, None], counts.scores[:, None])
+    # (1, C, C) with edges both ways: who met, whoever scored.
     connected = closure(scored | scored.transpose(0, 2, 1))[0]
     reached = connected if together else closure(scored)[0]
     part_of = _number_classes(reached & reached.T)
@@ -105,14 +107,17 @@ def are_determined(met: Meetings, games: FloatArray, scores: FloatArray) -> Bool
     Everybody is reached from the first contestant, and reaches it. Eight sets are a byte.
     """
     # Sets beyond the last one fill the last byte up: there everybody scores.
+    # (P, bytes): whether low scored against high, and high against low.
     scored, conceded = ~np.packbits(scores <= 0, axis=1), ~np.packbits(scores >= games, axis=1)
     is_fine = np.full(scored.shape[1], 255, dtype=np.uint8)
+    # First along the edges from the first contestant, then against them.
     for from_low, from_high in ((scored, conceded), (conceded, scored)):
         reached = np.zeros((met.contestants, len(is_fine)), dtype=np.uint8)
         further = reached.copy()
         further[0] = 255
         while (further != reached).any() and not (further == 255).all():
             reached = further.copy()
+            # (P, bytes) each: low's reach goes to high, high's to low; then by who receives it.
             arrived = [reached[met.low] & from_low, reached[met.high] & from_high]
             further[met.present] |= np.bitwise_or.reduceat(
                 np.concatenate(arrived)[met.by_end], met.starts, axis=0
@@ -126,6 +131,7 @@ def closure(edges: BoolArray) -> BoolArray:
     contestants = edges.shape[1]
     reached = np.packbits(edges, axis=2)
     for via in range(contestants):
+        # Whoever reaches `via` reaches all that it reaches; its bit becomes a mask of a byte.
         leads_there = (reached[:, :, via // 8] >> (7 - via % 8) & 1) * np.uint8(255)
         reached |= leads_there[:, :, None] & reached[:, via, None]
     return np.unpackbits(reached, axis=2, count=contestants).view(np.bool_)
@@ -145,6 +151,7 @@ def _number_classes(together: BoolArray) -> IntArray:
     """(C,) the number of each one's class, in the order of their first members."""
     if not len(together):
         return np.empty(0, dtype=np.int64)
+    # Rows of one class are equal, so argmax names its first member.
     return np.unique(together.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
 
 
@@ -255,6 +262,7 @@ def judge_across(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
     parts, pairs = len(chains.sizes), len(votes.names) * (len(votes.names) - 1)
     loser = chains.part_of[np.where(votes.score == 1.0, votes.second, votes.first)]
     number = _independent(votes, _winner_parts(votes, chains) * parts + loser, parts**2, unit)
+    # A coin falls n times alike with 2^-n: that times all ordered pairs is at most 5 %.
     is_told = (number >= np.log2(pairs / (1.0 - LEVEL))).reshape(parts, parts)
     np.fill_diagonal(is_told, False)
     return np.asarray(is_told[np.ix_(chains.part_of, chains.part_of)])
@@ -281,6 +289,7 @@ def _independent(votes: Comparisons, group: IntArray, groups: int, unit: Unit) -
     fewest = np.bincount(group, weights=votes.count, minlength=groups)
     for kind in unit.kinds:
         codes, cluster = np.unique(getattr(votes, kind), return_inverse=True)
+        # Group and cluster as one number: how many different clusters each group has.
         met = np.unique(group * len(codes) + cluster)
         different = np.bincount(met // max(len(codes), 1), minlength=groups)
         fewest = np.where(different > 1, np.minimum(fewest, different), fewest)

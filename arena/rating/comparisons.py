@@ -122,9 +122,11 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
     low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
+    # (R,) one number a pair; counting and a running sum number those that met, without a sort.
     pair = low * contestants + high
     has_met = np.bincount(pair, minlength=1) > 0
     met, pair_of = np.flatnonzero(has_met), (np.cumsum(has_met) - 1)[pair]
+    # Scores 1, 1/2, 0 of `first` become 0, 1, 2, turned round where `first` is the high one.
     outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
     outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
     place = pair_of * 3 + outcome_of
@@ -209,6 +211,7 @@ def share(hits: BoolArray, clusters: IntArray) -> Estimate:
         return Estimate(value=None)
     value = float(hits.mean())
     names, cluster = np.unique(clusters, return_inverse=True)
+    # (G,) hits above what is expected; their squares by G / (G - 1), over n^2.
     surplus = np.bincount(cluster, weights=hits - value, minlength=len(names))
     groups = len(names)
     spread = math.sqrt(float((surplus**2).sum()) * groups / max(groups - 1, 1)) / n

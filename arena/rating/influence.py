@@ -33,6 +33,7 @@ def bradley_terry(votes: Comparisons, is_slight: BoolArray | None = None) -> Flo
     scores: FloatArray = counts.scores
     if is_slight is not None:
         score = 1.0 - 0.5 * counts.outcome_of
+        # From 1 and 0 to 3/4 and 1/4; a tie stays a half.
         graded = np.where(is_slight, 0.5 + (2.0 * SLIGHT - 1.0) * (score - 0.5), score)
         scores = np.bincount(counts.pair_of, weights=votes.count * graded).astype(np.float64)
     start = np.zeros(len(votes.names))
@@ -50,6 +51,7 @@ def without_each_expert(votes: Comparisons, start: FloatArray) -> FloatArray:
     counts = count_pairs(votes)
     experts = int(votes.expert.max(initial=-1)) + 1
     shape = (experts, len(counts.low))
+    # Flat places of (E, P): what each expert gave, to be taken off everybody's.
     place = votes.expert * shape[1] + counts.pair_of
     games = np.bincount(place, minlength=shape[0] * shape[1]).reshape(shape)
     score = 1.0 - 0.5 * counts.outcome_of
@@ -71,6 +73,7 @@ def rank_changes(strengths: FloatArray, without: FloatArray) -> list[int | None]
 
 def _places(strengths: FloatArray) -> IntArray:
     """(n, C) places in the order of strengths, 0 the highest."""
+    # The order of the order is each one's own place.
     return np.asarray(np.argsort(np.argsort(-strengths, axis=1, kind="stable"), axis=1))
 
 

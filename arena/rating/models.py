@@ -31,6 +31,7 @@ ELO_PER_LOGIT = 400.0 / math.log(10.0)
 
 MEAN_ELO = 1000.0
 
+# In logits, as all parameters.
 _TOLERANCE = 1e-9
 _CHORD_TOLERANCE = 1e-7
 """The error that is left is a hundredth of that, 2e-7 points."""
@@ -55,10 +56,13 @@ class Meetings:
 
         self.contestants, self.low, self.high = contestants, counts.low, counts.high
         pairs, shape = np.arange(len(counts.low)), (contestants, len(counts.low))
+        # (C, P), 1 where the contestant is the pair's low or high: times values (P, B) of
+        # pairs they are sums (C, B) by contestant.
         self._of_low, self._of_high = (
             csr_array((np.ones(len(pairs)), (ends, pairs)), shape=shape)
             for ends in (counts.low, counts.high)
         )
+        # All 2 P ends sorted by contestant, and where each one's run starts, for reduceat.
         ends = np.concatenate([counts.high, counts.low])
         self.by_end = np.argsort(ends, kind="stable")
         self.present, self.starts = np.unique(ends[self.by_end], return_index=True)
@@ -107,6 +111,7 @@ def fit(
     left = np.arange(games.shape[1])
     if start is not None and ties is None and together is None and games.size:
         left = _follow_chord(met, games, scores, answer)
+    # Curvatures (B, K, K) and comparisons (P, B) of a block must fit into memory.
     at_once = max(1, _NUMBERS_AT_ONCE // max(1, parameters**2, len(games)))
     for first in range(0, len(left), at_once):
         block = left[first : first + at_once]
@@ -138,6 +143,7 @@ def chances(
     contestants: int, answer: FloatArray, first: IntArray, second: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """(n, ...) the score that `first` (n,) is expected to make against `second`, and of a tie."""
+    # x : v sqrt(x y) : y, all divided by sqrt(x y): with h half the gap, e^h : v : e^-h.
     half_gap = 0.5 * (answer[first] - answer[second])
     win, loss = np.exp(half_gap), np.exp(-half_gap)
     tie = np.exp(answer[-1]) if len(answer) > contestants else 0.0
@@ -158,6 +164,7 @@ def _follow_chord(
     """
     inverse = inverse_curvature(met, games.mean(axis=1), answer[:, 0])
     scored = met.sums(scores, games - scores)
+    # (B,): a round with more comparisons is curved more, about in proportion.
     size = games.sum(axis=0) / games.sum(axis=0).mean()
     moving, now = np.arange(games.shape[1]), answer.copy()
     for _ in range(_MOST_CHORD_STEPS):
@@ -188,6 +195,7 @@ def _climb(
     together: BoolArray | None,
 ) -> FloatArray:
     answer = start.copy()
+    # (C, B); only the rounds that still move are stepped again.
     scored = met.sums(scores, games - scores)
     moving = np.arange(games.shape[1])
     for _ in range(_MOST_STEPS):
@@ -224,6 +232,7 @@ def _step(
     """(K, B) Newton's step; that of the strengths has mean zero."""
     expected, tied = chances(met.contestants, answer, met.low, met.high)
     of_low = games * expected
+    # (C, B) of the log-likelihood: what was scored less what is expected.
     slope = scored - met.sums(of_low, games - of_low)
     curvature = _curvature(met, games, expected, tied, len(answer), together)
     if ties is not None:
@@ -231,6 +240,7 @@ def _step(
         # Where there is no top it flattens out; a trace of steepness changes steps, no answer.
         diagonal = np.arange(len(answer))
         curvature[:, diagonal, diagonal] += 1e-12 * (1.0 + games.sum(axis=0))[:, None]
+    # (B, K, K) against (B, K, 1); rounds are the last axis again.
     return np.asarray(np.linalg.solve(curvature, slope.T[:, :, None])[:, :, 0].T)
 
 
@@ -248,6 +258,7 @@ def _curvature(
     the size of the rest, which leaves steps of mean zero as they are.
     """
     size = met.contestants
+    # (P, B) variances of the scores: E[s^2] = expected - tied / 4.
     weight = games * (expected - 0.25 * tied - expected**2)
     curvature = np.zeros((games.shape[1], parameters, parameters))
     curvature[:, met.low, met.high] = -weight.T
@@ -258,6 +269,7 @@ def _curvature(
     filling = np.where(mean > 0.0, mean, 1.0) / size
     curvature[:, :size, :size] += filling[:, None, None] * together
     if parameters > size:
+        # By log v expected changes by tied (1/2 - expected), tied by tied (1 - tied).
         both = games * tied * (0.5 - expected)
         curvature[:, :size, size] = curvature[:, size, :size] = met.sums(both, -both).T
         curvature[:, size, size] = (games * tied * (1.0 - tied)).sum(axis=0)
@@ -310,10 +322,12 @@ def _draw_votes(
 def _play(halves: FloatArray, places: IntArray, gains: FloatArray, step: float) -> None:
     """Update `halves` (C * B,) by votes, one after the other in all rounds at once."""
     size, _, rounds = places.shape
+    # The halves of the two who meet in each round; `both` is the same memory, flat.
     values = np.empty((2, rounds))
     first, second, both = values[0], values[1], values.reshape(-1)
     moved = np.empty(rounds)
     for place, gain in zip(places.reshape(size, -1), gains, strict=True):
+        # Places are within range; "raise" would go through a buffer.
         halves.take(place, out=both, mode="clip")
         np.subtract(second, first, moved)
         np.tanh(moved, moved)

@@ -55,6 +55,7 @@ def judge_rater(rater: PanelRater) -> Judgement:
     must_look = bool(reasons)
     reliability = Reliability.LOOK if must_look else Reliability.UNKNOWN
     if evidence.scale > 0.0:
+        # In units of the gain that is expected of somebody who judges as the others do.
         attention, error = evidence.gain / evidence.scale, evidence.looking**0.5 / evidence.scale
         reasons.append(
             f"attention {whole_percent(attention)} % ± {whole_percent(MORE * error)}, where "
@@ -85,6 +86,7 @@ def _evidence_of_checks(rater: PanelRater) -> Evidence:
     checks, passed = rater.checks
     if checks - passed == 1:
         checks = passed
+    # A check has a right side: who guesses and does not tie finds it every other time.
     guessing = min(max((1.0 - rater.ties) / 2.0, 0.1), 0.5)
     return Evidence.of_trials(passed, checks, looking=PASSED, guessing=guessing)
 
@@ -99,6 +101,7 @@ def _reasons_to_look(rater: PanelRater) -> list[str]:
             (rater.fast or 0.0) >= TOO_FAST
         ),
         f"{whole_percent(share)} % of the decided votes for the {side}": (
+            # A share of n has the error 1 / (2 sqrt n) at a half: three of these, squared.
             share >= ONE_SIDED and (2.0 * share - 1.0) ** 2 * decided >= 9.0
         ),
         f"failed {checks - passed} of {checks} attention checks": (

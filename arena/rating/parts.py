@@ -144,6 +144,7 @@ def _fit_votes(
     """Return the point estimate, None if the votes determine none in Davidson's model."""
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
     has_ties = rules.method is Method.DAVIDSON and 0 < ties[0] < votes.votes
+    # (P, 1): the data are fitted as a single round.
     games, scores = counts.games[:, None], counts.scores[:, None]
     answer = fit(met, games, scores, ties if has_ties else None)[:, 0]
     if np.isnan(answer).any():
@@ -174,10 +175,12 @@ def _rate_rounds(
         if point.tie_strength is None:
             games, scores = rounds.games, rounds.scores
             return to_elo(fit(met, games, scores, start=point.answer, together=together))
+        # Without ties, or with ties alone, v is 0 or infinite: such rounds stay NaN.
         is_fine = (rounds.ties > 0) & (rounds.ties < rounds.games.sum(axis=0))
         fine = rounds.select(np.flatnonzero(is_fine))
         inside = None if together is None else together[is_fine]
         values = np.full((met.contestants, len(is_fine)), np.nan)
+        # The last row of (C + 1, B) is log v.
         values[:, is_fine] = fit(
             met, fine.games, fine.scores, fine.ties, start=point.answer, together=inside
         )[:-1]
@@ -220,6 +223,7 @@ def _find_intervals(
     if point.pulls is not None:
         spread = estimate_spread(point.pulls, rules.unit, reference)
         founders = reference & np.isin(point.pulls.votes.names, list(rules.founders))
+        # Around one founder alone, that one's interval would have no width.
         is_anchored = founders.sum() > 1
         around = estimate_spread(point.pulls, rules.unit, founders) if is_anchored else spread
         half = around.half_widths()
@@ -236,6 +240,7 @@ def _find_intervals(
         return _Intervals(lower=lower, upper=upper, above=separation.above, separation=separation)
     above = np.zeros((len(rating), len(rating)), dtype=bool)
     samples = values[members]
+    # (B,) rounds that determine every member; too few of them give no distribution.
     is_fine = np.asarray(np.isfinite(samples).all(axis=0))
     if 2 * is_fine.sum() >= len(is_fine):
         apart = above_in_rounds(rating[members], samples[:, is_fine])

@@ -34,7 +34,9 @@ MOST_ROUNDS = 2000
 """By so many a p-value of 5 % is known to one percent."""
 _MANY_CLUSTERS = 200.0
 """So many degrees of freedom make a square as good as known."""
+# Ten times the standardised differences (P * N) that draws hold, but for 500 draws.
 _MOST_KEPT = 20_000_000
+# Numbers in a block of rounds or draws: for memory alone.
 _NUMBERS_AT_ONCE = 2_000_000
 
 
@@ -49,6 +51,7 @@ def ranks(lower: ArrayLike, upper: ArrayLike) -> IntArray:
         (C,) ranks from 1; those who can't be told apart share one.
     """
     lowest_first = np.sort(np.asarray(lower, dtype=float))
+    # How many lower bounds are at most this upper bound.
     not_above = np.searchsorted(lowest_first, np.asarray(upper, dtype=float), side="right")
     return np.asarray(1 + len(lowest_first) - not_above, dtype=np.int64)
 
@@ -108,9 +111,11 @@ def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
         samples: (C, B) of the rounds.
     """
     low, high = np.triu_indices(len(rating), 1)
+    # (P,) of differences over the rounds.
     variance = variances_of_pairs(np.atleast_2d(np.cov(samples)), low, high)
     error = np.sqrt(np.maximum(variance, 1e-300))
     centred = samples - samples.mean(axis=1, keepdims=True)
+    # (B,) of each round, over all pairs: in blocks, as (P, B) may not fit into memory.
     largest = np.zeros(samples.shape[1])
     at_once = max(1, _NUMBERS_AT_ONCE // max(1, samples.shape[1]))
     for first in range(0, len(low), at_once):
@@ -119,6 +124,7 @@ def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
         gaps -= centred[high[some]]
         gaps /= error[some, None]
         np.maximum(largest, np.abs(gaps, out=gaps).max(axis=0, initial=0.0), out=largest)
+    # In 95 % of rounds no pair at all moves by more: that holds for the whole table.
     critical = float(np.quantile(largest, LEVEL)) if len(largest) else np.inf
     apart = _to_square(len(rating), np.abs(rating[low] - rating[high]) / error > critical, False)
     return apart & (rating[:, None] > rating[None, :])
@@ -201,10 +207,12 @@ def join_separations(separations: Sequence[Separation], across: BoolArray) -> Se
     if not separations and not across.any():
         return None
     unknown = np.full(across.shape, np.nan)
+    # fmax passes over NaN: two contestants were judged in one part at most.
     p_value, difference, half = (
         np.fmax.reduce([unknown, *(getattr(part, name) for part in separations)])
         for name in ("p_value", "difference", "half")
     )
+    # Bonferroni: the parts share the 5 %.
     p_value = np.minimum(len(separations) * p_value, 1.0)
     above = (p_value <= 1.0 - LEVEL) & (difference > 0.0)
     return Separation(above=above | across, p_value=p_value, difference=difference, half=half)
@@ -228,6 +236,7 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     )
     error = np.sqrt(np.maximum(variance, 1e-300))
     size = np.abs(rating[low] - rating[high]) / error
+    # (P,): the less certain of the two decides.
     degrees = np.minimum(spread.degrees[low], spread.degrees[high])
     if contestants <= MOST_DRAWN:
         number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // (10 * max(len(low), 1))))
@@ -249,6 +258,7 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
 def holm(p_values: FloatArray) -> FloatArray:
     """Holm's adjusted p-values (1979) of (n,) p-values, in their order."""
     order = np.argsort(p_values, kind="stable")
+    # From the smallest on times n, n - 1, ..., 1, and never less than the one before.
     factors = len(p_values) - np.arange(len(p_values))
     stepped = np.minimum(np.maximum.accumulate(p_values[order] * factors), 1.0)
     adjusted = np.empty(len(p_values))
@@ -265,15 +275,18 @@ def draw_equals(spread: Spread, *, rounds: int, seed: int) -> SingleArray:
     contestants = len(spread.covariance)
     low, high = np.triu_indices(contestants, 1)
     base = variances_of_pairs(spread.base, low, high)
+    # (P,): with two kinds of clusters the cells are in both, as in `estimate_spread`.
     taken_off = max(len(spread.components) - 1, 0) * base
     least = np.maximum(LEAST * base, 1e-30).astype(np.float32)
     clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
+    # A draw makes pulls (G, C) and their squares (C, C).
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
     root = _root(spread.common)
     roots = [_root(component.common) for component in spread.components]
     drawn: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
     for first in range(0, rounds, at_once):
         number = min(at_once, rounds - first)
+        # (N, C) ratings of equals, around 0.
         ratings = rng.standard_normal((number, contestants), dtype=np.float32) @ root
         variances: SingleArray = np.empty((number, len(low)), dtype=np.float32)
         variances[:] = -taken_off
@@ -281,6 +294,7 @@ def draw_equals(spread: Spread, *, rounds: int, seed: int) -> SingleArray:
             variances += variances_of_pairs(spread.covariance, low, high).astype(np.float32)
         for component, of_component in zip(spread.components, roots, strict=True):
             variances += _draw_variances(component, of_component, low, high, number, rng)
+        # (N, P), each over the error that its own draw of squares would show.
         gaps = np.abs(ratings.take(low, axis=1) - ratings.take(high, axis=1))
         drawn[first : first + number] = gaps / np.sqrt(np.maximum(variances, least))
     return drawn.T
@@ -306,16 +320,20 @@ def _draw_variances(
         variances = variances_of_pairs(component.common, low, high).astype(np.float32)
         return np.broadcast_to(variances, (number, len(low)))
     clusters, contestants = max(1, round(degrees)), len(component.common)
+    # (N, G, C) effects of G clusters, each with the covariance `common`.
     pulls = rng.standard_normal((number, clusters, contestants), dtype=np.float32) @ root
     weights = 1.0 / np.maximum(component.common.diagonal(), 1e-30)
+    # (N,) how large the common variance would be found, 1 on average.
     seen = np.einsum("ngc,ngc,c->n", pulls, pulls, weights.astype(np.float32))
     seen /= np.float32(clusters * contestants)
     others = np.sqrt(1.0 - component.own_share)
     moderated = others[:, None] * component.common * others
     shared = variances_of_pairs(moderated, low, high).astype(np.float32)
+    # pulls' pulls (N, C, C) is then the own square, a mean over clusters, by its weight.
     pulls *= np.sqrt(component.own_share / clusters).astype(np.float32)
     squares = np.matmul(pulls.transpose(0, 2, 1), pulls)
     variance = np.diagonal(squares, axis1=1, axis2=2)
+    # (N, P): v_i + v_j - 2 c_ij, the last by the flat place i * C + j.
     own = variance.take(low, axis=1) + variance.take(high, axis=1)
     own -= np.float32(2.0) * squares.reshape(number, -1).take(low * contestants + high, axis=1)
     own += seen[:, None] * shared
@@ -324,6 +342,7 @@ def _draw_variances(
 
 def _root(covariance: FloatArray) -> SingleArray:
     """(C, C): standard normal rows times it have the covariance."""
+    # Not Cholesky's: the covariance is singular along the shift of all ratings.
     values, directions = np.linalg.eigh(0.5 * (covariance + covariance.T))
     root = np.sqrt(np.maximum(values, 0.0))[:, None] * directions.T
     return np.asarray(root, dtype=np.float32)
@@ -332,10 +351,13 @@ def _root(covariance: FloatArray) -> SingleArray:
 def _step_down(size: FloatArray, drawn: SingleArray) -> FloatArray:
     """(P,) adjusted p-values of sizes (P,), by those of equals (P, N)."""
     order = np.argsort(size, kind="stable")
+    # (P, N), smallest difference first: the largest draw of this pair and of all before it.
     largest = np.maximum.accumulate(drawn[order], axis=0)
     reached = (largest >= size[order, None]).sum(axis=1)
+    # The data count as one more draw, so that no p-value is 0.
     stepped = (1.0 + reached) / (1.0 + drawn.shape[1])
     adjusted = np.empty(len(size))
+    # From the largest difference down p-values never become smaller.
     adjusted[order] = np.maximum.accumulate(stepped[::-1])[::-1]
     return adjusted
 

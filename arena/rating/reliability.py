@@ -77,6 +77,7 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         seed: Of its draws.
     """
     ends = np.sort([votes.first, votes.second], axis=0)
+    # Equal columns (expert, scenario, low, high) are one expert's judgements of one unit.
     first = np.unique([votes.expert, votes.scenario, *ends], axis=1, return_index=True)[1]
     table, scenario = unit_table(select_votes(votes, np.sort(first)))
     is_shared = table.sum(axis=1) >= 2
@@ -86,11 +87,13 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
             alpha=nothing, alpha_interval=nothing, percent=nothing, units=0, judgements=0
         )
     scenarios, cluster = np.unique(scenario, return_inverse=True)
+    # (U, 9 + 6): every coefficient is a function of sums over units, which rounds weigh anew.
     by_unit = np.hstack([_coincidences(table), _shares(table)])
     sums = np.zeros((len(scenarios), by_unit.shape[1]))
     np.add.at(sums, cluster, by_unit)
     rng = np.random.default_rng(seed)
     chance = np.full(len(scenarios), 1.0 / len(scenarios))
+    # (B, S) @ (S, 15): how often each scenario is drawn, times its sums.
     drawn = rng.multinomial(len(scenarios), chance, size=rounds) @ sums
     whole = sums.sum(axis=0)[None]
     several = len(np.unique(scenario[is_shared])) > 1
@@ -134,6 +137,7 @@ def krippendorff_alpha(table: IntArray, metric: DifferenceMetric) -> float | Non
 
 def _coincidences(table: IntArray) -> FloatArray:
     """(U, 9): each unit's pairs of values, every value weighing one in all; none of a single."""
+    # n_c (n_k - [c = k]) / (m - 1) in a unit of m values.
     pairs = table[:, :, None] * (table[:, None, :] - np.eye(VALUES, dtype=np.int64))
     others = np.maximum(table.sum(axis=1) - 1, 1)
     return np.asarray((pairs / others[:, None, None]).reshape(len(table), -1))
@@ -152,6 +156,7 @@ def _ac1(sums: FloatArray) -> FloatArray:
     values = sums[:, :-3] / sums[:, -3:-2]
     with np.errstate(invalid="ignore"):
         seen = sums[:, -2] / sums[:, -1]
+    # Gwet's chance: sum p (1 - p) / (q - 1) of q values.
     by_chance = (values * (1.0 - values)).sum(axis=1) / (values.shape[1] - 1)
     return np.asarray((seen - by_chance) / (1.0 - by_chance))
 
@@ -228,6 +233,7 @@ class Evidence:
     @classmethod
     def of_trials(cls, hits: float, trials: float, *, looking: float, guessing: float) -> Self:
         """Return the evidence of hits among trials, given both experts' chances of a hit."""
+        # By how much more a hit says than a miss; constants cancel between gain and expectation.
         weight = math.log(looking / guessing * (1.0 - guessing) / (1.0 - looking))
         return cls(
             gain=weight * (hits - trials * guessing),
@@ -329,6 +335,7 @@ def evidence_of_votes(votes: Comparisons) -> dict[int, Evidence]:
     )
     product, square, size, number = sums.sum(axis=1, keepdims=True) - sums
     with np.errstate(invalid="ignore", divide="ignore"):
+        # (1, E): least squares through zero of the others' leans on what was foreseen of them.
         slope = np.nan_to_num(np.maximum(product, 0.0) / square)
         weight = np.nan_to_num(slope * number / size)
     gain, scale = weight * sums[0], weight * slope * sums[1]
@@ -452,6 +459,7 @@ def evidence_of_repeats(repeats: Repeats, ties: Mapping[int, float]) -> dict[int
         repeats: Of all experts; they are shown with their sides swapped.
         ties: The share of ties of each expert, who would guess with these.
     """
+    # Who guesses ties twice, or names the same side of two by a coin.
     chance = {who: min(ties[who] ** 2 + (1.0 - ties[who]) ** 2 / 2.0, 0.9) for who in ties}
     surplus = {who: alike - n * chance[who] for who, (n, alike) in repeats.by_expert.items()}
     evidence = {}

@@ -72,10 +72,12 @@ class Pulls:
         """The same for ratings whose mean over a reference (C,) is fixed, not everybody's."""
         if reference.all():
             return self
+        # Taking the reference's mean off is linear in the strengths: (C, K) less one row (K,).
         return replace(self, back=self.back - self.back[reference].mean(axis=0))
 
     def by_row(self) -> FloatArray:
         """(C, C) the sandwich of independent votes."""
+        # n equal votes of a row are independent: their squares add up to n times that of one.
         return self._square(self.slopes * np.sqrt(self.votes.count)[:, None])
 
     def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
@@ -83,6 +85,7 @@ class Pulls:
         from scipy.sparse import csr_array
 
         rows = np.arange(len(cluster_of))
+        # (G, R) holding numbers of votes: times slopes (R, K) it sums the pulls by cluster.
         members = csr_array((self.votes.count, (cluster_of, rows)), shape=(clusters, len(rows)))
         return self._square(members @ self.slopes)
 
@@ -93,19 +96,24 @@ class Pulls:
         contestant has votes count.
         """
         size = len(self.votes.names)
+        # (2 R,): a row informs both its contestants, `first` and `second` alike.
         amount = np.tile(self.information * self.votes.count, 2)
         place = np.concatenate([self.votes.first, self.votes.second]) * clusters
+        # Contestant and cluster as one number, contestant * G + cluster; only those that occur.
         met, where = np.unique(place + np.tile(cluster_of, 2), return_inverse=True)
         weights = np.bincount(where, weights=amount)
         total = np.bincount(met // clusters, weights=weights, minlength=size)
+        # w of the module's notation: they add up to 1 over each contestant's clusters.
         shares = weights / total[met // clusters]
         squares, cubes = (
             np.bincount(met // clusters, weights=shares**power, minlength=size) for power in (2, 3)
         )
+        # Rounding must not make 1 - S2 negative.
         return np.minimum(squares, 1.0), cubes.astype(np.float64)
 
     def _square(self, slopes: Any) -> FloatArray:
         """(C, C) of sums of slopes (G, K), sparse, in squared points."""
+        # H^-1 S H^-1, from squared logits to squared points: S (K, K), `back` (C, K).
         squares = (slopes.T @ slopes).toarray()
         return np.asarray(ELO_PER_LOGIT**2 * self.back @ squares @ self.back.T)
 
@@ -120,6 +128,7 @@ def design_matrix(votes: Comparisons, weight: FloatArray, columns: FloatArray) -
     """
     from scipy.sparse import csr_array, hstack  # slow to load
 
+    # Two entries a row, at the columns of its two contestants: sparse, for up to 2,000 columns.
     rows = np.tile(np.arange(len(votes)), 2)
     places = (rows, np.concatenate([votes.first, votes.second]))
     values = np.concatenate([weight, -weight])
@@ -135,10 +144,12 @@ def pulls_of_model(
     expected, tied = chances(size, answer, votes.first, votes.second)
     surprise = votes.score - expected
     has_ties = len(answer) > size
+    # (R, 1) the slope by log v, tied or not less its chance; (R, 0) in Bradley-Terry.
     by_ties = ((votes.score == TIE) - tied)[:, None] if has_ties else np.empty((len(votes), 0))
     return Pulls(
         votes=votes,
         slopes=design_matrix(votes, surprise, by_ties),
+        # The variance of a score of 0, 1/2 or 1, for E[s^2] = expected - tied / 4.
         information=expected - 0.25 * tied - expected**2,
         back=inverse_curvature(met, games, answer)[:size],
     )
@@ -146,6 +157,7 @@ def pulls_of_model(
 
 def without_negative_parts(matrix: FloatArray) -> FloatArray:
     """Few clusters can make a difference of sums negative in some direction: that is cut off."""
+    # `eigh` reads one triangle alone: rounding may not make the two differ.
     matrix = 0.5 * (matrix + matrix.T)
     values, directions = np.linalg.eigh(matrix)
     if values[0] >= 0.0:
@@ -235,6 +247,7 @@ def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None
     base = pulls.by_row()
     single = base.diagonal()
     if len(kinds) > 1:
+        # A cell is one expert on one scenario: votes of a cell hang together both ways.
         cells, cell_of = np.unique(kinds[0][1] * kinds[1][0] + kinds[1][1], return_inverse=True)
         base = pulls.by_cluster(cell_of, len(cells))
     components = tuple(
@@ -245,11 +258,13 @@ def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None
             base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
         degrees = np.full(len(base), _FAR)
         return Spread(covariance=base, degrees=degrees, common=base, base=base, components=())
+    # V(experts) + V(scenarios) - V(cells) (Cameron, Gelbach, Miller 2011).
     covariance = np.asarray(sum(component.covariance for component in components))
     # What clusters add is never negative: equals drawn with less would be told apart too often.
     added = (part.common - base for part in components if part.common.trace() > base.trace())
     if len(components) > 1:
         covariance = covariance - base
+    # Cutting off negative directions widens the diagonal, which is therefore set back.
     least = np.maximum(covariance.diagonal(), LEAST * base.diagonal())
     covariance = _with_variances(without_negative_parts(covariance), least)
     return Spread(
@@ -264,6 +279,7 @@ def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None
 
 def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> FloatArray:
     """(C,) degrees of freedom of variances (C,) that are sums of the components'."""
+    # (sum of variances)^2 / sum of (variance^2 / degrees) (Satterthwaite 1946).
     of_parts = sum(
         component.covariance.diagonal() ** 2 / component.degrees for component in components
     )
@@ -307,7 +323,9 @@ def _component(
     raw = pulls.by_cluster(of_row, clusters)
     uneven, cubes = pulls.concentration(of_row, clusters)
     left_of_votes, left_of_effects = 1.0 - uneven, remaining_share(uneven, cubes)
+    # (C, C) of independent effects of variance S2 each, around the reference's mean.
     effects = _centre(uneven, reference)
+    # t^2 = surplus / room: sum r^2 - b (1 - S2), over S2 (1 - 2 S3 / S2 + S2).
     surplus = raw.diagonal() - base.diagonal() * left_of_votes
     room = effects.diagonal() * left_of_effects
     # Single votes, as cells contain the effect: weights by these would prefer where it is small.
@@ -319,14 +337,19 @@ def _component(
         common = without_negative_parts(common)
         least = np.maximum(common.diagonal(), LEAST * base.diagonal())
         common = _with_variances(common, least)
+    # (C,) the share of single votes in the common variance: it says what the fit left of both.
     of_votes = np.minimum(base.diagonal() / np.maximum(common.diagonal(), 1e-300), 1.0)
     left = of_votes * left_of_votes + (1.0 - of_votes) * left_of_effects
+    # G even clusters have S2 = 1 / G and S3 = 1 / G^2, which makes this G - 1.
     degrees = left / uneven
     with np.errstate(invalid="ignore", divide="ignore"):
         own = np.where(left > 0.0, raw.diagonal() / left, 0.0)
     prior = _prior_degrees(own[reference], common.diagonal()[reference], degrees[reference])
+    # Moderated: (d own + d0 common) / (d + d0), d0 the prior's degrees (Smyth 2004).
     share = degrees / (prior + degrees)
+    # mine^2 raw is share * own, without a division by `left`, which can be 0.
     mine, others = np.sqrt(1.0 / (prior * uneven + left)), np.sqrt(1.0 - share)
+    # No moderated square rests on more than all squares together, less one contestant's.
     everybody = float(degrees[reference].sum()) * (1.0 - 1.0 / reference.sum())
     return Component(
         covariance=mine[:, None] * raw * mine + others[:, None] * common * others,
@@ -347,6 +370,8 @@ def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> 
     if is_usable.sum() < 3:
         return MOST_PRIOR
     ratio, weight = own[is_usable] / common[is_usable], degrees[is_usable]
+    # F with d and d0 degrees, scaled to the mean 1, has the variance
+    # 2/d + (1 + 2/d) 2/(d0 - 4); this and the following lines solve it for d0.
     surplus = float((weight * ((ratio - 1.0) ** 2 - 2.0 / weight)).sum() / weight.sum())
     surplus /= 1.0 + 2.0 / float(weight.mean())
     return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
@@ -356,6 +381,7 @@ def _centre(values: FloatArray, reference: BoolArray) -> FloatArray:
     """(C, C) covariance of independent numbers with these variances (C,), around a mean."""
     number = reference.sum()
     of_mean = np.where(reference, values, 0.0)
+    # cov(x_i - m, x_j - m) = [i = j] v_i - v_i/n - v_j/n + sum v/n^2, m the mean of n members.
     centred = np.diag(values) - (of_mean[:, None] + of_mean) / number
     return np.asarray(centred + of_mean.sum() / number**2)
 
@@ -367,5 +393,6 @@ def _with_variances(covariance: FloatArray, variances: FloatArray) -> FloatArray
     would widen everybody's interval, by a tenth among a thousand.
     """
     now = np.maximum(covariance.diagonal(), 1e-300)
+    # D covariance D with a diagonal D: correlations stay as they are.
     change = np.sqrt(np.where(variances > 0.0, variances / now, 1.0))
     return np.asarray(change[:, None] * covariance * change)

@@ -16,6 +16,7 @@ from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.sandwich import design_matrix
 
 _MOST_STEPS = 60
+# Logits, as the longest step.
 _TOLERANCE = 1e-10
 _LONGEST_STEP = 2.0
 _FAR = 30.0
@@ -100,16 +101,19 @@ def _half_width(sums: FloatArray, squares: FloatArray, weights: FloatArray) -> f
     """
     pulled, even = sums @ sums, weights @ weights
     free = 1.0 - 2.0 * weights
+    # What single votes alone make of sum r^2; the rest is t^2 of the experts, at least 0.
     by_votes = squares @ (free + even)
     effect = max(float(pulled - by_votes), 0.0) / max(float(weights**2 @ (free + even)), 1e-300)
     own = effect * weights**2 + squares
     whole, met, square = own.sum(), own @ weights, own @ own
+    # With own = w^2 v: tr M = sum own (1 - 2 w) + w'w sum own.
     trace = own @ free + even * whole
     of_square = (1.0 + 2.0 * even) * square + 2.0 * own * weights @ (whole * weights - 2.0 * own)
     of_square += 2.0 * met**2 + even * whole * (even * whole - 4.0 * met)
     if trace <= 0.0:
         return 0.0
     degrees = trace**2 / max(float(of_square), 1e-300)
+    # `whole` is w'Vw.
     return float(t_quantile(degrees) * np.sqrt(pulled * whole / trace))
 
 
@@ -118,6 +122,7 @@ def _fit_advantage(votes: Comparisons) -> tuple[float, FloatArray, FloatArray] |
 
     By maximum likelihood, to 1e-10; None where the votes determine no finite answer.
     """
+    # (R, C + 1): 1 and -1 for the two contestants, and 1 for being on the left.
     design = design_matrix(votes, np.ones(len(votes)), np.ones((len(votes), 1)))
     parameters = np.zeros(design.shape[1])
     longest = np.inf
@@ -134,6 +139,7 @@ def _fit_advantage(votes: Comparisons) -> tuple[float, FloatArray, FloatArray] |
         parameters += step * min(1.0, _LONGEST_STEP / max(longest, 1e-300))
     else:
         return None
+    # (R,): by how much the advantage moves for a unit of a row's surprise.
     back = np.asarray(design @ inverse[-1])
     pulls = ELO_PER_LOGIT * (votes.score - expected) * back
     return ELO_PER_LOGIT * float(parameters[-1]), pulls, expected * (1.0 - expected) * back
