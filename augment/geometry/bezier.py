@@ -22,8 +22,11 @@ kink at each of them, and what drives along it does not."""
 
 _KNOTS = np.linspace(0.0, 1.0, 1001)
 """Between these parameters a curve is taken as straight: a chord is some centimetres long."""
+# Rounds of moving the parameters to the nearest points of the curve.
 _REFITS = 8
+# Least and most pieces that a line is cut into, one every half metre between these.
 _FIT_SAMPLES = (12, 120)
+# Distance of the places at which curve and line are compared; their least and most.
 _ERROR_EVERY_M = 0.05
 _ERROR_SAMPLES = (8, 600)
 
@@ -57,6 +60,7 @@ class CubicBezier:
     def points(self, t: FloatArray) -> FloatArray:
         """Return the points (N, 2) at the parameters (N,)."""
         c0, c1, c2, c3 = self._powers
+        # (N, 1) against coefficients (2,), by Horner's scheme.
         column = t[:, None]
         return np.asarray(c0 + column * (c1 + column * (c2 + column * c3)), dtype=np.float64)
 
@@ -114,7 +118,9 @@ def fit(
     curve = _least_squares(points, t, arms)
     for _ in range(_REFITS):
         along, gaps = curve.derivatives(t), curve.points(t) - points
+        # One Gauss-Newton step of |B(t) - p|^2 in each t: (B - p) . B' / |B'|^2.
         share = (gaps * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+        # Never backwards: points that change their order would fold the curve.
         t = np.maximum.accumulate(np.clip(t - share, 0.0, 1.0))
         curve = _least_squares(points, t, arms)
     return curve
@@ -139,6 +145,7 @@ def fit_error(
     gaps = curve.points(t) - line.points_at(stations)
     inner = (stations >= CHORD_REACH_M) & (stations <= line.length_m - CHORD_REACH_M)
     turns = curve.headings(t[inner]) - chord_headings(line, stations[inner])
+    # Turns past pi are the shorter ones the other way round.
     turns = np.abs(np.remainder(turns + math.pi, 2.0 * math.pi) - math.pi)
     return float(np.hypot(gaps[:, 0], gaps[:, 1]).max()), float(turns.max(initial=0.0))
 
@@ -159,6 +166,7 @@ def travel_pose(line: Polyline, s_m: float, d_m: float = 0.0) -> Pose:
     """
     on_m = min(max(s_m, 0.0), line.length_m)
     reach_m = min(CHORD_REACH_M, line.length_m / 2.0)
+    # Near an end the chord is taken further in, and bent by the parabola's second difference.
     inner_m = min(max(on_m, reach_m), line.length_m - reach_m)
     before, middle, after = line.points_at(inner_m + np.array([-reach_m, 0.0, reach_m]))
     bend = (before - 2.0 * middle + after) * (on_m - inner_m) / reach_m
@@ -187,11 +195,15 @@ def _least_squares(
     """The cubic with the first and the last of the points (N, 2), closest to all at t (N,)."""
     first, last = points[0], points[-1]
     rest = 1.0 - t
+    # Bernstein's polynomials (2, N): of the two inner control points, and of the two ends.
     inner = np.stack([3.0 * rest * rest * t, 3.0 * rest * t * t])
     outer = np.stack([rest * rest * rest, t * t * t])
+    # (N, 2): what is left with each inner control point on its own end.
     missing = points - (inner + outer).T @ np.stack([first, last])
+    # Unknown u moves the inner point `side[u]` along `arm[u]`: two by free ends, one by fixed.
     arm = np.concatenate(arms)
     side = np.repeat([0, 1], [len(arms[0]), len(arms[1])])
+    # The normal equations (U, U): sum over t of b_i b_j, times the directions' product.
     square = (inner @ inner.T)[side[:, None], side] * (arm @ arm.T)
     wanted = ((inner @ missing)[side] * arm).sum(axis=1)
     # The normal equations have four unknowns at most; lstsq bears it if they depend on each other.

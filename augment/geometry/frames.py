@@ -12,11 +12,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+# (4, 2) in lengths and widths: front left, rear left, rear right, front right.
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
 def wrap(angle_rad: float) -> float:
     """Return the same direction in (-pi, pi]."""
+    # IEEE's remainder rounds to even and may give -pi, which is outside of the range.
     wrapped = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if wrapped == -math.pi else wrapped
 
@@ -38,6 +40,7 @@ class Pose:
         """Return points (N, 2) of the frame this pose is given in, seen from the pose."""
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
         moved = np.asarray(points_m, dtype=np.float64) - np.array([self.x_m, self.y_m])
+        # Points are rows: p R, where R turns a column by the heading, turns a row back by it.
         return np.asarray(moved @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
     def to_parent(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -108,8 +111,10 @@ def overlap(first: Box, second: Box) -> Overlap:
     if math.dist((first.pose.x_m, first.pose.y_m), (second.pose.x_m, second.pose.y_m)) > reach_m:
         return APART
     one, other = first.corners_m, second.corners_m
+    # (4, 2): the two side directions of each box; no other direction can part rectangles.
     sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
     axes = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
+    # (4 corners, 4 axes): the shadows of the corners on the unit directions.
     a, b = one @ axes.T, other @ axes.T
     ends = np.minimum(a.max(axis=0) - b.min(axis=0), b.max(axis=0) - a.min(axis=0))
     depth_m = float(ends.min())

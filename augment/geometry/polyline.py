@@ -83,6 +83,7 @@ class Polyline:
 
     def position(self, s_m: float, d_m: float = 0.0) -> tuple[float, float]:
         """The point s along the line and d to its left; the ends are extended straight."""
+        # s before or past the ends stays with the first or last segment, which goes on straight.
         index = self._segment(s_m)
         start, direction = self.points_m[index], self._directions[index]
         along = s_m - self.stations_m[index]
@@ -101,11 +102,15 @@ class Polyline:
 
     def project(self, x_m: float, y_m: float) -> Projection:
         """The nearest place on the line; of equally near ones the first."""
+        # (P - 1, 2) from the start of each segment to the point.
         offset = np.array([x_m, y_m]) - self.points_m[:-1]
         along = (offset * self._directions).sum(axis=1)
+        # (P - 1,): how far the foot of the point lies before (negative) or past its segment.
         past = along - np.clip(along, 0.0, np.diff(self.stations_m))
+        # The cross product with a unit direction: the distance to the left.
         left = self._directions[:, 0] * offset[:, 1] - self._directions[:, 1] * offset[:, 0]
         distances = np.hypot(left, past)
+        # argmin takes the first of equally near segments.
         index = int(np.argmin(distances))
         past_m = float(past[index])
         is_past_end = index == (0 if past_m < 0.0 else len(past) - 1)
@@ -119,6 +124,7 @@ class Polyline:
     def resample(self, spacing_m: float) -> Polyline:
         """Points every `spacing_m` from the start; the last point is kept whatever is left."""
         stations = np.arange(0.0, self.length_m, spacing_m)
+        # The end follows by itself: no second point in its place for rounding alone.
         if self.length_m - stations[-1] < 1e-6:
             stations = stations[:-1]
         return self._at(np.concatenate([stations, [self.length_m]]))
@@ -140,6 +146,7 @@ class Polyline:
 
     @cached_property
     def _directions(self) -> FloatArray:
+        # (P - 1, 2), never of length 0: repeats were dropped.
         steps = np.diff(self.points_m, axis=0)
         return np.asarray(steps / np.hypot(steps[:, 0], steps[:, 1])[:, None], dtype=np.float64)
 

@@ -30,6 +30,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "yaw_acceleration_radps2": (-1.93, 1.93),
 }
 """Lowest and highest value of each signal."""
+# Samples.
 _YAW_WINDOW = 5
 
 
@@ -42,6 +43,7 @@ def filter_matrix(count: int, window: int, order: int, derivative: int = 0) -> F
     from scipy.signal import savgol_filter
 
     window = min(window, count)
+    # The filter is linear: what it makes of unit vectors is its matrix, for signals as rows.
     matrix = savgol_filter(
         np.eye(count), window, min(order, window - 1), deriv=derivative, delta=STEP_S, axis=0
     )
@@ -80,12 +82,15 @@ def comfort_signals(
     """
     forward = states[..., ACCELERATION]
     if windows.at_centre:
+        # Yaw rate w of the bicycle, (..., T); the centre's acceleration is a + d (w^2 + w').
         turning = states[..., SPEED] * np.tan(states[..., STEERING]) / body.wheelbase_m
         change = np.diff(turning, axis=-1, prepend=turning[..., :1]) / STEP_S
         forward = forward + body.centre_m * (turning**2 + change)
     count = states.shape[-2]
     rate = filter_matrix(count, windows.jerk, 2, 1)
+    # Smoothed first, then derived: both filters as one matrix (T, T).
     jerk = forward @ (filter_matrix(count, windows.before_jerk, 2) @ rate)
+    # A jump by 2 pi would be an infinite yaw rate.
     heading = np.unwrap(states[..., HEADING], axis=-1)
     return {
         "longitudinal_acceleration_mps2": forward @ filter_matrix(count, windows.acceleration, 2),

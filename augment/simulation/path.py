@@ -31,6 +31,7 @@ class Path:
         self.points_m = points_m
         self.stations_m = np.concatenate([[0.0], np.cumsum(self._lengths)])
         self.length_m = float(self.stations_m[-1])
+        # Unwrapped, so that headings between two segments may be interpolated.
         self._headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         self._directions = steps / self._lengths[:, None]
         # The heading is read between the middles of segments, so that it turns without jumps.
@@ -53,15 +54,20 @@ class Path:
 
         Beyond the ends the line goes on straight.
         """
+        # Segment i leads from point i to point i + 1.
         last = len(self._directions) - 1
         nearest = np.asarray(self._tree.query(points_m)[1], dtype=np.int64)
+        # (2, N): the segments before and after the nearest point.
         candidates = np.stack([np.maximum(nearest - 1, 0), np.minimum(nearest, last)])
         offset = points_m - self.points_m[candidates]
         direction = self._directions[candidates]
+        # The first and the last segment go on without an end.
         low = np.where(candidates == 0, -np.inf, 0.0)
         high = np.where(candidates == last, np.inf, self._lengths[candidates])
+        # (2, N) the foot on each segment, then the squared way from there.
         along = np.clip((offset * direction).sum(axis=-1), low, high)
         distance = ((offset - along[..., None] * direction) ** 2).sum(axis=-1)
+        # (N,) the nearer of the two, the earlier one of equals.
         pick = (distance[1] < distance[0]).astype(np.int64), np.arange(len(points_m))
         left = direction[..., 0] * offset[..., 1] - direction[..., 1] * offset[..., 0]
         side = np.where(left[pick] >= 0.0, 1.0, -1.0)
@@ -77,6 +83,7 @@ class Path:
             return self
         heading = self.poses(self.stations_m)[:, 2]
         moved = self.points_m + left_m * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        # On the inside of a bend tighter than the offset points come to lie in reverse order.
         forward = (np.diff(moved, axis=0) * self._directions).sum(axis=1)
         return Path(moved[np.concatenate([[True], forward > 0.05 * SPACING_M])])
 

@@ -38,17 +38,22 @@ ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
 """The centreline first: of equal scores, all zero among them, the lowest number wins."""
 PAPER_OFFSETS_M = (0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0)
 """The paper says up to 4 m; steps of 1 m and their order are our reading."""
+# Of the speed limit: one policy each.
 SPEED_SHARES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+# Steps of 0.1 s: proposals are judged over 4 s, the plan and what others do go on to 8 s.
 HORIZON_STEPS = 40
 WHOLE_STEPS = 80
 FAULT_WITHIN_S = 2.0
 AT_MOST_MPS = 5.0
 _LOW_MPS = 0.2
+# m/s^2, the limits of the comfort of longitudinal acceleration.
 _HARDEST, _SOFTEST = -4.05, 2.40
 _STILL_MPS = 5e-3
+# Steps of 0.1 s ahead of each moment.
 _TTC_STEPS = (0, 3, 6, 9)
 _PROGRESS_WEIGHT, _TTC_WEIGHT, _COMFORT_WEIGHT = 5.0, 5.0, 2.0
 _LITTLE_PROGRESS_M = 0.1
+# The multiplier that is left after a collision with something static.
 _STATIC_HIT = 0.5
 _ONCOMING_FREE_M, _ONCOMING_HALF_M = 2.0, 6.0
 
@@ -94,15 +99,19 @@ class PdmClosed:
         forecast = planning.foresee(self._see(situation), WHOLE_STEPS * STEP_S)
         ego_m = self._road.centreline.station_of(ego)
         limit = self._road.limit_at(ego_m)
+        # (V,) wished speeds, and how far each leads in 8 s.
         targets = SPEED_SHARES * (planning.FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
         reaches_m = targets * WHOLE_STEPS * STEP_S
         furthest_m = reaches_m.max(keepdims=True)
         corridor = paths.corridor(forecast, ego_m, float(furthest_m[0]), body)
         corridor = self._with_red(corridor, ego_m + body.front_m)
+        # (P, V): every policy on every path starts from the ego's own state.
         speeds = np.full((len(paths.paths), len(targets)), max(float(ego[SPEED]), 0.0))
         starts = np.broadcast_to(paths.stations(np.array([ego_m])), speeds.shape)
         first, rest = range(HORIZON_STEPS), range(HORIZON_STEPS, WHOLE_STEPS)
+        # Over the first 4 s the furthest reach counts for all; then each policy's own.
         begun, speeds = self._roll_out(starts, speeds, targets, furthest_m, corridor, first)
+        # (P, V, T, 3) as (B, T, 3), proposal p * V + v; what is judged is how the car follows it.
         states = track(paths.poses(begun).reshape(-1, HORIZON_STEPS + 1, 3), ego, body)
         judged = score_proposals(states, forecast, self._road, body)
         # Scores that differ by rounding alone are equal, and the lowest number wins.
@@ -114,6 +123,7 @@ class PdmClosed:
         ends = begun[..., -1]
         goes_on, _ = self._roll_out(ends, speeds, targets, reaches_m, corridor, rest)
         path, policy = divmod(best, len(targets))
+        # The last station of the first part is the first one of the second.
         stations = np.concatenate([begun[path, policy], goes_on[path, policy, 1:]])
         return planning.Plan(poses=paths.paths[path].poses(stations), proposals=shown)
 
@@ -121,6 +131,7 @@ class PdmClosed:
         """The objects that count: near, and not touching the ego since some step."""
         box = self._body.boxes(situation.ego)
         near = planning.nearest(situation.objects, box[:2])
+        # Who touches the ego once is never a leader or an obstacle again.
         touching = shapes.meet(box, near.boxes)
         self._touched |= {name for name, hit in zip(near.ids, touching, strict=True) if hit}
         return near.chosen(np.array([name not in self._touched for name in near.ids], dtype=bool))
@@ -130,6 +141,7 @@ class PdmClosed:
         red = self._road.red_stations_m
         red = red[red >= front_m]
         slices, paths = corridor.near_m.shape[:2]
+        # (F, P, R): lights stand still, each as something whose middle is a metre past its line.
         stops = np.broadcast_to(self._paths.stations(red), (slices, paths, len(red)))
         return replace(
             corridor,
@@ -163,12 +175,14 @@ class PdmClosed:
         stations = [station]
         near, leader = np.zeros(station.shape), np.zeros(station.shape)
         for step in steps:
+            # Forecasts have slices of 0.2 s, roll-outs steps of 0.1 s.
             if step % planning.STEPS_A_SLICE == 0:
                 near, leader = self._leaders(
                     station, corridor, step // planning.STEPS_A_SLICE, reaches_m
                 )
             gap = near - station - self._body.front_m
             pull = PROPOSAL_IDM.clip(speed, targets_mps, gap, leader)
+            # Explicit Euler: the place by the speed of before.
             station = station + speed * STEP_S
             speed = np.maximum(speed + pull * STEP_S, 0.0)
             stations.append(station)
@@ -186,11 +200,13 @@ class PdmClosed:
             (self._paths.ends_m - self._body.length_m / 2.0)[:, None], station.shape
         )
         moment = min(moment, len(corridor.near_m) - 1)
+        # (P, 1, A) against stations (P, V, 1).
         near = corridor.near_m[moment][:, None, :]
         if near.shape[-1] == 0:
             return end, np.zeros(station.shape)
         middle, front = corridor.middle_m[moment][:, None, :], station[..., None]
         ahead = (middle > front) & (near - front < reaches_m[:, None])
+        # (P, V, A); argmin takes the first of equally near ones.
         rear = np.where(ahead, near, np.inf)
         closest = rear.min(axis=-1)
         speeds = corridor.speeds_mps[moment][rear.argmin(axis=-1)]
@@ -244,23 +260,27 @@ class _Look:
         self.states, self.road, self.body = states, road, body
         self.boxes = body.boxes(states)
         self.corners = shapes.corners(self.boxes)
+        # Corners (B, T, 4, 2): off the road with any one of them, (B, T).
         self.off_road: BoolArray = np.any(~road.drivable.contains(self.corners), axis=-1)
         self.objects, self.moving_boxes = forecast.objects, forecast.boxes
         self._sizes = shapes.radii(forecast.boxes[0])
 
     def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
         """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
+        # (T,) the slice of each moment; after the last one, that.
         moments = (np.arange(boxes.shape[1]) + later) // planning.STEPS_A_SLICE
         others = self.moving_boxes[np.minimum(moments, len(self.moving_boxes) - 1)]
         reach = (self._sizes + shapes.radii(boxes[0, 0])) ** 2
         dx = boxes[..., None, 0] - others[None, ..., 0]
         dy = boxes[..., None, 1] - others[None, ..., 1]
+        # Circles round the boxes first, (B, T, A): few pairs are left for separating axes.
         proposal, moment, thing = np.nonzero(dx * dx + dy * dy <= reach)
         hit = shapes.meet(boxes[proposal, moment], others[moment, thing])
         return proposal[hit], moment[hit], thing[hit]
 
     def astray(self, proposal: IntArray, moment: IntArray) -> BoolArray:
         """Return whether the ego (K,) is off the road or not on one way; asks a place once."""
+        # Several objects at one moment of a proposal ask for the same place.
         keys, back = np.unique(proposal * self.states.shape[1] + moment, return_inverse=True)
         rows, times = np.divmod(keys, self.states.shape[1])
         wrong = self.off_road[rows, times] | ~self.road.on_one_way(self.corners[rows, times])
@@ -272,6 +292,7 @@ def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
     count, never = look.states.shape[:2]
     multiplier, fault_s = np.ones(count), np.full(count, np.inf)
     proposal, moment, thing = look.contacts(look.boxes, 0)
+    # (B, A) the first moment at which each proposal meets each object; T for never.
     first = np.full((count, len(look.objects)), never)
     np.minimum.at(first, (proposal, thing), moment)
     proposal, thing = np.nonzero(first < never)
@@ -282,6 +303,7 @@ def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
     contacts = classify_contacts(states, boxes, speeds, kinds, look.body)
     guilty = are_at_fault(contacts, look.astray(proposal, moment))
     hits = np.where(kinds == Kind.STATIC, _STATIC_HIT, 0.0)
+    # The worst of a proposal's collisions; `at`, as a proposal may have several.
     np.minimum.at(multiplier, proposal[guilty], hits[guilty])
     np.minimum.at(fault_s, proposal[guilty], moment[guilty] * STEP_S)
     return multiplier, fault_s
@@ -291,9 +313,11 @@ def _direction(look: _Look) -> FloatArray:
     """1, 0.5 or 0 (B,) by the longest way in one go with the centre on no way of the route."""
     centres = look.boxes[..., :2]
     against = ~look.road.on_route.contains(centres)
+    # (B, T): metres driven off the route's ways since the moment before.
     steps = np.zeros(against.shape)
     steps[:, 1:] = np.hypot(*np.moveaxis(np.diff(centres, axis=1), -1, 0)) * against[:, 1:]
     gone = np.cumsum(steps, axis=1)
+    # What was gone when the ego was last on the route: the difference is the present stretch.
     before = np.maximum.accumulate(np.where(against, 0.0, gone), axis=1)
     longest = (gone - before).max(axis=1)
     return np.select([longest < _ONCOMING_FREE_M, longest < _ONCOMING_HALF_M], [1.0, 0.5], 0.0)
@@ -318,6 +342,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
     made = np.ones(len(look.states))
     meetings = [_meetings(look, later) for later in _TTC_STEPS]
     proposal, moment, thing, later = np.concatenate(meetings, axis=1)
+    # By moment, then by how far ahead: the first row of each pair is its first meeting.
     order = np.lexsort((later, moment))
     pairs = (proposal * (len(look.objects) + 1) + thing)[order]
     first = order[np.unique(pairs, return_index=True)[1]]
@@ -326,6 +351,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
     places = look.moving_boxes[moments, thing, :2]
     bearing = shapes.bearings(look.states[proposal, moment], places)
     made[proposal[bearing < AHEAD_RAD]] = 0.0
+    # Those who failed already need no second look at the map.
     beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
     proposal, moment = proposal[beside], moment[beside]
     axles = look.states[proposal, moment][:, [X, Y]]

@@ -26,6 +26,7 @@ STEPS_A_SLICE = 2
 RADIUS_M = 50.0
 MOST: dict[Kind, int] = {Kind.VEHICLE: 50, Kind.PEDESTRIAN: 25, Kind.BICYCLE: 10, Kind.STATIC: 50}
 """How many of each kind PDM-Closed looks at, nearest first."""
+# Who is further behind the ego along the centreline is not laid beside the paths.
 _BEHIND_M = 10.0
 
 
@@ -111,6 +112,8 @@ class Idm:
 
         `gap` is from bumper to bumper; `inf` is a free road.
         """
+        # a (1 - (v / v0)^d - (s* / s)^2), and the wished gap
+        # s* = s0 + max(0, v T + v (v - v_leader) / (2 sqrt(a b))).
         root = 2.0 * math.sqrt(self.max_acceleration_mps2 * self.max_deceleration_mps2)
         moving = self.headway_s * speed + speed * (speed - leader_speed) / root
         wished = self.min_gap_m + np.maximum(moving, 0.0)
@@ -135,6 +138,7 @@ class Forecast:
 
 def foresee(objects: Objects, horizon_s: float) -> Forecast:
     """Return where objects will be at constant velocity along their headings."""
+    # (F,), both ends included.
     times = np.arange(round(horizon_s / SLICE_S) + 1) * SLICE_S
     return Forecast(objects=objects, boxes=objects.later(times))
 
@@ -178,6 +182,7 @@ class ParallelPaths:
         self.ends_m = np.array([path.length_m for path in self.paths])
         # Arc lengths on the centreline that belong to those of each path's points.
         self._on_centre = [
+            # Increasing, as interpolation needs it: in bends feet of parallels can step back.
             np.maximum.accumulate(centreline.beside(path.points_m)[0])
             if path is not centreline
             else centreline.stations_m
@@ -188,6 +193,7 @@ class ParallelPaths:
         """Return arc lengths (P, ...) on the paths, of arc lengths (...) on the centreline."""
         stations = np.empty((len(self.paths), *centre_m.shape))
         for row, on_centre in enumerate(self._on_centre):
+            # Beyond the ends the paths go on straight, a metre a metre.
             inside = np.clip(centre_m, on_centre[0], on_centre[-1])
             on_path = np.interp(inside, on_centre, self.paths[row].stations_m)
             stations[row] = on_path + (centre_m - inside)
@@ -204,17 +210,22 @@ class ParallelPaths:
     ) -> Corridor:
         """Return who meets half the ego's width either side of each path, up to the reach."""
         boxes = forecast.boxes
+        # (F, A, 2): along the centreline, left of it.
         middle = self._beside(boxes[..., :2])
+        # Half the diagonal of each, (A,): whoever cannot come near in any slice is left out.
         size = np.hypot(boxes[0, :, 3], boxes[0, :, 4]) / 2.0
         widest = float(np.abs(self._offsets).max()) + body.width_m / 2.0
         near = np.abs(middle[..., 1]) < widest + size
         near &= (middle[..., 0] > ego_m - _BEHIND_M) & (middle[..., 0] < ego_m + reach_m + size)
         columns = np.flatnonzero(near.any(axis=0))
         boxes, middle = boxes[:, columns], middle[:, columns]
+        # (F, A', 4, 2): A' of A are left.
         edges = self._beside(shapes.corners(boxes))
         low, high = edges[..., 1].min(axis=-1), edges[..., 1].max(axis=-1)
+        # (F, P, A'): (F, 1, A') against offsets (P, 1).
         meets = low[:, None] <= self._offsets[:, None] + body.width_m / 2.0
         meets &= high[:, None] >= self._offsets[:, None] - body.width_m / 2.0
+        # The rear edge on each path: stations (P, F, A') become (F, P, A').
         begin = np.moveaxis(self.stations(edges[..., 0].min(axis=-1)), 0, 1)
         heading = self._centreline.poses(middle[..., 0])[..., 2]
         return Corridor(
@@ -232,6 +243,7 @@ class ParallelPaths:
 PLANNER_IDM = Idm(1.0, 3.0, 4.0)
 """nuPlan's IDM planner."""
 TARGET_MPS = 10.0
+# Who is further from the ego's centre does not count.
 _IDM_RADIUS_M = 40.0
 HORIZON_S = 8.0
 

@@ -25,7 +25,9 @@ from augment.simulation.states import BoolArray, FloatArray, IntArray
 
 ROUTE_M = 600.0
 """Collected ahead of the ego, as far as the map goes: 15 s at 20 m/s, and what a planner sees."""
+# Straight on past the end of the map: a planner's horizon must not end in nothing.
 RUN_OUT_M = 300.0
+# From a way's centreline to an ego that stands on none, at most; and their directions.
 _NEAR_M = 3.0
 _ALIGNED_RAD = math.radians(60.0)
 _DRIVABLE = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
@@ -49,6 +51,7 @@ def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> t
 
     def preference(name: str) -> tuple[bool, int]:
         """The goal first, then how much was driven on a way and, at best, on one after it."""
+        # A way on which no moment of the recording fell still counts by what follows it.
         after = max((seen[following] for following in graph.successors(name)), default=0)
         return name in goal, seen[name] + after
 
@@ -157,6 +160,7 @@ class Road:
             self.centreline = self.path_over(self.route, run_out=_straight_on(last))
         ends = [self.graph.lanes[name].centerline.points_m[-1] for name in self.route]
         stations, _ = self.centreline.beside(np.array(ends))
+        # Increasing, as searches need it, wherever an end falls on a winding line.
         self.route_ends_m = np.maximum.accumulate(stations)
         self._paths: dict[int, Path] = {}
 
@@ -188,6 +192,7 @@ class Road:
     @cached_property
     def red_stations_m(self) -> FloatArray:
         """Stations on the centreline where the route enters connectors with a red light (R,)."""
+        # A way begins where the one before it ends.
         starts = np.concatenate([[0.0], self.route_ends_m[:-1]])
         return starts[np.array([name in self.red for name in self.route], dtype=np.bool_)]
 
@@ -200,12 +205,14 @@ class Road:
     def covering(self, points_m: FloatArray) -> BoolArray:
         """Return which ways (W,) lie under points (N, 2), (N, W); an edge counts as outside."""
         covers = np.zeros((len(points_m), len(self.names)), dtype=np.bool_)
+        # Two rows of indices, of pairs (point, way) alone: "within" leaves out the edge.
         points, ways = self._tree.query(shapely.points(points_m), predicate="within")
         covers[points, ways] = True
         return covers
 
     def on_one_way(self, corners_m: FloatArray) -> BoolArray:
         """Return which boxes (N, 4, 2) lie on one way, or on one and what follows it, (N,)."""
+        # (N, 4, W); all four corners on one way, or each on one or the other of a pair (N, 4, E).
         inside = self.covering(corners_m.reshape(-1, 2)).reshape(-1, 4, len(self.names))
         first, second = self._follows
         both = inside[:, :, first] | inside[:, :, second]
@@ -258,8 +265,10 @@ class Road:
         for before in names:
             for after in self.graph.successors(before):
                 way, following = self.graph.lanes[before], self.graph.lanes[after]
+                # (4, 2): the last edge of one and the first of the other.
                 rim = np.vstack([_rim(way, -1), _rim(following, 0)])
                 if after in names and np.ptp(rim, axis=0).max() < _JOINT_M + way.width_m:
+                    # A millimetre more: edges that only touch would leave a slit in the union.
                     wedges.append(shapely.MultiPoint(rim).convex_hull.buffer(1e-3))
         return np.array(wedges, dtype=object)
 

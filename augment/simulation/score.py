@@ -37,14 +37,18 @@ NO_WAY = -1
 NEAR_M = 5.0
 """So far off every way the ego still counts as on the one it was on."""
 LITTLE_M = 2.0
+# Share of the expert's way.
 ENOUGH_PROGRESS = 0.2
+# Steps of 0.1 s: the window of driving against a lane.
 DIRECTION_STEPS = 11
 WRONG_WAY_FREE_M, WRONG_WAY_HALF_M = 2.0, 6.0
 MAX_OVERSPEED_MPS = 2.23
 OFF_ROAD_M = 0.3
+# nuPlan's bound, and how far ahead meetings are looked for.
 LEAST_TTC_S = 0.95
 TTC_HORIZON_S = 3.0
 _STILL_MPS = 5e-3
+# Values of interPlan's goal lane metric: beside the route at the end, and from the start.
 OFF_GOAL_LANE = 0.5
 NO_START = 0.2607
 _CLASSES = (((Kind.PEDESTRIAN, Kind.BICYCLE), 0), ((Kind.VEHICLE,), 0), ((Kind.STATIC,), 1))
@@ -152,6 +156,7 @@ def score_drive(
 
 def combine(metrics: tuple[Metric, ...]) -> float:
     """Return the product of the multipliers times the weighted mean of the others, 0 to 1."""
+    # What can't be said counts neither as a multiplier nor among the weights.
     product, total, weights = 1.0, 0.0, 0.0
     for metric in metrics:
         if metric.value is None:
@@ -176,6 +181,7 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
         touching = shapes.meet(
             np.broadcast_to(drive.boxes[moment], objects.boxes.shape), objects.boxes
         )
+        # One contact with each object: a car that is pushed on is hit once.
         fresh = np.array([name not in hit_before for name in objects.ids], dtype=bool)
         hit = objects.chosen(touching & fresh)
         hit_before.update(hit.ids)
@@ -284,6 +290,7 @@ def _ego_ways(road: Road, centres_m: FloatArray, headings_rad: FloatArray) -> In
     ways, before = np.full(len(centres_m), NO_WAY, dtype=np.int64), NO_WAY
     for moment, row in enumerate(road.covering(centres_m)):
         candidates, place_m = np.flatnonzero(row), centres_m[moment]
+        # Ways overlap in intersections: staying avoids jumps between them.
         if before != NO_WAY and row[before]:
             ways[moment] = before
         elif len(candidates):
@@ -321,6 +328,7 @@ def _direction(drive: Drive, ways: IntArray) -> float:
             path = drive.road.way_path(int(ways[moment]))
             (before, here), _ = path.beside(centres[moment - 1 : moment + 1])
             steps[moment] = here - before
+    # (T,) metres gone along the lanes in the last 1.1 s; negative is against them.
     window = np.convolve(steps, np.ones(DIRECTION_STEPS))[: len(steps)]
     against_m = -float(window.min())
     if against_m < WRONG_WAY_FREE_M:
@@ -330,6 +338,7 @@ def _direction(drive: Drive, ways: IntArray) -> float:
 
 def _speed_limit(drive: Drive, ways: IntArray) -> float | None:
     """1 less the overspeed, integrated and held against 2.23 m/s throughout."""
+    # (T,); NO_WAY is -1, which reads the NaN at the end.
     limits = np.append(drive.road.limits_mps, np.nan)[ways]
     if np.isnan(limits).all():
         return None
@@ -377,10 +386,13 @@ def _ttc_series(drive: Drive, met: tuple[Collision, ...], *, only_relevant: bool
 
 def _first_meeting(box: FloatArray, state: FloatArray, objects: Objects) -> float:
     """The first of 0.1, 0.2 ... 2.9 s at which the ego's box meets one of the objects."""
+    # (S,) moments ahead.
     times = np.arange(1, round(TTC_HORIZON_S / STEP_S)) * STEP_S
     fastest = abs(state[SPEED]) + np.abs(objects.speeds_mps)
+    # Who is further away than both can drive in that time is left out, (A,).
     reach = shapes.radii(objects.boxes) + shapes.radii(box) + times[-1] * fastest
     near = ((objects.boxes[:, :2] - box[:2]) ** 2).sum(axis=1) <= reach**2
+    # (S, A', 5), the ego's box beside each.
     theirs = objects.chosen(near).later(times)
     mine = np.broadcast_to(box, theirs.shape).copy()
     mine[..., :3] = shapes.move_ahead(mine, (times * state[SPEED])[:, None])

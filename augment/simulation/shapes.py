@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from augment.geometry.polyline import FloatArray
 
 BoolArray = NDArray[np.bool_]
+# (4, 2) in lengths and widths, as `frames.corners`.
 _SIGNS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
@@ -32,6 +33,7 @@ def wrap_angles(angle_rad: FloatArray) -> FloatArray:
 def corners(boxes: FloatArray) -> FloatArray:
     """Return corners (..., 4, 2) of boxes (..., 5): front left, rear left, rear right, front."""
     cos, sin = np.cos(boxes[..., 2])[..., None], np.sin(boxes[..., 2])[..., None]
+    # (..., 4): corners in the box's own frame, then turned by its heading.
     along = boxes[..., 3, None] * _SIGNS[:, 0]
     left = boxes[..., 4, None] * _SIGNS[:, 1]
     points = np.empty((*boxes.shape[:-1], 4, 2))
@@ -50,10 +52,12 @@ def meet(first: FloatArray, second: FloatArray) -> BoolArray:
     cos_a, sin_a = np.cos(first[..., 2]), np.sin(first[..., 2])
     cos_b, sin_b = np.cos(second[..., 2]), np.sin(second[..., 2])
     dx, dy = second[..., 0] - first[..., 0], second[..., 1] - first[..., 1]
+    # Of the turn between the two, from the cosines and sines that are there.
     cos = np.abs(cos_a * cos_b + sin_a * sin_b)
     sin = np.abs(sin_a * cos_b - cos_a * sin_b)
     length_a, width_a = first[..., 3] / 2.0, first[..., 4] / 2.0
     length_b, width_b = second[..., 3] / 2.0, second[..., 4] / 2.0
+    # On an axis of one box: the way between centres against both half shadows.
     hit = np.abs(dx * cos_a + dy * sin_a) <= length_a + length_b * cos + width_b * sin
     hit &= np.abs(dy * cos_a - dx * sin_a) <= width_a + length_b * sin + width_b * cos
     hit &= np.abs(dx * cos_b + dy * sin_b) <= length_b + length_a * cos + width_a * sin
@@ -65,4 +69,5 @@ def bearings(poses: FloatArray, places_m: FloatArray) -> FloatArray:
     """Return the angles (K,), 0 to pi, between the ego's heading and the way from its axle."""
     dx, dy = places_m[..., 0] - poses[..., 0], places_m[..., 1] - poses[..., 1]
     cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    # Left over ahead, in the ego's frame.
     return np.abs(np.arctan2(dy * cos - dx * sin, dx * cos + dy * sin))

@@ -161,9 +161,11 @@ def classify_contacts(
     states: FloatArray, boxes: FloatArray, speeds: FloatArray, kinds: IntArray, body: EgoBody
 ) -> IntArray:
     """Return the `Contact` of ego states (K, 6) with boxes (K, 5) of such speeds and kinds."""
+    # A box without a length, at the front: what it meets is hit by the front.
     bumper = np.zeros((len(states), 5))
     bumper[:, :3] = shapes.move_ahead(states, body.front_m)
     bumper[:, 4] = body.width_m
+    # Later lines overrule earlier ones: a standing ego before all, then a standing object.
     contacts = np.full(len(states), Contact.LATERAL, dtype=np.int64)
     contacts[shapes.meet(bumper, boxes)] = Contact.FRONT
     contacts[shapes.bearings(states, boxes[:, :2]) > BEHIND_RAD] = Contact.REAR

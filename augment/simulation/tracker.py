@@ -27,19 +27,24 @@ from augment.simulation.states import (
 )
 
 MAX_STEERING_RAD = math.pi / 3.0
+# First-order lags of 0.2 s and 0.05 s over one step, dt / (dt + tau).
 _PEDAL = STEP_S / (STEP_S + 0.2)
 _WHEEL = STEP_S / (STEP_S + 0.05)
+# Weights of the least squares of nuPlan's reference velocities and curvatures.
 JERK_PENALTY = 1e-4
 """On the squared difference of neighbouring accelerations."""
 CURVATURE_RATE_PENALTY = 1e-2
 FIRST_CURVATURE_PENALTY = 1e-10
 
+# Steps of 0.1 s that the tracker looks ahead; the horizon itself, _B_S, in seconds.
 HORIZON = 10
 SPEED_WEIGHT, SPEED_COST = 10.0, 1.0
 LATERAL_WEIGHT, HEADING_WEIGHT, STEERING_RATE_COST = 1.0, 10.0, 1.0
 STOPPING_SPEED_MPS = 0.2
 STOPPING_GAIN = 0.5
 _B_S = HORIZON * STEP_S
+# One-step LQR of v' = v + B a: the least q (v + B a - w)^2 + r a^2 is at
+# a = B q (w - v) / (B q B + r).
 _SPEED_GAIN = _B_S * SPEED_WEIGHT / (_B_S * SPEED_WEIGHT * _B_S + SPEED_COST)
 
 
@@ -57,6 +62,7 @@ def drive_steps(
 
     The headings are not wrapped.
     """
+    # (T, B, 3): a step reads one block of memory.
     poses = np.ascontiguousarray(references.transpose(1, 0, 2))
     plan = _Plan(poses, steps)
     states = np.empty((steps + 1, WIDTH, poses.shape[1]))
@@ -90,6 +96,7 @@ def advance(
     gained = state[ACCELERATION] + _PEDAL * (acceleration_mps2 - state[ACCELERATION])
     following[ACCELERATION] = gained
     following[SPEED] = state[SPEED] + gained * STEP_S
+    # The commanded angle is rate * dt further on; the lag lets a share of that happen.
     turned = steering + (_WHEEL * STEP_S) * steering_rate_radps
     following[STEERING] = turned.clip(-MAX_STEERING_RAD, MAX_STEERING_RAD)
     return following
@@ -99,6 +106,7 @@ def speeds(poses: FloatArray) -> FloatArray:
     """Return the speed profile (T-1, B) of poses (T, B, 3)."""
     steps = np.diff(poses[..., :2], axis=0)
     heading = poses[:-1, :, HEADING]
+    # (T - 1, B): each step's part along the heading at its beginning.
     advances = np.cos(heading) * steps[..., X] + np.sin(heading) * steps[..., Y]
     return np.asarray(_speed_fit(len(advances)) @ advances, dtype=np.float64)
 
@@ -106,7 +114,9 @@ def speeds(poses: FloatArray) -> FloatArray:
 @lru_cache(maxsize=16)
 def _speed_fit(count: int) -> FloatArray:
     """The matrix (N, N) from advances along the heading to speeds."""
+    # (N - 2, N): differences of neighbouring accelerations (v[i + 1] - v[i]) / dt.
     second = np.diff(np.eye(count), n=2, axis=0) / STEP_S
+    # Least |dt v - advances|^2 + penalty |second v|^2.
     normal = STEP_S**2 * np.eye(count) + JERK_PENALTY * second.T @ second
     return np.asarray(np.linalg.inv(normal) * STEP_S, dtype=np.float64)
 
@@ -117,8 +127,10 @@ def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
     rates = np.diff(np.eye(len(way)), axis=0) / STEP_S
     penalty = CURVATURE_RATE_PENALTY * rates.T @ rates
     penalty[0, 0] += FIRST_CURVATURE_PENALTY
+    # (B, T - 1, T - 1): turn = curvature * way in each step; standing ones rest on the penalty.
     normal = penalty + np.eye(len(way)) * (way.T**2)[:, :, None]
     right = way * shapes.wrap_angles(np.diff(poses[..., HEADING], axis=0))
+    # B systems against (B, T - 1, 1), the moments first again.
     return np.asarray(np.linalg.solve(normal, right.T[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
@@ -128,6 +140,7 @@ class _Plan:
     def __init__(self, poses: FloatArray, steps: int) -> None:
         speed = speeds(poses)
         last = len(speed) - 1
+        # (steps, HORIZON): the profile that each step looks at; past its end the last value.
         ahead = np.minimum(np.arange(steps)[:, None] + np.arange(HORIZON), last)
         self._bends = curvatures(poses, speed)[ahead]
         self._wanted = speed[np.minimum(np.arange(steps) + HORIZON, last)]
@@ -150,16 +163,20 @@ class _Plan:
         """The rate (B,) that is best over the horizon, in which the errors go on by themselves."""
         pose, bends = self._poses[step], self._bends[step]
         cos, sin = np.cos(pose[HEADING]), np.sin(pose[HEADING])
+        # (B,) left of the reference pose.
         lateral = cos * (state[Y] - pose[Y]) - sin * (state[X] - pose[X])
         heading = shapes.wrap_angles(state[HEADING] - pose[HEADING])
         # The errors, and how they answer to a steering rate of 1 rad/s.
         by_lateral, by_heading = np.zeros(lateral.shape), np.zeros(lateral.shape)
         for ahead in range(HORIZON):
+            # Small angles: a step leads way * heading to the left and turns by way * curvature.
             way = (state[SPEED] + pedals * (ahead * STEP_S)) * STEP_S
             lateral = lateral + way * heading
             by_lateral += way * by_heading
             heading = heading + way * (state[STEERING] / wheelbase_m - bends[ahead])
             by_heading += way * (ahead * STEP_S / wheelbase_m)
+        # Of both errors at the end: the least sum of q (error + by rate)^2 + r rate^2 is at
+        # rate = -sum q by error / (sum q by^2 + r).
         gain = LATERAL_WEIGHT * by_lateral * lateral
         gain += HEADING_WEIGHT * by_heading * shapes.wrap_angles(heading)
         cost = LATERAL_WEIGHT * by_lateral**2 + HEADING_WEIGHT * by_heading**2

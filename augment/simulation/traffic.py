@@ -39,13 +39,11 @@ TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
 ACTIVE_WITHIN_M = 50.0
 """A walker appears once the ego has no further to go than this along its centreline."""
 WALK_STEPS, LAST_STEP = 150, 301
-"""interPlan's walk takes 15 s and as much longer as it took to set out, but no longer than its
-scenarios last."""
+"""Steps: interPlan's walk takes 15 s and its delay once more, at most to the scenario's end."""
 FALLBACK_MPS = 10.0
 """The wished speed where the map has no limit: nuPlan's."""
 SWEEP_S = 1.5
-"""Gaps are measured from the road that a driver covers in this time, but for the first step:
-nuPlan's way."""
+"""Gaps begin after the road that is covered in this time, but in the first step, as in nuPlan."""
 PATH_M = 400.0
 _LOOK_M = 80.0
 _KEPT_WAYS = 5
