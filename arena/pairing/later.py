@@ -72,6 +72,7 @@ def deal(
     dealt: dict[str, list[GridUnit]] = {name: [] for name in to}
     for index in rng.permutation(len(units)):
         wanted = units[index]
+        # Who has least so far first, by lot among equals.
         order = sorted(to, key=lambda name: (len(dealt[name]), rng.random()))
         fits = [name for name in order if wanted not in columns_of[name]]
         taker, scenario = (
@@ -126,11 +127,14 @@ def choose_for_newcomer(
         rng: The lots.
     """
     free, counts = grid.showable.copy(), judges.copy()
+    # (P,) votes planned of each pair before this choice.
     before = counts.sum(axis=1)
+    # (S,) how often each scenario comes in this choice.
     used = np.zeros(free.shape[1], dtype=np.int64)
     chosen: list[GridUnit] = []
     while len(chosen) < count and free.any():
         pairs, planned = np.flatnonzero(free.any(axis=1)), counts.sum(axis=1)
+        # First what comes least in this choice: every newcomer sees all pairs equally often.
         pairs = pairs[_least((planned - before)[pairs], planned[pairs])]
         pair = int(rng.choice(pairs))
         open_ = np.flatnonzero(free[pair])
@@ -196,6 +200,7 @@ def _draw_repeats(
     """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
     done = {showing.repeats for showing in so_far if showing.kind == REPEAT}
     mains = [showing for showing in so_far if showing.kind == MAIN]
+    # The share is of all the expert's main showings, so what was repeated already is taken off.
     count = min(round(rules.repeat_share * (len(mains) + len(units))) - len(done), len(units))
     if count < 1:
         return []
@@ -239,6 +244,7 @@ def _find_order(
     """Order the items with the largest gap that can be kept, also to what was shown before."""
     bases = [int(base) for base in grid.bases]
     last = [bases[grid.column_of_scenario[name]] for name in before[-rules.scenario_gap :]]
+    # Greedy orders depend on their lots: five of each gap, then a smaller one.
     for gap in range(rules.scenario_gap, -1, -1):
         for _ in range(5):
             order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng, bases)
@@ -266,6 +272,7 @@ def _try_order(
         open_ = [place for place in waiting if waiting[place] and bases[place] not in barred]
         if not open_:
             return None
+        # The fullest first, or its showings would be left over side by side at the end.
         place = max(open_, key=lambda place: len(waiting[place]) + rng.random())
         order.append(waiting[place].pop())
         recent.append(bases[place])

@@ -67,12 +67,14 @@ def order_units(
         bases: (S,) columns with the same number are samples of one scenario, which are kept apart
             like one column; None for all different.
     """
+    # (E, S) showings of each scenario, units first, then repeats and checks.
     counts = chosen.sum(axis=1)
     if bases is None:
         bases = np.arange(counts.shape[1])
     for row, more in zip(counts, extras, strict=True):
         for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
             row[scenario] += 1
+    # One gap for all experts: what the plan promises holds for each of them.
     best_gap = min(largest_gap(_sum_samples(row, bases), gap) for row in counts)
     return [
         _order(mine, more, row, best_gap, distance, rng, bases)
@@ -169,6 +171,7 @@ def deal_sides(
 ) -> list[BoolArray]:
     """Return the showings to turn around: half of each expert's of a pair, odd ones in turn."""
     flipped = [np.zeros(len(order), dtype=bool) for order in orders]
+    # (P,) whether the next odd showing is turned: in turn over experts, for +-1 over all.
     odd_turn = rng.random(pairs) < 0.5
     for expert in rng.permutation(len(orders)):
         showings: dict[int, list[int]] = {}
@@ -200,6 +203,7 @@ def sequence(counts: IntArray, gap: int, rng: np.random.Generator) -> list[int]:
     left = counts.astype(float)
     order: list[int] = []
     for _ in range(int(counts.sum())):
+        # (S,) what is left, lots below 1 among equals; minus infinity where the gap bars it.
         score = left + rng.random(len(left))
         score[left < 1] = -np.inf
         if gap:

@@ -28,6 +28,8 @@ def choose_units(
         _fill(mine, showable, judges, order, of_scenario[expert], of_pair[expert], rng)
         even_out(mine, showable, of_pair[expert])
         judges += mine
+    # (P, E * S): with each expert's scenarios as columns of their own, whose sums stay, pairs are
+    # evened out over everybody.
     flat = chosen.transpose(1, 0, 2).reshape(pairs, experts * scenarios)
     everywhere = np.tile(showable, (1, experts))
     even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
@@ -58,6 +60,7 @@ def _fill(
     """
     wanted = owed.astype(float)
     for column in order:
+        # (n,): what is owed outweighs any number of judges, and these outweigh the lots below 1.
         score = 1e4 * wanted - judges[:, column] + rng.random(len(wanted))
         score[~showable[:, column]] = -np.inf
         picked = np.argsort(-score)[: take[column]]
@@ -72,12 +75,14 @@ def quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generato
     over all experts, so that nobody and no place collects them.
     """
     base = np.zeros(len(capacity), dtype=np.int64)
+    # One more for every place with room, as long as that can be given to all of them.
     while (base + (base < capacity)).sum() <= votes and (base < capacity).any():
         base += base < capacity
     odd = votes - int(base.sum())
     quotas = np.tile(base, (experts, 1))
     places = rng.permutation(np.flatnonzero(base < capacity))
     for expert in range(experts):
+        # The circle goes on where the odd votes of the expert before ended.
         start = expert * odd
         for step in range(odd):
             quotas[expert, places[(start + step) % len(places)]] += 1
@@ -98,6 +103,8 @@ def even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
         level = chosen.sum(axis=1) - aim
         if level.max() - level.min() < 2:
             return
+        # gives @ takes' (P, P): in how many columns a row can give to another one; as floats,
+        # which multiply fast.
         gives = chosen.astype(np.float32)
         takes = (showable & ~chosen).astype(np.float32)
         chain = _chain(level, gives @ takes.T > 0)
@@ -182,8 +189,10 @@ def _exchange(
     drawn = rng.permutation(len(alone))[:_MOST_AT_ONCE]
     pair, scenario = alone[drawn].T
     free = showable & ~mine
+    # (n, n): unit i takes the scenario of j, and j that of i; row and column sums stay.
     fits = free[pair[:, None], scenario[None, :]] & free[pair[None, :], scenario[:, None]]
     others = judges[pair[:, None], scenario[None, :]]
+    # How many of the two new units somebody else judges already.
     gain = np.minimum(others, 1) + np.minimum(others.T, 1)
     gain[~fits] = 0
     if not gain.size or not gain.max():
@@ -206,10 +215,12 @@ def _take_over(mine: BoolArray, judges: IntArray, _: BoolArray, rng: np.random.G
     others = rng.permutation(np.argwhere(~mine & (judges > 0)))[:_MOST_AT_ONCE]
     if not len(alone) or not len(others):
         return False
+    # (n, m): units that one other judges come first.
     cost = np.where(judges[tuple(others.T)] == 1, 0, judges.size)[None, :]
     for axis in (0, 1):
         here, there = alone[:, None, axis], others[None, :, axis]
         for counts in (mine.sum(axis=1 - axis), judges.sum(axis=1 - axis)):
+            # Half of what the sum of squared counts changes by when one moves.
             cost = cost + np.where(here == there, 0, counts[there] - counts[here] + 1)
     giver, taken = np.unravel_index(int(cost.argmin()), cost.shape)
     for unit, change in ((alone[giver], -1), (others[taken], 1)):

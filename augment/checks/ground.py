@@ -34,6 +34,7 @@ VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
 STOPPED_BELOW_MPS = 0.5
 CRASH_GAP_M = 1.5
 """Between cars of one accident; those placed by hand for interPlan are up to 1.43 m apart."""
+# Least length and width of a box.
 _SMALLEST_M = 0.01
 _ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
@@ -58,6 +59,7 @@ class Surface:
         near = self._pieces[self._tree.query(box, predicate="intersects")]
         if any(piece.covers(box) for piece in near):
             return 0.0
+        # Joined first: where pieces overlap, their shares would count twice.
         left = float(shapely.difference(box, shapely.union_all(near)).area) / float(box.area)
         return min(1.0, max(0.0, left))
 
@@ -85,6 +87,7 @@ class Surface:
     def _joined(self) -> shapely.Geometry:
         """All pieces as one, without the seams between them."""
         half_m = SEAM_M / 2.0
+        # Grown by half a seam and shrunk again: gaps up to a seam close, edges stay.
         grown = shapely.buffer(self._pieces, half_m, quad_segs=2)
         return shapely.buffer(shapely.union_all(grown), -half_m, quad_segs=2)
 
@@ -96,6 +99,7 @@ class Surface:
         """
         reached_m = 0.0
         is_on = False
+        # In order of their beginning: the first gap wider than a seam ends the surface.
         for low_m, high_m in self._spans_m(x_m, y_m, heading_rad, most_m):
             if low_m > reached_m + SEAM_M:
                 break
@@ -120,7 +124,9 @@ class Surface:
         ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
         near = self._pieces[self._tree.query(ray, predicate="intersects")]
         parts = shapely.get_parts(shapely.intersection(near, ray))
+        # What only touches the ray leaves a point.
         parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
+        # Metres along the ray, (p - start) . step, negative behind the start.
         spans = (((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
         return sorted((min(span), max(span)) for span in spans)
 
@@ -317,6 +323,7 @@ class ChangedScene:
             return frozenset()
         corners_m = np.array([self.boxes[car.id].corners_m for car in cars])
         boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
+        # (cars, cars), itself left out by infinity.
         gaps = np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
         np.fill_diagonal(gaps, np.inf)
         near = gaps.min(axis=1) <= CRASH_GAP_M

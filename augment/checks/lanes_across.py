@@ -31,9 +31,11 @@ from augment.scene.presets import find_crossing
 _SAME_LANE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
 _ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)
+# So far past its end a lane still counts as beside the route.
 _JOINT_M = 1.0
 _BESIDE_M = 15.0
 """Who is further from the route is on another road; prompts show as much beside it."""
+# Who is left or right of the ego's way is at least so far off it.
 _ON_A_SIDE_M = 1.0
 _ALIGNED_RAD = math.radians(15.0)
 _MISSED_M = 0.1
@@ -163,6 +165,8 @@ def _band(lane: Beside, tangent_rad: float, choice: intents.LaneChoice) -> Band 
     """A lane beside the own one as one of the choice, None where it is not."""
     turn_rad = abs(difference(lane.tangent_rad, tangent_rad))
     is_along, is_against = turn_rad < _ALONG_RAD, turn_rad > _AGAINST_RAD
+    # d_m is the route's point seen from the lane: the lane lies on the other side of it, and a
+    # lane that runs against the route has its left on the route's right.
     left_m = lane.d_m if is_against else -lane.d_m
     fits = {
         intents.LaneChoice.LEFT: is_along and left_m > 0.0,
@@ -185,16 +189,19 @@ def find_place(lanes: LanesAcross, point: Point, heading_rad: float | None = Non
 
     def misfit(lane: Beside) -> tuple[float, float, float]:
         turn_rad = difference(lane.tangent_rad, heading_rad or lane.tangent_rad)
+        # Whole metres and steps of 15 degrees: less does not outweigh the next key.
         return round(lane.off_m), round(abs(turn_rad) / _ALIGNED_RAD), lane.distance_m
 
     near = sorted(lanes.route.graph.beside(*point), key=misfit)
     ways = [(None, 0.0), *((lane.lane_id, round(lane.off_m)) for lane in near)]
     places = list[tuple[float, LanePlace]]()
     for via, off_m in ways:
+        # Lanes come nearest first: none of the rest can be better than what there is.
         if any(cost <= off_m for cost, _ in places):
             break
         for place, missed_m in _list_places(lanes.over(via), via, point):
             is_missed = missed_m > _MISSED_M
+            # What does not lead back to the point counts as if it were on another road.
             places.append((round(place.off_m) + _BESIDE_M * is_missed, place))
     return min(places, key=lambda item: item[0])[1]
 
@@ -311,8 +318,10 @@ def resolve_spot(
     bare = replace(spot, anchor=None, landmark=None, mark=None, distance=None, relation=None)
     if own is None or base is None or not math.isfinite(sum((*own, *base))):
         return bare
+    # Both ranges are open within themselves: their ends add up.
     low_m, high_m = own[0] + base[0], own[1] + base[1]
     is_ahead = low_m + high_m >= 0.0
+    # Behind is counted backwards, so the nearer end is the higher one.
     low_m, high_m = (low_m, high_m) if is_ahead else (-high_m, -low_m)
     is_approximate |= spot.distance is not None and spot.distance.is_approximate
     return replace(
@@ -409,6 +418,7 @@ def list_crosswalks(lanes: LanesAcross) -> list[tuple[float, float]]:
     for area in lanes.route.scene.areas:
         if area.kind is AreaKind.CROSSWALK:
             part = shapely.intersection(way, shapely.Polygon(area.boundary_m))
+            # The way begins at the ego, so stations on it are metres ahead of it.
             points = shapely.points(shapely.get_coordinates(part))
             ends_m = np.asarray(shapely.line_locate_point(way, points))
             spans_m += [(float(ends_m.min()), float(ends_m.max()))] if len(ends_m) else []

@@ -118,6 +118,7 @@ def motion_limits(situation: ChangedScene) -> Iterator[Finding]:
         if limits is None or first is None:
             continue
         window = min(round(WINDOW_S / step_s), len(mover.states) - 1)
+        # (T - window,) mean accelerations in m/s^2.
         gained = (mover.states[window:, 3] - mover.states[:-window, 3]) / (window * step_s)
         sideways, curvature = measure_bends(mover.states[first:])
         kind = name_type(mover.agent.type)
@@ -227,6 +228,7 @@ def measure_bends(states: FloatArray) -> tuple[float, float]:
     states = states[np.concatenate([[True], steps_m > 1e-6])]
     gone_m = np.concatenate([[0.0], np.cumsum(steps_m[steps_m > 1e-6])])
     reach_m = np.maximum(BEND_M, BEND_S * states[:, 3])
+    # Of each place the last one a reach before it, and the first one a reach after it.
     before = np.searchsorted(gone_m, gone_m - reach_m + 1e-9, side="right") - 1
     after = np.searchsorted(gone_m, gone_m + reach_m - 1e-9)
     inside = (before >= 0) & (after < len(gone_m))
@@ -234,6 +236,7 @@ def measure_bends(states: FloatArray) -> tuple[float, float]:
         return 0.0, 0.0
     a, b, c = (states[at, :2] for at in (before[inside], inside, after[inside]))
     ab, bc, ca = b - a, c - b, a - c
+    # 1 / r = 4 area / (|ab| |bc| |ca|) of the circle through three points; this is twice the area.
     area2 = np.abs(ab[:, 0] * bc[:, 1] - ab[:, 1] * bc[:, 0])
     sides = np.prod([np.hypot(*side.T) for side in (ab, bc, ca)], axis=0)
     curvature = 2.0 * area2 / np.maximum(sides, 1e-9)
@@ -257,6 +260,7 @@ def _contact(movement: Movement, other: Movement, until: int) -> int | None:
     reach_m = (
         sum(np.hypot(way.agent.length_m, way.agent.width_m) for way in (movement, other)) / 2.0
     )
+    # Circles round both boxes first: few steps are left to be measured.
     near, parted = _apart_m(movement, other)[: until + 1] < reach_m, False
     for step, is_near in enumerate(near.tolist()):
         touches = is_near and _depth_m(movement, other, step) > GRAZED_M

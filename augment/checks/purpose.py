@@ -24,8 +24,10 @@ HIDING = (AgentType.VEHICLE, AgentType.BUS)
 """Who hides a pedestrian; all else is too low or too slim."""
 WIDEST_M, LONGEST_TTC_S = 8.0, 3.0
 """Wider ways and longer times are not told apart."""
+# Beside the route; before the ego and past the furthest change; ahead where nothing changed.
 _ASIDE_M, _BEYOND_M, _LOOKS_M = 15.0, 10.0, 60.0
 _SETS_OUT_WITHIN_M = 2.0
+# Of 8 m, down to 2 mm.
 _HALVINGS = 12
 
 
@@ -170,6 +172,7 @@ def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
             if movement.is_present[step]
         ]
         bodies = np.asarray(shapely.polygons(np.array(boxes).reshape(-1, 4, 2)))  # (B,)
+        # (5, B): hidden where every one of the lines meets some body.
         if not shapely.intersects(lines[:, None], bodies[None, :]).any(axis=1).all():
             return step
     return None

@@ -231,6 +231,8 @@ class _Fitting:
         gap_m = (request.spacing.low_m, request.spacing.high_m)
         count, route = request.count or len(agents), self._lanes.route
 
+        # Numbers: the first station and the gap; of each vehicle the two ends across its lane,
+        # (count, 2, 2).
         def slots(numbers: FloatArray, is_straight: bool) -> FloatArray:
             ahead_m, step_m = numbers.tolist()
             ends = []
@@ -245,6 +247,7 @@ class _Fitting:
 
         guess = (self._ahead_m(agents[first]), fmean(gap_m))
         tries = [
+            # Both readings of a gap: along the lane, and from centre to centre.
             Pattern(
                 ranges=(stations_m, gap_m), slots=partial(slots, is_straight=is_straight)
             ).nearest(np.array(points), guess)
@@ -269,6 +272,7 @@ class _Fitting:
             lane = graph.lane(arm.lane_id)
             places = (
                 graph.along(arm.lane_id, lane.centerline.length_m, -before_m)
+                # Back along the lanes from the junction, a point a metre.
                 for before_m in np.arange(0.0, reach_m, 1.0).tolist()
             )
             line = [place.pose.beside(0.0) for place in places if place is not None]
@@ -299,6 +303,7 @@ class _Fitting:
             there = self._chain(request, agents, meets, met)
             tries.append(
                 [
+                    # A walk is moved as a whole, by as much as its meeting is off.
                     (x + to[0] - at[0], y + to[1] - at[1])
                     for (x, y), at, to in zip(points, met, there, strict=True)
                 ]
@@ -319,6 +324,7 @@ class _Fitting:
             Link(
                 base=0,
                 gap_m=(gap.low_m, gap.high_m),
+                # In file they stand further towards the side that they come from.
                 toward_rad=lane_rad + (side.sign if side else 0.0) * math.pi / 2.0,
                 aside_rad=math.pi / 2.0 if side else math.pi,
             )
@@ -362,10 +368,12 @@ class _Fitting:
         if car is None:
             return point
         here = self._lanes.route.locate_agent(car)
+        # From the car to the ego's way, then as a side of the car: 1 left, -1 right.
         toward_rad = here.tangent_rad - math.copysign(math.pi / 2.0, here.left_m)
         side = math.copysign(1.0, difference(toward_rad, car.heading_rad))
         near_m, far_m = car.width_m / 2.0, car.width_m / 2.0 + _DOOR_OFF_M
         half_m = car.length_m / 2.0
+        # Ahead and out of that side, in the car's frame.
         corners = [(-half_m, near_m), (half_m, near_m), (half_m, far_m), (-half_m, far_m)]
         ground = car.pose.to_parent(np.array([(x_m, side * y_m) for x_m, y_m in corners]))
         return _find_nearest(shapely.Polygon(ground), point)

@@ -92,6 +92,7 @@ class MotionCase:
 
     def measure(self, agent: TrafficAgent) -> float:
         """Return how far the answer is from an agent on average, in m."""
+        # (T,) distances; steps past the map count nothing.
         return float(np.nanmean(np.hypot(*self.find_offsets(agent).T)))
 
     def find_nearest(self) -> TrafficAgent:
@@ -185,6 +186,7 @@ class _Search:
         )
         agent = self._give(motion)
         mean_m = self._case.measure(agent)
+        # Admissibility is the dear part: it is asked only of what is nearer than the best.
         if self._fits and mean_m >= self._best_m:
             return
         fits = _is_admissible(self._case, agent, self._wish, after_s)
@@ -259,8 +261,10 @@ def _list_starts(
         mark_m = find_mark(case.whole.lanes, start.mark) if start.mark else None
         if mark_m is not None:
             places[:] = case.whole.route.position(mark_m)
+        # (T,) of the ego from where the agent waits, or from the place that is named.
         apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
         near = start.ego_distance
+        # The ego comes within the farther end first: that is the earliest start.
         reaches_m = (near.high_m, near.low_m) if near else (planned_motion.REACHED_M,) * 2
         steps = (np.flatnonzero(apart_m <= reach_m) for reach_m in reaches_m)
         first_s, last_s = (float(times_s[at[0]]) if len(at) else math.inf for at in steps)
@@ -335,6 +339,7 @@ def _list_paths(
         )
         here = case.carry_out(waits, min(after_s, HORIZON_S))[-1, :2]
         began_s = min(case.own_start_s, HORIZON_S)
+        # (points, 2), moved by as much as its beginning is.
         points = own.points_m + here - case.answer.states[round(began_s / STEP_S), :2]
         if not np.isnan(points).any():
             yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
@@ -353,6 +358,7 @@ def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterat
     """Yield doors in the car's side, along it or across it, that come out on the ego's side."""
     door, own, place = case.answer.agent, case.own, case.whole.route.locate_agent(car)
     toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
+    # (2,) turns the car's frame over, so that out of the door's side is positive.
     side = np.array([1.0, math.copysign(1.0, math.sin(toward_rad - car.heading_rad))])
     points = own.path.points_m[-1:] if isinstance(own.path, planned_motion.PointPath) else ()
     local = car.pose.to_local(np.array([(door.x_m, door.y_m), *points])) * side

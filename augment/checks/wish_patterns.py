@@ -47,6 +47,7 @@ class Pattern:
         """
         from scipy.optimize import minimize
 
+        # (K,) each; only numbers that have a range are looked for.
         low, high = np.array(self.ranges, dtype=np.float64).T
         numbers = np.clip(np.array(guess, dtype=np.float64), low, high)
         free = np.flatnonzero(high > low)
@@ -60,6 +61,8 @@ class Pattern:
             # Infinite ranges are searched as far around the guess as anything is looked for.
             far = np.column_stack([numbers - 60.0, numbers + 60.0])[free]
             bounds = np.clip(far, low[free, None], high[free, None])
+            # Powell's method asks for no slopes, which jump where the assignment changes; from two
+            # starts, as the sum can have several valleys.
             starts: list[FloatArray] = [numbers[free], bounds.mean(axis=1)]
             options: Any = {"xtol": 1e-4, "ftol": 1e-7}
             results = [
@@ -76,6 +79,7 @@ class Pattern:
         ends = self.slots(numbers)
         begin, along = ends[:, 0], ends[:, 1] - ends[:, 0]
         # Foot of each point on each slot's line: (M, N) shares of its length, clipped to it.
+        # (N,) squared lengths of the lines, not 0 where a slot is a point.
         length2 = np.maximum((along**2).sum(axis=1), 1e-12)
         shares = ((points[:, None] - begin) * along).sum(axis=2) / length2
         feet = begin + np.clip(shares, 0.0, 1.0)[..., None] * along
@@ -166,6 +170,7 @@ class Chain:
         if self.links and total_m(start) > THERE_M * len(points):
             from scipy.optimize import minimize
 
+            # Two unknowns, x and y of the first, in metres.
             start = minimize(total_m, start, method="Nelder-Mead", options={"xatol": 1e-4}).x
         best = self._place(ordered, (float(start[0]), float(start[1])))
         back = dict(zip(order, best, strict=True))

@@ -170,6 +170,7 @@ class Place:
             return point
         if not len(self._pieces):
             return point
+        # (pieces,) lines from each piece to the point.
         way = shapely.shortest_line(self._pieces, shapely.Point(point))
         (x_m, y_m), _ = shapely.get_coordinates(way[np.argmin(shapely.length(way))]).tolist()
         return x_m, y_m
@@ -212,6 +213,7 @@ def _join(spans: Iterable[Span]) -> list[Span]:
 
 def _list_bends(lanes: LanesAcross) -> list[Span]:
     route, half_m = lanes.route, _BEND_OVER_M / 2.0
+    # A station a metre, from 100 m behind the ego on.
     stations = np.arange(-min(route.ego_s_m, 100.0), route.ends_m[-1], 1.0).tolist()
     turns = [
         abs(difference(route.heading_at(s + half_m), route.heading_at(s - half_m)))

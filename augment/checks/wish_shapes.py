@@ -64,6 +64,7 @@ def lay_out(
             return _lay_out_rows(first_m, from_m, count, gap_m, to)
         case wish.Shape.RING:
             radius_m = ring_radius_m(count, gap_m)
+            # The first cone is the one towards the ego, but for the turn.
             angles = [math.pi + to + 2.0 * math.pi * index / count for index in range(count)]
             return [
                 (first_m + radius_m * math.cos(a), from_m + radius_m * math.sin(a)) for a in angles
@@ -75,6 +76,7 @@ def lay_out(
             across_m = (to - from_m) / gaps
             if request.reach_m is None and not is_along:
                 across_m = math.copysign(min(abs(across_m), gap_m), across_m)
+                # From cone to cone: along^2 + across^2 = gap^2.
                 along_m = math.sqrt(gap_m**2 - across_m**2)
             return [(first_m + i * along_m, from_m + i * across_m) for i in range(count)]
     sides = (1.0, -1.0) if request.both_sides else (1.0,)
@@ -83,6 +85,7 @@ def lay_out(
 
 def ring_radius_m(count: int, gap_m: float) -> float:
     """Return the radius of a ring of cones that are so far apart."""
+    # The chord between neighbours: gap = 2 r sin(pi / n).
     return gap_m / (2.0 * math.sin(math.pi / max(count, 2)))
 
 
@@ -91,6 +94,7 @@ def _lay_out_rows(
 ) -> list[Placement]:
     first_m = centre_m - (count // 2 - 1) * gap_m / 2.0
     along = [first_m + index * gap_m for index in range(count // 2)]
+    # An odd cone closes the rows from before, a gap away from the first of either.
     closing_m = first_m - math.sqrt(max(gap_m**2 - side_m**2, 0.0))
     closing = [(closing_m, middle_m)] if count % 2 else []
     rows = [(s, middle_m - side_m) for s in along]
@@ -121,6 +125,7 @@ def find_nearest_cones(
         return there
     lefts = [place.left_m - band.left_m for place in here]
     gaps_m = np.hypot(*np.diff(points, axis=0).T)
+    # The median: a cone that is missing or astray moves the guess little.
     gap_m = float(np.median(gaps_m)) if len(gaps_m) else 1.0
     best: FloatArray | None = None
     bend_rad = difference(here[-1].tangent_rad, here[0].tangent_rad)
@@ -158,6 +163,7 @@ def find_worker_ground(
     ground = shapely.MultiPoint(near).buffer(WORKER_M, quad_segs=64)
     ahead = np.array([math.cos(here.tangent_rad), math.sin(here.tangent_rad)])
     leads = last - first
+    # Left of the lane's direction.
     across_m = float(leads @ np.array([-ahead[1], ahead[0]]))
     is_along = abs(across_m) <= _ALONG_SHARE * float(np.hypot(*leads))
     normal, begin = ahead, first
@@ -169,6 +175,7 @@ def find_worker_ground(
     elif not is_along:
         normal = np.array([-leads[1], leads[0]]) / np.hypot(*leads)
         normal = normal if normal @ ahead > 0.0 else -normal
+    # Half the plane, as a rectangle of 200 m by 100 m from the line on.
     side = 100.0 * np.array([-normal[1], normal[0]])
     half = [
         begin + side,

@@ -233,6 +233,7 @@ def _match(
         np.subtract.outer([agent.x_m for agent in wanted], [agent.x_m for agent in candidates]),
         np.subtract.outer([agent.y_m for agent in wanted], [agent.y_m for agent in candidates]),
     )  # (R, G)
+    # Of an uneven matrix the smaller side is matched as a whole; the rest is missing or surplus.
     rows, columns = linear_sum_assignment(apart_m * (1.0 + _EVENNESS_PER_M * apart_m))
     return [
         Match(
@@ -250,6 +251,7 @@ def _follow(
 ) -> list[Match]:
     """The matches with their distances over time."""
     motions = [ground.motion_after(change, of_all=False) for change in (reference, generated)]
+    # (T,); 1e-9 s, as steps of 0.1 s add up inexactly.
     compared = motions[0].times_s <= HORIZON_S + 1e-9
     wanted, placed = (
         {movement.agent.id: movement for movement in motion.others} for motion in motions
@@ -260,6 +262,7 @@ def _follow(
         average_m, final_m, start_s = match.distance_m, match.distance_m, None
         if movement.agent.motion is not None or other.agent.motion is not None:
             apart_m = np.hypot(*(movement.states[compared, :2] - other.states[compared, :2]).T)
+            # NaN where one of the two has left the map: only common steps count.
             apart_m = apart_m[~np.isnan(apart_m)]
             average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
             if movement.started_s is not None and other.started_s is not None:
@@ -369,6 +372,7 @@ def _all_matched(agents: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) 
 
     if len(agents) != len(other):
         return False
+    # 1 for a pair that differs: a matching of cost 0 is one of pairs that look the same.
     apart = np.array([[not look_alike(a, b) for b in other] for a in agents])
     rows, columns = linear_sum_assignment(apart.reshape(len(agents), len(other)))
     return not apart.reshape(len(agents), len(other))[rows, columns].any()
@@ -378,6 +382,7 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     """Return whether two objects look the same, whatever their ids."""
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
+    # As documents, whose numbers alone may differ a little.
     motions = [agent.motion and asdict(agent.motion) for agent in (one, other)]
     if not _are_close(*motions):
         return False

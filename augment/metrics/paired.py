@@ -87,6 +87,7 @@ def _interval(
     """Return the percentile interval of the median over resampled differences."""
     n, tail = len(differences), 100.0 * (1.0 - LEVEL) / 2.0
     medians = [
+        # (size, n) resampled scenarios, some rounds at a time.
         np.median(differences[rng.integers(0, n, size=(size, n))], axis=1)
         for begin in range(0, rounds, _ROUNDS_AT_ONCE)
         for size in [min(_ROUNDS_AT_ONCE, rounds - begin)]
@@ -101,6 +102,7 @@ def adjust_holm(p_values: Sequence[float | None]) -> list[float | None]:
     adjusted: list[float | None] = [None] * len(p_values)
     highest = 0.0
     for rank, (p, index) in enumerate(present):
+        # The i-th smallest of m times m - i, and never below the one before (Holm 1979).
         highest = max(highest, min(1.0, (len(present) - rank) * p))
         adjusted[index] = highest
     return adjusted
@@ -110,6 +112,7 @@ def find_p_by_signed_ranks(differences: NDArray[np.float64]) -> float | None:
     """The two-sided p of Wilcoxon's signed-rank test; pairs without a difference are dropped."""
     from scipy.stats import wilcoxon
 
+    # Wilcoxon's own rule: a zero has no sign to rank.
     unequal = differences[differences != 0.0]
     if len(unequal) < FEWEST_PAIRS:
         return None
@@ -124,5 +127,6 @@ def within_sd(groups: Iterable[Sequence[float]]) -> float | None:
     repeated = [group for group in groups if len(group) > 1]
     if not repeated:
         return None
+    # sqrt(sum (n - 1) s^2 / sum (n - 1)): each group around its own mean.
     squares = sum(float(np.var(group, ddof=1)) * (len(group) - 1) for group in repeated)
     return math.sqrt(squares / sum(len(group) - 1 for group in repeated))

@@ -157,6 +157,7 @@ def judge(objects: Sequence[PlacedObject], recorded: RecordedCounts) -> Realism:
     judgeable = [thing for thing in objects if seen[thing.object_class] >= LEAST_RECORDED]
     scores = {}
     for feature in Feature:
+        # Logarithms: a product of many shares would underflow.
         logs = [
             math.log(_share(recorded, thing.object_class, feature, thing.bins[feature]))
             for thing in judgeable
@@ -219,6 +220,7 @@ def _gaps_m(situation: ChangedScene) -> list[float]:
     corners_m = np.array([situation.boxes[name].corners_m for name in names])
     boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
     own = [names.index(agent.id) for agent in situation.changed]
+    # (changed, everybody), itself left out by infinity.
     gaps = np.asarray(shapely.distance(boxes[own, None], boxes[None, :]), dtype=np.float64)
     gaps[np.arange(len(own)), own] = np.inf
     return [float(gap) for gap in gaps.min(axis=1)]

@@ -88,6 +88,7 @@ class Camera:
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
         """Return points (N, 2) of the ego frame as pixels (N, 2), also outside the picture."""
         scale = self.px_per_m
+        # Left of the ego is up, and pixels count downwards.
         pixels = np.asarray(points_m, dtype=np.float64) * (scale, -scale)
         pixels += (-self.x_min_m * scale, self.y_max_m * scale)
         return pixels
@@ -172,6 +173,7 @@ def _camera_for(
 def _widen(need: FloatArray, places: list[FloatArray], widest_m: float) -> FloatArray:
     """Return the window (2, 2) widened by those places, the nearest first, up to a width."""
     for place in sorted(places, key=_distance_m):
+        # Whole metres, as the raster of windows.
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
         more = np.array([low, high])
@@ -198,6 +200,7 @@ def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.n
     ):
         cells = (polygon - origin_m) * _CELLS_PER_M
         pen.polygon([(x, y) for x, y in cells.tolist()], fill=1)
+    # Sums over all cells left of and below: any window's are four reads away.
     sums = np.asarray(raster).astype(np.int64).cumsum(axis=0).cumsum(axis=1)
     return np.pad(sums, ((1, 0), (1, 0)))
 
@@ -210,13 +213,16 @@ def _best(need: FloatArray, scene: Scene) -> Camera:
     """
     width = _width_m(need)
     height = width / RATIO
+    # The raster reaches past every window that holds what is needed.
     origin_m = need[1] - 1.5 * width
     sums = _ground_sums(scene, origin_m, need[0] - need[1] + 3.0 * width)
+    # (X,), (Y,) lower left corners, a metre apart, of windows that hold what is needed.
     x_min = np.arange(need[1, 0] - width, need[0, 0] + 0.5)
     y_min = np.arange(math.ceil(need[1, 1] - height), math.floor(need[0, 1]) + 0.5)
     left = ((x_min - origin_m[0]) * _CELLS_PER_M).astype(int)[None, :]
     low = ((y_min - origin_m[1]) * _CELLS_PER_M).astype(int)[:, None]
     across, up = int(width * _CELLS_PER_M), int(height * _CELLS_PER_M)
+    # (Y, X), from (Y, 1) and (1, X): a window's sum by the corners of the sums.
     covered = sums[low + up, left + across] - sums[low, left + across]
     share = (covered - sums[low + up, left] + sums[low, left]) / (across * up)
     usual = np.abs(x_min + width / 4.0)[None, :] + np.abs(y_min + height / 2.0)[:, None]

@@ -192,8 +192,10 @@ def _stretches(movement: Movement, camera: Camera) -> Iterator[tuple[int, int, l
         # A film that goes on after a recording ends keeps its last moment.
         end = STEPS - 1 if last == len(states) - 1 else last
         pixels = camera.to_pixels(part[:, :2]) * _FINE
+        # Clockwise in a picture whose y runs down; unwrapped, so that nobody spins round at pi.
         turns = np.zeros(len(part)) if is_upright(agent) else -np.degrees(np.unwrap(part[:, 2]))
         rows = np.round(np.column_stack([pixels, turns])).astype(int)
+        # (T - 1, 3) differences of rounded rows: added up they give these again, without drift.
         steps = np.diff(rows, axis=0)
         moves = rows[:1] if not steps.any() else np.vstack([rows[:1], steps])
         yield first, end, moves.ravel().tolist()

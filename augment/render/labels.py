@@ -65,6 +65,7 @@ def draw_badges(ground: Canvas, badges: list[Badge]) -> None:
         middle = np.array([left + _PADDING_PX + _ARROW_PX / 2.0 - 4.0, (top + bottom) / 2.0])
         step = np.array(badge.towards_px) - middle
         step = step / max(float(np.hypot(*step)), 1e-9)
+        # Across the arrow, for its head.
         side = np.array([-step[1], step[0]])
         ground.stroke(np.array([middle - 9.0 * step, middle + 2.0 * step]), style.fill, 3.0)
         ground.fill(middle + np.array([10.0 * step, 6.0 * side, -6.0 * side]), style.fill)
@@ -253,10 +254,12 @@ def _station_towards(start: Spot, end: Spot, ring: np.ndarray, stations: np.ndar
     """Return where on a ring the line from a point inside to one outside crosses it."""
     low, high = ring[0], ring[2]
     step = np.array(end) - start
+    # The edge that lies ahead on each axis; the first that is reached is where it leaves.
     gaps = np.where(step > 0.0, high, low) - start
     shares = [gap / way for gap, way in zip(gaps, step, strict=True) if abs(way) > 1e-9]
     share = max(0.0, min(shares, default=0.0))
     x, y = np.clip(np.array(start) + share * step, low, high)
+    # Stations of the point on the top, right, bottom and left edge, by how far that is off.
     away = {
         x - low[0]: abs(y - low[1]),
         stations[1] + y - low[1]: abs(x - high[0]),

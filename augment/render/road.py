@@ -32,6 +32,7 @@ Strip = tuple[AnyLane, FloatArray, FloatArray]
 _ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _ROAD_COLOURS = (palette.ROAD, palette.CARPARK, palette.INTERSECTION)
 _CHEVRON_EVERY_M = 12.0
+# (3, 2) ahead and left: its tip lies ahead.
 _CHEVRON_M = np.array([[-0.5, 0.5], [0.25, 0.0], [-0.5, -0.5]])
 # Up to this ratio of length to width a crosswalk's shape does not say which lane it leads.
 _STUB_RATIO = 1.5
@@ -48,6 +49,7 @@ _LIGHTS = {
 }
 _LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
 _LAMP_PX = 5.5
+# Ahead of the ego's centre.
 _GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
 _SCALE_TEXT_PX = 21
 _INSET_PX, _PADDING_PX, _HEIGHT_PX = 12.0, 28.0, 52.0
@@ -124,6 +126,7 @@ def draw_signals(ground: Canvas, scene: Scene) -> None:
         part_m = width_m / len(states)
         for index, state in enumerate(states):
             left_m = width_m / 2.0 - index * part_m
+            # (3, 2) from the connector's beginning: the two ends of a part, and its lamp between.
             ends = [[0.0, left_m], [0.0, left_m - part_m], [0.0, left_m - part_m / 2.0]]
             points = ground.px(start.to_parent(np.array(ends)))
             bar_px = max(2.0, 0.2 * ground.camera.px_per_m)
@@ -230,6 +233,7 @@ def _traffic_direction(polygon: FloatArray, lanes: list[AnyLane]) -> float:
         place = lane.centerline.project(x_m, y_m)
         if place.distance_m < lane.width_m:
             turn = difference(lane.centerline.heading_at(place.s_m), along_rad)
+            # 1 for a lane along the axis, -1 for one across it.
             votes += abs(math.cos(turn)) - abs(math.sin(turn))
     return along_rad if votes > 0.0 else along_rad + math.pi / 2.0
 
@@ -265,11 +269,13 @@ def _lane_lines(ground: Canvas, scene: Scene, strips: list[Strip]) -> None:
     for (line, side), is_margin_road in zip(margins, is_road, strict=True):
         inner = ground.px(offset(resample_line(line, 2.0), -_INSET_M * side))
         for first, last in runs(is_margin_road):
+            # Pieces first to last lie between the points first and last + 1.
             ground.stroke(inner[first : last + 2], palette.LANE_SOLID, 1.5)
 
 
 def _has_road_beyond(ground: Canvas, line: FloatArray, side: float) -> np.ndarray:
     """Return for each piece of a line whether road lies on its left (side 1) or right (-1)."""
+    # Half a metre outside, looked at in the middle of each piece, (P - 1, 2).
     beyond = offset(resample_line(line, 2.0), 0.5 * side)
     return ground.holds(ground.px((beyond[:-1] + beyond[1:]) / 2.0), _ROAD_COLOURS)
 

@@ -19,10 +19,12 @@ def offset(points: FloatArray, distance: float) -> FloatArray:
     """Shift a line (P, 2) by a distance to its left (negative: right), (P, 2)."""
     steps = points[1:] - points[:-1]
     steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None]
+    # (P, 2) sums of the unit steps before and after: their length is 2 cos(turn / 2).
     middle = np.empty_like(points, dtype=np.float64)
     middle[0], middle[-1] = 2.0 * steps[0], 2.0 * steps[-1]
     middle[1:-1] = steps[:-1] + steps[1:]
     length = np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)
+    # The corner of the offset lies distance / cos(turn / 2) away, along the left of `middle`.
     reach = distance * np.minimum(2.0 / length, _MITER_LIMIT) / length
     return np.stack(
         [points[:, 0] - reach * middle[:, 1], points[:, 1] + reach * middle[:, 0]], axis=1
@@ -47,6 +49,7 @@ def lane_ring(left: FloatArray, right: FloatArray) -> FloatArray:
 def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
     """Return the dashes of a line (P, 2) as straight pieces (K, 2, 2)."""
     stations = _stations(points)
+    # (K,) stations; as (K, 2) with the ends they become points (K, 2, 2).
     starts = np.arange(0.0, stations[-1], on + off)
     ends = np.minimum(starts + on, stations[-1])
     return _points_at(points, stations, np.stack([starts, ends], axis=1))
@@ -68,6 +71,7 @@ def spread(points: FloatArray, every: float) -> FloatArray:
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last index of each unbroken run of true flags."""
+    # Changes come in pairs: where a run begins, and the first index behind it.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -80,6 +84,7 @@ def stripes(
     They lie evenly about the polygon's middle, which is left free.
     """
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    # Turned back by the angle, so that stripes lie along x and are cut by upright rectangles.
     turned = polygon @ np.array([[cos, -sin], [sin, cos]])
     (left, low), (right, high) = turned.min(axis=0) - 1.0, turned.max(axis=0) + 1.0
     shape, middle = shapely.Polygon(turned), (low + high) / 2.0
@@ -97,6 +102,7 @@ def stripes(
 def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
     """Return the direction, length and width of a polygon's smallest rectangle."""
     rectangle = shapely.minimum_rotated_rectangle(shapely.Polygon(polygon))
+    # (2, 2): two neighbouring sides.
     sides = np.diff(shapely.get_coordinates(rectangle)[:3], axis=0)
     lengths = np.hypot(sides[:, 0], sides[:, 1])
     longer = int(lengths[1] > lengths[0])

@@ -24,6 +24,7 @@ from augment.geometry.polyline import Polyline
 SHORTEST_PIECE_M = 1.0
 """Nothing is cut shorter: below it the points of a recorded line are its shape."""
 
+# Places of a cut that are tried in a row; samples of the parabola at an end.
 _CUTS_TRIED = 9
 _END_SAMPLES = 21
 _END_M = 2.0 * CHORD_REACH_M
@@ -48,6 +49,7 @@ class Tolerance:
     def used_by(self, *pieces: "LanePiece") -> float:
         """Return the largest share that the errors of pieces use up; above 1 it is too large."""
         limits = (self.position_m, self.heading_rad)
+        # (pieces, 2) metres and radians, each as a share of its limit.
         return float((np.array([piece.error for piece in pieces]) / limits).max())
 
 
@@ -94,6 +96,7 @@ def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> tuple[Lan
 def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
     """Return the curve from a point (2,) straight to another, at an even pace."""
     ends = np.array([start_m, end_m], dtype=np.float64)
+    # Control points at thirds: the parameter is the share of the way.
     return CubicBezier(np.linspace(ends[0], ends[1], 4))
 
 
@@ -115,6 +118,7 @@ def _letters(number: int) -> str:
 
 def _cut(line: Polyline, span: _Span, allowed: Tolerance) -> list[LanePiece]:
     """The part of the line as the pieces that it takes to stay within the tolerance."""
+    # A straight piece first: its two ends are the shortest that can be written.
     straight = _straight_piece(line, span)
     if STRAIGHT.used_by(straight) <= 1.0:
         return [straight]
@@ -123,6 +127,7 @@ def _cut(line: Polyline, span: _Span, allowed: Tolerance) -> list[LanePiece]:
         return [whole]
     halves = _best_halves(line, span, allowed)
     strays = whole.error[0] > allowed.position_m
+    # A heading that no cut betters is the line's own unrest; a place off the line is cut on.
     if not strays and allowed.used_by(*halves) >= allowed.used_by(whole):
         return [whole]
     return [piece for half in halves for piece in _cut(line, (half.start_m, half.end_m), allowed)]
@@ -147,6 +152,7 @@ def _best_halves(line: Polyline, span: _Span, allowed: Tolerance) -> tuple[LaneP
             for cut_m in cuts_m.tolist()
         ]
         best = min(range(_CUTS_TRIED), key=lambda number: badness(halves[number]))
+        # The second row lies between the neighbours of the best cut.
         low_m, high_m = cuts_m[max(0, best - 1)], cuts_m[min(best + 1, _CUTS_TRIED - 1)]
     return halves[best]
 
@@ -187,6 +193,7 @@ def _heading_at(line: Polyline, s_m: float) -> float:
         return float(chord_headings(line, np.array([s_m]))[0])
     inwards_m = np.linspace(0.0, min(_END_M, line.length_m), _END_SAMPLES)
     points = line.points_at(np.abs(s_m - inwards_m))
+    # p(s) - p(0) = a s + b s^2 by least squares, (samples, 2); a is the direction at the end.
     powers = np.column_stack([inwards_m, inwards_m * inwards_m])
     dx, dy = np.linalg.lstsq(powers, points - points[0], rcond=None)[0][0]
     return math.atan2(dy, dx) if s_m == 0.0 else math.atan2(-dy, -dx)

@@ -32,6 +32,7 @@ from augment.scene.lane_graph import LaneGraph
 
 FIRST_ID = 101
 """Spawned agents are numbered from here, so that the ids of a change stay clear of them."""
+# Gaps are whole metres, as interPlan draws them.
 NARROWEST_M = 10
 WIDEST_M = {TrafficDensity.HIGH: 33, TrafficDensity.MEDIUM: 50, TrafficDensity.LOW: 100}
 """No gap is as wide as this."""
@@ -230,6 +231,7 @@ def _fill(
     ego_m = line.project(scene.ego.x_m, scene.ego.y_m).s_m
     is_egos = lane_id == find_ego_lane(scene, graph)
     limit_mps = graph.lane(lane_id).speed_limit_mps
+    # s^2/m: share * v^2 is three times the way to a stop, v^2 / (2 DECEL_MPS2).
     share, speed_mps, here_m = 3.0 / (2.0 * DECEL_MPS2), -1.0, line.length_m
     while True:
         gap_m = float(rng.randrange(NARROWEST_M, widest_m))
@@ -242,6 +244,7 @@ def _fill(
         if speed_mps >= 0.0:
             delay_s = max(rng.gauss(0.25, 0.05), 0.1)
             way_m = share * speed_mps**2 + gap_m
+            # The speed v that solves share v^2 + delay v = way.
             root = math.sqrt(delay_s**2 + 4.0 * share * way_m)
             speed_mps = min(gap_m / 2.0, (root - delay_s) / (2.0 * share))
         elif has_one_exit:

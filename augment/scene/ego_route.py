@@ -16,6 +16,7 @@ from augment.geometry.polyline import Polyline
 from augment.scene.entities import Point, Scene, TrafficAgent, TurnType
 from augment.scene.lane_graph import LaneGraph, LanePosition
 
+# Stations that differ by no more are the same.
 _ROUNDED_M = 1e-6
 _ROUND_M = 100.0
 """A longer way to a lane near the ego leads round the block."""
@@ -93,6 +94,7 @@ class EgoRoute:
         lane_ids = (*before, *way[:-1], *after)
         lines = [graph.lane(name).centerline for name in lane_ids]
         to_own = lines[: len(before) + way.index(own)]
+        # Counted lane by lane: a projection may find another stretch of a winding route.
         ego_s_m = sum(line.length_m for line in to_own) + lane_s_m
         line = Polyline([point for line in lines for point in line.points_m.tolist()])
         if way == [via]:
@@ -103,6 +105,7 @@ class EgoRoute:
             lane_id=own,
             lane_s_m=lane_s_m,
             lane_ids=lane_ids,
+            # From the ego, as instructions count; negative behind it.
             ends_m=tuple(end - ego_s_m for end in accumulate(line.length_m for line in lines)),
             line=line,
             ego_s_m=ego_s_m,
@@ -132,6 +135,7 @@ class EgoRoute:
 
     def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
+        # The first lane that does not end before; at a joint that is the one before it.
         number = bisect_left(self.ends_m, ahead_m - _ROUNDED_M)
         if number == len(self.ends_m) or ahead_m < -self.ego_s_m - _ROUNDED_M:
             return None

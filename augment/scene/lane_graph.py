@@ -82,6 +82,8 @@ def best_aligned(beside: Iterable[Beside], heading_rad: float | None) -> Beside 
         turn_rad = 0.0
         if heading_rad is not None:
             turn_rad = abs(difference(place.tangent_rad, heading_rad))
+        # Headings in steps, or a degree would outweigh metres; names last, so that no order of the
+        # map decides.
         return round(turn_rad / math.radians(15.0)), round(place.distance_m, 4), place.lane_id
 
     return min(beside, key=misfit, default=None)
@@ -162,6 +164,7 @@ class LaneGraph:
         """
         point, lanes = shapely.Point(x_m, y_m), list(self.lanes.values())
         reach_m = NEAR_M + max((lane.width_m for lane in lanes), default=0.0) / 2.0
+        # A tree first: projecting onto every lane of a large map is what would take the time.
         near = self._lines.query(point, "dwithin", reach_m)
         if not len(near):
             near = self._lines.query_nearest(point, all_matches=False)
@@ -169,6 +172,7 @@ class LaneGraph:
         for lane in (lanes[number] for number in sorted(near.tolist())):
             place = lane.centerline.project(x_m, y_m)
             beyond_m = place.beyond_m
+            # Past an end the way to it has a part along the lane, beyond_m, and one across it.
             d_m = math.copysign(math.sqrt(place.distance_m**2 - beyond_m**2), place.d_m)
             beside = Beside(
                 lane_id=lane.id,
@@ -196,6 +200,7 @@ class LaneGraph:
             place
             for place in self.beside(x_m, y_m)
             if place.distance_m <= place.width_m / 2.0
+            # Past an end only within 5 cm of the centreline's last point.
             and (place.beyond_m == 0.0 or place.distance_m < 0.05)
         ]
         best = best_aligned(covering, heading_rad)
@@ -268,6 +273,7 @@ class LaneGraph:
         """
         ways = {name: ([name], 0.0) for name in starts}
         waiting = list(starts)
+        # Breadth first: the first way that arrives has the fewest lanes.
         for here in waiting:  # which grows meanwhile
             way, length_m = ways[here]
             if here in ends:
@@ -291,6 +297,7 @@ class LaneGraph:
 
 def classify_turn(line: Polyline) -> TurnType:
     """Return how a line turns from its first point to its last, all bends summed up."""
+    # (P - 1,); summed up, as a loop of 270 degrees ends like a turn of 90 the other way.
     headings = np.arctan2(*np.diff(line.points_m, axis=0).T[::-1]).tolist()
     turn = sum(difference(after, before) for before, after in pairwise(headings))
     if abs(turn) < STRAIGHT_BELOW_RAD:

@@ -121,6 +121,7 @@ def find_motion(
         others |= {
             movement.agent.id: movement for movement in _later(recording, times_s, taken, replaced)
         }
+    # Last of all: triggers watch where everybody else is.
     others |= _plan_movements(scene, times_s, graph, {ego.agent.id: ego} | others)
     return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
 
@@ -176,10 +177,12 @@ def _ego_movement(
     if recording is None or not recording.shows_ego:
         return _assume_movement(ego, times_s, graph, stays=True)
     read = _resample_track(ego, recording.ego, recording, times_s)
+    # (T, 4), and the steps at which the ego was seen.
     states, seen = read.states, np.flatnonzero(read.is_present)
     last = int(seen[-1])
     gaps = np.flatnonzero(~read.is_present[:last])
     visible = states[seen]
+    # Unwrapped for the interpolation over gaps, wrapped again after it.
     visible[:, 2] = np.unwrap(visible[:, 2])
     for column in range(4):
         states[gaps, column] = np.interp(times_s[gaps], times_s[seen], visible[:, column])
@@ -190,6 +193,7 @@ def _ego_movement(
         there = replace(
             ego, x_m=x_m, y_m=y_m, heading_rad=heading_rad, speed_mps=speed_mps, lane_id=lane_id
         )
+        # From the last step seen on by itself, its own time 0 there.
         states[last:] = _assume_movement(
             there, times_s[last:] - times_s[last], graph, stays=True
         ).states
@@ -207,6 +211,7 @@ def _resample_track(
 
 def read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> FloatArray:
     """Return states between two recorded ones; NaN beside a step where nothing was seen."""
+    # (T,) the recorded steps around each time; 1e-9 s, as 0.1 has no exact binary form.
     after = np.clip(np.searchsorted(recorded_s, times_s - 1e-9), 1, len(recorded_s) - 1)
     before = after - 1
     share = (times_s - recorded_s[before]) / (recorded_s[after] - recorded_s[before])
@@ -214,6 +219,7 @@ def read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> 
     # A share of nothing of what was not seen is nothing, not NaN.
     low, high = states[before], states[after]
     step = high - low
+    # The shorter way round, also over pi.
     step[:, 2] = _wrap_angles(step[:, 2])
     read = np.where(share < 1e-6, low, np.where(share > 1.0 - 1e-6, high, low + share * step))
     read[:, 2] = _wrap_angles(read[:, 2])
@@ -242,6 +248,7 @@ def _assume_movement(
         return Movement(agent=agent, source=MotionSource.STANDING, states=states)
     course = HeldCourse(agent, graph)
     for step in range(1, len(times_s)):
+        # Speed times time: without a motion the velocity is held.
         pose = course.pose_at(float(times_s[step]) * agent.speed_mps)
         if pose is None:
             states[step:] = [*states[step - 1, :3], 0.0] if stays else np.nan
@@ -252,6 +259,7 @@ def _assume_movement(
 
 def _wrap_angles(angles_rad: FloatArray) -> FloatArray:
     """Angles in (-pi, pi]."""
+    # mod gives [0, 2 pi), turned round so that pi itself stays and -pi does not.
     return np.asarray(np.pi - np.mod(np.pi - angles_rad, 2.0 * np.pi), dtype=np.float64)
 
 

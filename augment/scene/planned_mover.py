@@ -31,11 +31,13 @@ WALK_S = 15.0
 """A walk without a pace of its own takes this long, as interPlan's do."""
 SETS_OUT_WITHIN_M = 50.0
 """People with a walk set out once the ego is this near to their start."""
+# Between the points of lines that paths are made into.
 SAMPLE_M = 0.5
 LEAST_M = 1e-6
 """Points nearer to each other than this are one."""
 MOST_SAMPLES = 20_000
 """Of one line: paths of strangers may be as long as they like, lines of 10 km are exact."""
+# Points of one lane change.
 MOST_OF_CHANGE = 100
 REACH_M = 600.0
 """So far paths over lanes are followed past the last lane that is named."""
@@ -72,6 +74,7 @@ class HeldCourse:
             return
         line = graph.lane(lane_id).centerline
         self._here = line.project(agent.x_m, agent.y_m)
+        # Its turn from the lane's direction is kept; who heads against the lane has the sign -1.
         self._askew = wrap(agent.heading_rad - line.heading_at(self._here.s_m))
         self._sign = math.copysign(1.0, math.cos(self._askew))
         if abs(math.cos(self._askew)) > math.cos(_ALONG_BELOW_RAD):
@@ -192,10 +195,12 @@ def way_and_speed(
     speeds: tuple[tuple[float, float], ...], own_mps: float, since_s: float
 ) -> tuple[float, float]:
     """Return way and speed so long after the start: the area under the speeds, and the last."""
+    # Without a row at 0 s the profile begins at the agent's own speed.
     rows = speeds if speeds and speeds[0][0] == 0.0 else ((0.0, own_mps), *speeds)
     gone_m = 0.0
     for (from_s, from_mps), (to_s, to_mps) in pairwise(rows):
         if since_s < to_s:
+            # Speeds are linear between rows, so the way is the area of trapezes.
             now_mps = from_mps + (to_mps - from_mps) * (since_s - from_s) / (to_s - from_s)
             return gone_m + (since_s - from_s) * (from_mps + now_mps) / 2.0, now_mps
         gone_m += (to_s - from_s) * (from_mps + to_mps) / 2.0
@@ -217,6 +222,7 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
         return None
     if len(points) == 2:
         return Polyline(points)
+    # (P,) the length of the chords as parameter: even steps of it are about even on the curve.
     chords_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     count = min(max(3, math.ceil(chords_m[-1] / SAMPLE_M) + 1), MOST_SAMPLES)
     samples_m = np.linspace(0.0, chords_m[-1], count)
@@ -238,12 +244,15 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline | None:
     line, last_begins_m = _join_run(graph, runs[0])
     at = line.project(*here)
     at_m, d_m, points = at.s_m, at.d_m, [here]
+    # Who does not drive in its first lane changes onto it, as from another lane.
     is_beside = abs(d_m) > graph.lane(path.lane_ids[0]).width_m * _KEEPS_OFFSET_SHARE
     for run in runs[0 if is_beside and at.beyond_m == 0.0 else 1 :]:
+        # A change begins at once, or where the last lane of the run before begins.
         begins_m = at_m if run is runs[0] else max(at_m, last_begins_m)
         points += [line.position(s_m, d_m) for s_m in _samples(at_m, begins_m)]
         target, last_begins_m = _join_run(graph, run)
         for s_m in _samples(begins_m, begins_m + path.change_m, most=MOST_OF_CHANGE):
+            # From the offset in the old lane to the abreast place in the centre of the new one.
             share = smooth_share((s_m - begins_m) / path.change_m)
             start = line.position(s_m, d_m)
             end = target.position(target.project(*start).s_m)
@@ -325,6 +334,7 @@ def run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
 
 def smooth_share(share: float) -> float:
     """Return a share that goes from 0 to 1 without a jump in speed or acceleration across."""
+    # Quintic with first and second derivative 0 at 0 and at 1.
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 

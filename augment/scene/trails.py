@@ -13,7 +13,9 @@ from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, find_motion, wit
 from augment.scene.planned_motion import AtTime, PlannedMotion
 from augment.scene.recording import Recording
 
+# Between the outlines of a trail.
 EVERY_S = 1.0
+# Outlines nearer to the one before are left out.
 _LEAST_M = 0.3
 
 _STEPS, _EVERY = round(HORIZON_S / STEP_S), round(EVERY_S / STEP_S)
