@@ -110,7 +110,9 @@ def check_heading(case: Case) -> Iterator[Finding]:
 
 def unwrap_deg(turn_rad: float, near_deg: float) -> float:
     """Return a turn in degrees, as the number of it that is nearest to another."""
-    return near_deg + math.degrees(difference(turn_rad, math.radians(near_deg)))
+    turn_deg = math.degrees(difference(turn_rad, 0.0))
+    turns_deg = (turn_deg, turn_deg + 360.0, turn_deg - 360.0)
+    return min(turns_deg, key=lambda turn: (round(abs(turn - near_deg), 6), abs(turn)))
 
 
 def check_walk(case: Case) -> Iterator[Finding]:

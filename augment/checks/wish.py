@@ -27,6 +27,7 @@ from augment.geometry.polyline import FloatArray
 from augment.scene import intent as wish
 from augment.scene.entities import Modification, Point, TrafficAgent
 from augment.scene.planned_motion import MotionPreset
+from augment.scene.presets import find_road_edge_m
 
 ABREAST_M = 3.0
 """From one to the next of those who walk side by side, at most."""
@@ -291,7 +292,12 @@ class _Fitting:
             lateral, band = request.spot.lateral, lanes.band(wish.LaneChoice.OWN, ahead_m)
             if band is not None and (request.on_road or lateral is not None):
                 return find_across(lateral, lanes.side_sign(lateral), band.width_m, 0.0)
-            return ends[0] * ACROSS_M, ends[-1] * ACROSS_M
+            side = request.start
+            if side is None or request.motion is None:
+                return ends[0] * ACROSS_M, ends[-1] * ACROSS_M
+            edge_m = find_road_edge_m(lanes.route, ahead_m, side.sign)  # there he waits
+            low_m, high_m = sorted((side.sign * edge_m, side.sign * (edge_m + ACROSS_M)))
+            return low_m, high_m
 
         stations_m = list_stations(request.spot, lanes)
         begins = Place(lanes=lanes, stations_m=stations_m, across=beside)

@@ -39,6 +39,8 @@ _MIDDLE_M = 0.1
 _HINGED_M = 0.15
 """A closed door's edge is so near to its car's side."""
 _OPENS_S = 0.3, 3.0
+_WIDER = 1.05
+"""Bends are measured by chords, so a little more than what is needed."""
 _SLOWS = planned_motion.MotionPreset.HARD_BRAKING, planned_motion.MotionPreset.EMERGENCY_STOP
 
 Speeds = tuple[tuple[float, float], ...]
@@ -139,6 +141,8 @@ def measure_placed(
         band = lanes.band(spot.lane, station_m) if spot.lane else None
         if band is not None and request.facing is None:
             placed = replace(placed, heading_rad=band.tangent_rad, lane_id=band.lane_id)
+    else:
+        placed = replace(placed, speed_mps=0.0)  # who is to walk or to open later waits
     (answer,) = (other for other in motion.others if other.agent.id == agent.id)
     at_t0 = MotionCase(whole=case, motion=motion, answer=answer, placed=placed, wish=wish, car=car)
     nearest = at_t0.find_nearest()
@@ -339,10 +343,12 @@ def _list_paths(
         )
         here = case.carry_out(waits, min(after_s, HORIZON_S))[-1, :2]
         began_s = min(case.own_start_s, HORIZON_S)
-        # (points, 2), moved by as much as its beginning is.
-        points = own.points_m + here - case.answer.states[round(began_s / STEP_S), :2]
-        if not np.isnan(points).any():
-            yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
+        # (P, 2) from its beginning, moved there and widened where they turn too narrowly.
+        ways_m = own.points_m - case.answer.states[round(began_s / STEP_S), :2]
+        for scale in (1.0, _find_scale(case)):
+            points = here + scale * ways_m
+            if not np.isnan(points).any():
+                yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
     numbers = presets.PresetNumbers(start=planned_motion.AtTime(after_s=min(after_s, HORIZON_S)))
     if speeds and "speed_mps" in presets.preset_numbers(wish.preset):
         numbers = replace(numbers, speed_mps=speeds[-1][1])
@@ -354,14 +360,23 @@ def _list_paths(
     yield usual.motion.path
 
 
+def _find_scale(case: MotionCase) -> float:
+    """Return how much wider the answer's bends would have to be for its kind, at least 1."""
+    limits = LIMITS.get(case.placed.type)
+    if limits is None:
+        return 1.0
+    sideways, curvature = measure_bends(case.answer.states)
+    return max(1.0, _WIDER * sideways / limits.sideways, _WIDER * curvature * limits.radius_m)
+
+
 def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterator[TrafficAgent]:
     """Yield doors in the car's side, along it or across it, that come out on the ego's side."""
     door, own, place = case.answer.agent, case.own, case.whole.route.locate_agent(car)
     toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
     # (2,) turns the car's frame over, so that out of the door's side is positive.
     side = np.array([1.0, math.copysign(1.0, math.sin(toward_rad - car.heading_rad))])
-    points = own.path.points_m[-1:] if isinstance(own.path, planned_motion.PointPath) else ()
-    local = car.pose.to_local(np.array([(door.x_m, door.y_m), *points])) * side
+    at_once = replace(door, motion=replace(own, start=planned_motion.AtTime()))
+    local = car.pose.to_local(case.carry_out(at_once)[[0, -1], :2]) * side  # shut, open
     half_m, slab_m, reach_m = car.width_m / 2.0, presets.DOOR_WIDTH_M, presets.DOOR_LENGTH_M
     ends_m = (car.length_m - reach_m) / 2.0
     opens_s = (wish.duration_s.low, wish.duration_s.high) if wish.duration_s else _OPENS_S

@@ -152,7 +152,7 @@ def refuses(answer: str) -> bool:
     rest = _NOTHING.sub("", text)
     is_short = len(text) <= _LONGEST_REFUSAL
     says_so = is_short and (says("declines", text) or says("unmet", text))
-    return "{" not in rest and (rest != text or says_so)
+    return "{" not in rest.replace("{}", "") and (rest != text or says_so)
 
 
 def without_thoughts(answer: str) -> str:

@@ -277,7 +277,7 @@ def _late_pedestrian(case: _Case) -> TrafficAgent:
     if case.is_in_ego_lane():
         raise case.refusal("who starts late stands beside the ego's lane before.")
     side = math.copysign(1.0, case.place.left_m)
-    edge_m = _road_edge_m(case.route, case.place.ahead_m, -side)
+    edge_m = find_road_edge_m(case.route, case.place.ahead_m, -side)
     end = case.route.position(case.place.ahead_m, -side * (edge_m + _KERB_M))
     east, north = end[0] - case.agent.x_m, end[1] - case.agent.y_m
     waiting = replace(
@@ -468,7 +468,7 @@ def _ramp(
     return ((takes_s, to_mps),) if takes_s > 0.0 else ()
 
 
-def _road_edge_m(route: EgoRoute, ahead_m: float, side: float) -> float:
+def find_road_edge_m(route: EgoRoute, ahead_m: float, side: float) -> float:
     """Return the distance in m from the ego's way, straight across, to its road's far edge."""
     end_m = across_m = 0.0
     while across_m - end_m < _GAP_M and across_m < _ACROSS_M:

@@ -4,6 +4,7 @@ Of each answer the numbers of its block alone; on the scenes, sentences and inte
 set. Careless answers copy the example values of the prompt's rules.
 """
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +18,7 @@ from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.scene.intent import Intent, VehicleRequest
 from augment.scene.intent_parts import Amount, StartWish
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, PointPath
-from tests.fixtures.shelf import MOVING_SLUGS, entry, shown_scene
+from tests.fixtures.shelf import MOVING_SLUGS, ROUNDED_M, entry, shown_scene
 
 CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
 U_TURN, DOOR, CHILD = "u-turn-quarry-narrows", "door-lime-street", "late-pedestrian-lime-street"
@@ -191,6 +192,41 @@ def test_the_distance_grows_and_stays_below_that_to_the_reference(slug: str) -> 
         assert found.mean_m is not None
         assert last_m < distance_m <= found.mean_m + 0.02
         last_m = distance_m
+
+
+def moved(slug: str, **parts: Any) -> TrafficAgent:
+    """The reference's only agent, with another motion."""
+    (made,) = entry(slug).reference.added
+    assert made.motion is not None
+    return replace(made, motion=replace(made.motion, **parts))
+
+
+def test_who_walks_already_is_not_somebody_who_waits() -> None:
+    # 1.5 s early at 3 m/s; he may stand further out, never in the middle of the road.
+    slug = "late-pedestrian-boulevard-north"
+    made = replace(moved(slug), motion=None, walk_to_m=(45.0, 6.25), speed_mps=3.0)
+    assert wish_m(slug, Modification(added=(made,))) > 1.0
+
+
+def test_a_door_that_stops_on_its_way_is_as_open_as_it_gets() -> None:
+    slug = "door-terrace-row"
+    further = PointPath(points_m=((28.5, -1.5),), keeps_heading=True)
+    assert wish_m(slug, Modification(added=(moved(slug, path=further),))) <= ROUNDED_M
+
+
+@pytest.mark.parametrize(("radius_m", "most_m"), [(4.4, 1.5), (5.0, 0.3), (5.5, 0.0)])
+def test_a_turn_that_is_a_little_too_narrow_is_a_little_off(
+    radius_m: float, most_m: float
+) -> None:
+    slug = "u-turn-station-cross"
+    turns = [math.pi / 2.0 + step * math.pi / 6.0 for step in range(7)]
+    circle = [
+        (38.0 + radius_m * math.cos(turn), -6.6 - radius_m * (1.0 - math.sin(turn)))
+        for turn in turns
+    ]
+    y_m = -6.6 - 2.0 * radius_m
+    path = PointPath(points_m=(*circle, (69.0, y_m), (99.0, y_m)))
+    assert wish_m(slug, Modification(added=(moved(slug, path=path),))) <= most_m
 
 
 def test_where_a_motion_begins_is_judged_over_time() -> None:

@@ -64,6 +64,12 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
         "Il n'y a pas de bus : cette demande ne peut pas être satisfaite.",
         "No hay ningún autobús, así que no es posible.",
         "场景中没有公交车，所以无法完成。",
+        "Unfortunately no bus exists in this scene. No changes are made.",
+        "The scene contains no bus; therefore nothing can be moved.",
+        "Not possible: there is no second cyclist.",
+        "There is no bus in the scene. I therefore make no changes.",
+        "The user's wish is unsatisfiable: no lane comes the other way.",
+        "Summary: cannot be done.\n\nModification Dict: {}\n",
     ],
 )
 def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -> None:
@@ -80,6 +86,7 @@ def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -
         "I can't: " + GOOD.replace('"', "'"),
         "The place at 20 m is taken, so the car can stand at 24 m instead.",
         "There is no traffic behind, so the car stands 20 m ahead.",
+        "There is no crosswalk, so pedestrians can't cross there; the car stands 20 m ahead.",
         "",
     ],
 )
