@@ -96,12 +96,14 @@ def _order(
         [int(pair) for pair in rng.permutation(np.flatnonzero(column))] for column in mine.T
     ]
     for pair, scenario in more.repeated:
+        # Repeats and what they show get places of their own, before the others are filled in.
         waiting[scenario].remove(pair)
     best: list[Slot] = []
     nearest = -1
     for _ in range(TRIES if more.repeated else 1):
         columns = _columns(sequence(_sum_samples(counts, bases), gap, rng), counts, bases, rng)
         slots = _fill_places(waiting, more, columns, distance, rng)
+        # Of the best order its nearest repeat is furthest from what it shows.
         gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
         if min(gaps, default=distance) > nearest:
             best, nearest = slots, min(gaps, default=distance)
@@ -195,6 +197,7 @@ def largest_gap(counts: IntArray, gap: int) -> int:
     if most < 2:
         return gap
     fullest = int((counts == most).sum())
+    # (most - 1) (gap + 1) + fullest <= all showings, solved for the gap.
     return min(gap, (int(counts.sum()) - fullest) // (most - 1) - 1)
 
 

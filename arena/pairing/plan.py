@@ -48,6 +48,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     check_rules(rules, grid)
     rng = np.random.default_rng(rules.seed)
     experts, votes = len(rules.experts), rules.votes_per_expert
+    # (E, P, S). All steps draw from one generator: their order is part of the plan.
     chosen = choose_units(grid.showable, experts, votes, rng)
     bring_together(chosen, grid.showable, rules.overlap_share, rng)
     extras = [_extras(rules, grid, mine, rng) for mine in chosen]
@@ -71,6 +72,7 @@ def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Genera
     repeats, checks = rules.count_extras(rules.votes_per_expert)
     if not repeats and not checks:
         return Extras()
+    # (units, 2): pair and scenario of each.
     units = np.argwhere(mine)
     drawn = rng.permutation(len(units))[:repeats]
     shown = rng.permutation(len(rules.checks))[:checks]
@@ -116,6 +118,7 @@ def lay_out(
         else:
             sides = grid.pairs[slot.pair]
             is_repeat = slot.again is not None
+            # A repeat is turned around: who prefers a side must not look steady.
             flip = left_of[slot.again or 0] == sides[0] if is_repeat else bool(next(waiting))
         left, right = sides[::-1] if flip else sides
         left_of[position] = left

@@ -223,6 +223,7 @@ def draw_ties(
     average = sum(votes_by_judge.values()) / showable if showable else 0.0
     drawn = []
     for triple in settled:
+        # By the pair itself: what is drawn for one depends on no other.
         dice = Random(f"ties {seed} {triple}")
         number = math.floor(average) + (dice.random() < average % 1.0)
         # Each judge's place in line: without replacement, in proportion to the votes.

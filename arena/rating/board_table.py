@@ -129,6 +129,7 @@ def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[An
     fixed = [line.rating for line in lines if line.name in founders and line.rating is not None]
     if len(parts) != 1 or not fixed:
         return list(lines)
+    # Ratings are known up to a shift: one that is the same for all moves no difference.
     shift = MEAN - sum(fixed) / len(fixed)
 
     def move(value: float | None) -> float | None:
@@ -145,4 +146,5 @@ def spread_over(ranked: Sequence[AnyName], most: int) -> list[AnyName]:
     last = len(ranked) - 1
     if last < most:
         return list(ranked)
+    # Even steps from 0 to the last place, both included.
     return [ranked[round(step * last / (most - 1))] for step in range(most)]

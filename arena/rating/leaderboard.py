@@ -41,6 +41,7 @@ from arena.rating.rules import (
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
 
+# Resamples by default; the paper has 1000.
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
 
@@ -165,6 +166,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     above = chains.above()
     parts = sorted(
         (members for members in chains.parts if len(members) > 1),
+        # Group by group, within a group from the top down.
         key=lambda members: (chains.group_of[members[0]], above[members[0]], members[0]),
     )
     if len(parts) > 1:  # whose scales have nothing in common
@@ -177,6 +179,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     if chains.reaches.any():
         _rank_across(lines, present, counting, chains, rules)
         if rules.intervals is Intervals.CLOSED_FORM:
+            # (C, C) over all lines, from those who have votes.
             across[np.ix_(present, present)] = judge_across(counting, chains, rules.unit)
     order = _standing_order(chains, [lines[index] for index in present])
     absent = sorted(set(range(len(lines))) - set(present.tolist()))

@@ -23,6 +23,7 @@ def whole_percent(share: float) -> int:
     A half goes to the even number, also where 100 times the share falls short of it: 0.575 of the
     votes are 58 %, and the 0.425 beside them 42 %.
     """
+    # The inner rounding mends 57.49999999999999, the outer one takes halves to the even number.
     return round(round(100.0 * share, 9))
 
 

@@ -92,6 +92,7 @@ def _tiers(places: Sequence[int], apart: Pairs) -> list[list[int]]:
     """Return tiers: those with nobody above, then those with nobody of the rest above, ..."""
     left, tiers = list(places), []
     while left:
+        # Peeled from the top: places whose betters are all in tiers before.
         tier = [place for place in left if not any((other, place) in apart for other in left)]
         tiers.append(tier)
         left = [place for place in left if place not in tier]

@@ -21,6 +21,7 @@ from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo,
 from augment.scene.planned_mover import PlannedMover, walk_as_motion
 from augment.scene.presets import find_bend_end
 
+# Since its start.
 _CARRIED_OUT_S = 15.0
 _THERE_M = 0.3
 """So near to where a lane change ends it is over."""
@@ -102,6 +103,7 @@ def _carry_out(case: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatA
     for time_s in np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist():
         mover.advance(time_s)
         rows.append(mover.state())
+    # (T, 4), without the steps past the map.
     states = np.array(rows)
     return states[~np.isnan(states[:, 0])]
 
@@ -123,6 +125,7 @@ def check_path(
             yield hold(kind, [agent], what, turned_deg, _TURNS_ROUND, unit="degrees")
         case MotionPreset.LATE_PEDESTRIAN | MotionPreset.RED_LIGHT:
             words = "{agents[0]} is to cross the ego's way ahead of it"
+            # Between two steps on different sides of the ego's way, it was on it.
             meets = (b.ahead_m for a, b in pairwise(places) if a.left_m * b.left_m <= 0.0)
             crosses = max(meets, default=0.0) > 0.0 and first.left_m * last.left_m < 0.0
             yield find(FindingKind.ASKED_CROSSING, crosses, [agent], f"{words}.")
@@ -146,6 +149,7 @@ def check_path(
 def _numbers(
     case: Case, agent: TrafficAgent, motion: PlannedMotion, wish: MotionWish, states: FloatArray
 ) -> Iterator[Finding]:
+    # Speeds are linear from pair to pair, so each leg has one deceleration.
     profile = [(0.0, agent.speed_mps), *motion.speeds]
     slows = wish.preset in (MotionPreset.HARD_BRAKING, MotionPreset.EMERGENCY_STOP)
     braking = [
@@ -154,6 +158,7 @@ def _numbers(
     moves = states[:, 3] > 0.0
     if wish.preset is MotionPreset.CUT_IN:
         lefts_m = np.array([case.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])
+        # (T,): a cut-in lasts until it is in its new lane, not until it stands.
         moves = np.abs(lefts_m - lefts_m[-1]) > _THERE_M
     measured = {
         "speed_mps": ("The speed in the end of {agents[0]}", profile[-1][1], "m/s"),

@@ -150,6 +150,7 @@ def _bounds(case: Case, lateral: wish.Lateral | None, band: Band, half_box_m: fl
 def _cones(case: Case, party: Party, request: wish.ConesRequest, band: Band) -> Iterator[Finding]:
     """A line by its side of the lane, all other shapes by their middle and their first cone."""
     cones = sorted(party.placed, key=case.ahead_m)
+    # Left of the middle of the lane that is asked for, in order along it.
     lefts = [case.left_m(cone) - band.left_m for cone in cones]
     sign, middle_m = case.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
     is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
@@ -199,6 +200,7 @@ def _in_row(case: Case, party: Party, spacing: wish.Length | None) -> Iterator[F
     # Who stands in another is a fault of its own, which leaves gaps elsewhere.
     if any(apart_m(thing, other) <= thing.width_m for thing, other in combinations(things, 2)):
         return
+    # Each one's nearest neighbour, in the middle of all of them.
     straight_m = median(
         min(apart_m(thing, other) for other in things if other is not thing) for thing in things
     )

@@ -71,6 +71,7 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
         shared = frames.overlap(situation.boxes[agent.id], situation.boxes[other.id])
         if shared.depth_m <= TOUCH_M:
             continue
+        # Of the smaller box: the larger share is its own.
         share = max(shared.share_of_first, shared.share_of_second)
         is_ego = other.id == ego_id
         yield find(
@@ -85,6 +86,7 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
 
 
 def _overlap_severity(body: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
+    # Shares of the smaller box: up to the first a fact, up to the second doubtful.
     fine, doubtful = 0.0, SLIGHT_SHARE
     if any(_is_door(a) and b.type in VEHICLES for a, b in ((body, other), (other, body))):
         fine = 1.0
@@ -108,6 +110,7 @@ def size(situation: ChangedScene) -> Iterator[Finding]:
     for agent in situation.changed:
         length_m, width_m = agent.length_m, agent.width_m
         shortest, longest, narrowest, widest = USUAL_SIZES_M[agent.type]
+        # By how much each side is below its least or above its most; 1 is at the limit.
         factors = (
             *(shortest / max(length_m, 1e-3), length_m / longest),
             *(narrowest / max(width_m, 1e-3), width_m / widest),
@@ -136,11 +139,13 @@ def speed(situation: ChangedScene) -> Iterator[Finding]:
         speeds, speed_mps = USUAL_MPS, agent.speed_mps
         if agent.id in situation.planned:
             speeds = _MOVED_MPS
+            # (T,) speeds, NaN past the map.
             speed_mps = float(np.nanmax(situation.planned[agent.id].states[:, 3]))
         usual_mps = speeds.get(agent.type, STOPPED_BELOW_MPS)
         most_mps, under = usual_mps, situation.under[agent.id]
         if under is not None and agent.type in (AgentType.VEHICLE, AgentType.BUS):
             limit_mps = situation.ground.graph.lanes[under.lane_id].speed_limit_mps
+            # A fast limit makes nothing usual that its kind does not drive.
             most_mps = min(usual_mps, OVER_LIMIT * limit_mps) if limit_mps else usual_mps
         if speed_mps <= most_mps:
             continue
@@ -181,6 +186,7 @@ def walk_blocked(situation: ChangedScene) -> Iterator[Finding]:
             if not is_stopped(other) or other.type is AgentType.PEDESTRIAN:
                 continue
             box = shapely.Polygon(situation.boxes[other.id].corners_m)
+            # Along the walk, so that who only passes a corner goes through little of it.
             inside_m = float(shapely.intersection(walk, box).length)
             if inside_m > GRAZED_M:
                 words = "The walk of {agents[0]} leads {inside_m:.1f} m through {agents[1]}."

@@ -62,8 +62,10 @@ def _numbers(preset: MotionPreset, agent: TrafficAgent, motion: PlannedMotion) -
     takes_s, to_mps = motion.speeds[-1] if motion.speeds else (0.0, own_mps)
     values = {"speed_mps": to_mps, "duration_s": takes_s}
     if takes_s > 0.0 and own_mps > to_mps:
+        # Even braking over the whole time.
         values["braking_mps2"] = (own_mps - to_mps) / takes_s
     if isinstance(motion.path, LanePath) and own_mps + to_mps > 0.0:
+        # The length of the change over the mean speed.
         values["duration_s"] = 2.0 * motion.path.change_m / (own_mps + to_mps)
     start = None if preset is MotionPreset.EMERGENCY_STOP else motion.start
     numbers = {name: values.get(name) or None for name in preset_numbers(preset)}

@@ -121,6 +121,7 @@ class Surface:
         """From where to where each piece lies under a ray; it begins a seam behind its point."""
         step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
         start = np.array([x_m, y_m])
+        # A seam further back, for a point that stands on one.
         ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
         near = self._pieces[self._tree.query(ray, predicate="intersects")]
         parts = shapely.get_parts(shapely.intersection(near, ray))

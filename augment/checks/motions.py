@@ -157,6 +157,7 @@ def motion_off_road(situation: ChangedScene) -> Iterator[Finding]:
         there = mover.states[mover.is_present]
         steps = list(range(0, len(there), STRAY_STEPS))
         if len(there) < len(mover.states):
+            # (T,) metres to where it leaves the map; within its length the nose is past the edge.
             left_m = np.hypot(*(there[:, :2] - there[-1, :2]).T)
             steps = [step for step in steps if left_m[step] > agent.length_m]
         strays = [(stray(ground, agent.type, _box_at(box, there[step])), step) for step in steps]
@@ -214,6 +215,7 @@ def _first_step(situation: ChangedScene, mover: Movement) -> int | None:
     """The first step at which a motion is carried out, None where it is not or leaves the map."""
     if mover.started_s is None:
         return None
+    # 1e-9 s, as a start may fall on a step but for rounding.
     first = int(np.searchsorted(situation.motion.times_s, mover.started_s - 1e-9))
     return first if first < len(mover.states) and mover.is_present[first] else None
 
@@ -250,6 +252,7 @@ def _box_at(box: Box, state: FloatArray) -> Box:
 
 def _ego_comes(situation: ChangedScene, mover: Movement) -> int:
     """The step at which the ego is nearest, the last one if it never comes near."""
+    # (T,), NaN while one of the two is not there.
     apart_m = _apart_m(mover, situation.motion.ego)
     nearest = int(np.nanargmin(apart_m))
     return nearest if nearest and apart_m[nearest] <= COMES_WITHIN_M else len(apart_m) - 1
@@ -263,6 +266,7 @@ def _contact(movement: Movement, other: Movement, until: int) -> int | None:
     # Circles round both boxes first: few steps are left to be measured.
     near, parted = _apart_m(movement, other)[: until + 1] < reach_m, False
     for step, is_near in enumerate(near.tolist()):
+        # Passing corners is no contact.
         touches = is_near and _depth_m(movement, other, step) > GRAZED_M
         if touches and parted:
             return step

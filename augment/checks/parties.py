@@ -164,12 +164,14 @@ def match_to_requests(
     roles = [_roles(request, added) for request in intent.requests]
     places = [(number, role) for number, some in enumerate(roles) for role in some]
     spots = [spot_middle(request.spot, lanes) for request in intent.requests]
+    # Every place with every agent, nearest first; equally near ones in the order of the intent.
     near = sorted(
         (math.dist(spots[number], (agent.x_m, agent.y_m)), place, index)
         for place, (number, _) in enumerate(places)
         for index, agent in enumerate(added)
     )
     taken: dict[int, int] = {}
+    # Types that fit come first; only what is still missing then takes anybody.
     for must_suit in (True, False):
         for _, place, index in near:
             is_free = place not in taken and index not in taken.values()
@@ -183,6 +185,7 @@ def match_to_requests(
         right = [(agent, role) for agent, role in answers if role.suits(agent)]
         missing = [places[place][1] for place in own if place not in taken]
         agents = [agent for agent, role in right if role is not Role.WORKER]
+        # Before the ego or behind it alike.
         agents.sort(key=lambda agent: abs(lanes.route.locate_agent(agent).ahead_m))
         party = Party(
             request=request,
@@ -215,6 +218,7 @@ def spot_middle(spot: wish.Spot, lanes: LanesAcross) -> Point:
     What is open is taken as the ego's own place and lane: it only says who is nearest.
     """
     lanes = lanes.over(spot.via) or lanes
+    # "At least 20 m" has one end, which is then its middle.
     span_m = [end for end in spot.span_m or (0.0,) if math.isfinite(end)]
     ahead_m = sum(span_m) / len(span_m)
     band = lanes.band(spot.lane or wish.LaneChoice.OWN, ahead_m)
@@ -263,6 +267,7 @@ class Case:
 
     def gap(self, wanted: wish.Length) -> "Bounds":
         """Return how far apart two things may be of which this is asked for."""
+        # Of the larger number of a range.
         share_m = self.tolerances.spacing_share * wanted.high_m
         return Bounds(wanted.low_m, wanted.high_m, max(self.tolerances.spacing_m, share_m))
 
@@ -375,6 +380,7 @@ def meets_route(route: EgoRoute, agent: TrafficAgent) -> Point | None:
     start, end = route.locate_agent(agent).left_m, route.locate(*agent.walk_to_m).left_m
     if start * end >= 0.0:
         return None
+    # Distances to the route go from start to end, linearly along the walk; there they are 0.
     share = start / (start - end)
     x_m, y_m = agent.walk_to_m
     return agent.x_m + share * (x_m - agent.x_m), agent.y_m + share * (y_m - agent.y_m)

@@ -16,9 +16,11 @@ ALONG_BELOW_DEG = 30.0
 OPPOSITE_ABOVE_DEG = 150.0
 ROADSIDE_M = 3.0
 """Up to here off a lane a vehicle is parked beside it; further out no lane gives a direction."""
+# Of a heading against the walk: beyond it somebody walks backwards.
 BACKWARDS_ABOVE_DEG = 90.0
 SHORT_M = 1.5
 """A step of a worker who stands has no direction that anybody would have to face."""
+# Shares of a vehicle's box off the road, from one that no map resolves on.
 SEEN_SHARE = 0.02
 KERB_SHARE = 0.15
 """A third of a metre of a car's width: maps and placements are no better."""
@@ -50,6 +52,7 @@ def lane(situation: ChangedScene) -> Iterator[Finding]:
         way = "its lanes and {left_m:.1f} m left of them"
         if under is not None:
             words = f"on {{lanes[0]}}, {under.d_m:.2f} m left of its centre line"
+            # Far beside the route its metres ahead say little: the way to that lane says more.
             if abs(place.left_m) > _BRANCH_M:
                 there = find_place(
                     LanesAcross(route=route), (agent.x_m, agent.y_m), agent.heading_rad
@@ -77,6 +80,7 @@ def lane_named(situation: ChangedScene) -> Iterator[Finding]:
         severity, off_m = Severity.WRONG, math.inf
         words = "{agents[0]} names {lanes[0]} as its lane, which the map does not have."
         if lane is not None:
+            # From the lane's edge, negative on it.
             off_m = lane.centerline.project(agent.x_m, agent.y_m).distance_m - lane.width_m / 2.0
             severity = Severity.DOUBTFUL
             words = f"{{agents[0]}} names {{lanes[0]}} as its lane but is {off_m:.1f} m off it."
@@ -175,6 +179,7 @@ def stray(ground: Ground, kind: AgentType, box: Box) -> Stray:
         limits = (EDGE_M, EDGE_M, NEAR_ROAD_M)
     elif ground.walkways.is_empty:
         limits = (0.0, math.inf, math.inf)
+    # Limits rise from a fact over doubtful to wrong: those that are passed name the severity.
     over = sum(off > limit for limit in limits)
     return Stray(over=over, off=off, outside_share=share, gap_m=gap_m)
 

@@ -220,6 +220,7 @@ class _Fitting:
         points = [(agent.x_m, agent.y_m) for agent in agents]
         if request.spot == wish.Spot() and request.motion is not None:
             return [self._place_mover(request, agent) for agent in agents]
+        # The spot is that of the first along the lane.
         first = min(range(len(agents)), key=lambda index: self._ahead_m(agents[index]))
         place = Place.of(request.spot, self._lanes, agents[first].width_m)
         if request.spacing is None or len(agents) == 1:

@@ -82,6 +82,7 @@ class MotionCase:
     def carry_out(self, agent: TrafficAgent, until_s: float = HORIZON_S) -> FloatArray:
         """Return the states (T, 4) of an agent whose motion waits for nobody."""
         mover, rows = PlannedMover(agent, self.whole.route.graph), []
+        # Half a step more, so that rounding loses no last step.
         for time_s in np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist():
             mover.advance(time_s)
             rows.append(mover.state())
@@ -292,6 +293,7 @@ def _find_ramp(case: MotionCase, wish: MotionWish) -> _Ramp:
     elif slows or from_mps > 0.0:
         to_mps = 0.0 if slows else from_mps
     limits = LIMITS.get(case.placed.type)
+    # Who has no limits may change its speed at once.
     most_mps2 = math.inf
     if limits is not None:
         most_mps2 = limits.braking if to_mps < from_mps else limits.speeding_up
@@ -299,6 +301,7 @@ def _find_ramp(case: MotionCase, wish: MotionWish) -> _Ramp:
     if wish.braking_mps2 is not None:
         least_mps2, most_mps2 = wish.braking_mps2.low, wish.braking_mps2.high
     change_mps = abs(to_mps - from_mps)
+    # The hardest change takes the least time.
     return _Ramp(to_mps=to_mps, least_s=change_mps / most_mps2, most_s=change_mps / least_mps2)
 
 
@@ -312,6 +315,7 @@ def _list_speeds(case: MotionCase, wish: MotionWish) -> Iterator[Speeds]:
     steepest = (steps[:, 1] / steps[:, 0]).tolist()
     if rows[0][1] != from_mps:
         steepest.append(math.inf)  # a jump, which people manage
+    # As long as a ramp that is as steep as its steepest part.
     takes_s = change_mps / max(steepest, default=math.inf) if change_mps else 0.0
     if rows[-1][1] == ramp.to_mps and ramp.least_s <= takes_s <= ramp.most_s:
         yield speeds
@@ -330,6 +334,7 @@ def _list_paths(
     if wish.preset in _SLOWS:
         return
     if isinstance(own, planned_motion.LanePath) and wish.duration_s is not None:
+        # The sentence has seconds, a path has metres.
         mean_mps = (case.placed.speed_mps + _find_ramp(case, wish).to_mps) / 2.0
         span = wish.duration_s.low * mean_mps, wish.duration_s.high * mean_mps
         own = replace(own, change_m=_shift(own.change_m, 0.0, span))

@@ -60,9 +60,11 @@ def list_stations(spot: wish.Spot, lanes: LanesAcross) -> tuple[Span, ...]:
     if spot.span_m is not None:
         low_m, high_m = spot.span_m
         is_about = spot.distance is not None and spot.distance.is_approximate
+        # The further end sets how much "about" leaves open at both.
         about_m = _ABOUT_SHARE * max(abs(low_m), abs(high_m)) if is_about else 0.0
         spans = [(low_m - about_m, high_m + about_m)]
     for setting in spot.settings:
+        # Several named places hold at once; one that leaves nothing is passed over.
         spans = _intersect(spans, list_named(setting, lanes)) or spans
     return tuple(spans)
 
@@ -79,6 +81,7 @@ def list_named(setting: wish.Setting, lanes: LanesAcross) -> list[Span]:
             return list_crosswalks(lanes)
         case places.OFF_CROSSWALK:
             edges = [end for span in list_crosswalks(lanes) for end in span]
+            # What lies between crosswalks: ends and beginnings in turn.
             ends = [-math.inf, *edges, math.inf]
             return list(zip(ends[::2], ends[1::2], strict=True))
         case places.BY_PARKED | places.BY_PARKED_LEFT | places.BY_PARKED_RIGHT:
@@ -119,6 +122,7 @@ def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m:
     }[lateral.nearness]
     if lateral.offset is not None:
         near_m, far_m = lateral.offset.low_m, lateral.offset.high_m
+    # On the right near is the higher number, as left is positive.
     low_m, high_m = sorted((sign * near_m, sign * far_m))
     return low_m, high_m
 
@@ -165,6 +169,7 @@ class Place:
         """
         here = self.lanes.route.locate(*point)
         span = self.across(here.ahead_m)
+        # An admitted point stays as it is: strips would move it by their chords.
         is_there = find_off(here.ahead_m, self.stations_m) <= _SAME_M
         if is_there and span is not None and find_off(here.left_m, [span]) <= _SAME_M:
             return point
@@ -216,6 +221,7 @@ def _list_bends(lanes: LanesAcross) -> list[Span]:
     # A station a metre, from 100 m behind the ego on.
     stations = np.arange(-min(route.ego_s_m, 100.0), route.ends_m[-1], 1.0).tolist()
     turns = [
+        # The turn over 20 m around the station.
         abs(difference(route.heading_at(s + half_m), route.heading_at(s - half_m)))
         for s in stations
     ]

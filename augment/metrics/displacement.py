@@ -116,6 +116,7 @@ class Displacement:
     @property
     def error_m(self) -> float:
         """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any."""
+        # Capped, or dropping a misplaced object would be better than keeping it.
         errors_m = [min(error, MISS_M) for error in self.errors_m]
         errors_m += [MISS_M] * (len(self.missing) + len(self.surplus))
         return float(np.mean(errors_m)) if errors_m else 0.0
@@ -141,6 +142,7 @@ class OverTime:
 def mean_over_time(displacements: Sequence[Displacement]) -> OverTime | None:
     """Return the means over all matched objects of changes that move, None without any."""
     matches = chain.from_iterable(measured.matches for measured in displacements)
+    # Objects of changes in which nothing moves have no error over time.
     moving = [match for match in matches if match.average_m is not None]
     starts_s = [abs(match.start_s) for match in moving if match.start_s is not None]
     if not moving:
@@ -176,6 +178,7 @@ def displacement(
         )
         if wanted and agents:
             matches += _match(wanted, agents, object_class)
+    # Either change suffices: not moving what should is an error over time as well.
     moves = reference.has_motion or (generated is not None and generated.has_motion)
     if moves and matches and generated is not None and ground is not None:
         matches = _follow(matches, generated, reference, ground)
@@ -264,6 +267,7 @@ def _follow(
             apart_m = np.hypot(*(movement.states[compared, :2] - other.states[compared, :2]).T)
             # NaN where one of the two has left the map: only common steps count.
             apart_m = apart_m[~np.isnan(apart_m)]
+            # ADE and FDE of trajectory forecasting, on steps at which both are there.
             average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
             if movement.started_s is not None and other.started_s is not None:
                 start_s = other.started_s - movement.started_s

@@ -27,6 +27,7 @@ def first_guess(findings: Iterable[Finding]) -> frozenset[FaultClass]:
     misplaced and overlap do so on their own account.
     """
     faults = [finding for finding in findings if finding.is_fault]
+    # A wrong place comes first: what follows from it is no fault of its own.
     misplaced = _names(faults, FaultClass.POSITION)
     turned = {name for name in _names(faults, FaultClass.HEADING) if name not in misplaced}
     return frozenset(fault.fault for fault in faults if not _follows(fault, misplaced, turned))

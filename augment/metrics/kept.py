@@ -58,6 +58,7 @@ def find_kept_objects(
         reference_before: Of the scenario that is followed.
         reference_after: Of the follow-up.
     """
+    # What both references have alike is what the follow-up says nothing of.
     alike = {
         agent.id
         for agent in reference_before.changed
@@ -65,6 +66,7 @@ def find_kept_objects(
     }
     matches = displacement(before, reference_before).matches
     to_keep = {match.generated for match in matches if match.reference in alike}
+    # The answer before takes the reference's part: each object's own way from one to the next.
     steps = {step.reference: step for step in displacement(after, before).matches}
     old = {agent.id: agent for agent in before.changed}
     new = {agent.id: agent for agent in after.changed} if after else {}

@@ -107,6 +107,7 @@ def measure_objects(situation: ChangedScene) -> list[PlacedObject]:
         PlacedObject(
             object_class=CLASS_OF[agent.type],
             bins={
+                # 0 to the number of edges; "right": a value at an edge is in the upper bin.
                 feature: int(np.searchsorted(EDGES[feature], value, side="right"))
                 for feature, value in _measure(situation, agent, gap_m).items()
                 if value is not None
@@ -217,6 +218,7 @@ def _measure(
 def _gaps_m(situation: ChangedScene) -> list[float]:
     """Return how far each changed object is from the nearest other; infinite where it is alone."""
     names = list(situation.boxes)
+    # (everybody, 4, 2).
     corners_m = np.array([situation.boxes[name].corners_m for name in names])
     boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
     own = [names.index(agent.id) for agent in situation.changed]
@@ -229,6 +231,7 @@ def _gaps_m(situation: ChangedScene) -> list[float]:
 def _share(
     recorded: RecordedCounts, object_class: ObjectClass, feature: Feature, number: int
 ) -> float:
+    # One more in each bin than was seen: no bin is impossible, and shares still add up to 1.
     counts = [
         1 + recorded[object_class, feature, other] for other in range(len(EDGES[feature]) + 1)
     ]

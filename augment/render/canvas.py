@@ -26,6 +26,7 @@ from augment.render.shapes import dashes
 Box = tuple[float, float, float, float]
 Spot = tuple[float, float]
 
+# Pixels of the file for each picture pixel, each way.
 DENSITY = 2
 MOST_PIXELS = 16_000_000
 """Far more than is drawn; an imported study may hold any file as its picture."""
@@ -100,6 +101,7 @@ class Canvas:
         """Draw a dashed line through points (P, 2); what lies outside costs nothing."""
         pieces = dashes(points, on, off)
         size = np.array([self.width_px, self.height_px])
+        # (K,) pieces (K, 2, 2) whose bounding box touches the picture.
         seen = ((pieces.max(axis=1) >= 0.0) & (pieces.min(axis=1) <= size)).all(axis=1)
         for piece in _in_pixels(pieces[seen]).reshape(-1, 4).tolist():
             self._pen.line(piece, fill=_INKS[colour], width=max(1, round(width * DENSITY)))
@@ -154,6 +156,7 @@ class Canvas:
         cells = np.floor(np.asarray(points) * DENSITY).astype(np.int64)
         within = ((cells >= 0) & (cells < np.array(self._image.size))).all(axis=1)
         inside = np.zeros(len(cells), dtype=bool)
+        # Rows are y.
         pixels = np.asarray(self._image)[cells[within, 1], cells[within, 0]]
         inside[within] = np.isin(pixels, [_INKS[colour] for colour in colours])
         return inside
@@ -275,6 +278,7 @@ def _sharp_turns(points: FloatArray) -> FloatArray:
     """Return the inner points (K, 2) of a line (P, 2) at which its segments leave a notch."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
+    # (P - 2,) |a| |b| cos(turn) at each inner point.
     along = (steps[1:] * steps[:-1]).sum(axis=1)
     inner = points[1:-1][along < _NOTCH_COS * lengths[1:] * lengths[:-1]]
     return np.asarray(inner, dtype=np.float64)

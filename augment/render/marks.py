@@ -140,6 +140,7 @@ def _covers(one: FloatArray, other: FloatArray) -> bool:
     along = steps[1] / lengths[1]
     if abs(float(steps[0] @ along)) < _WALK_TURN_COS * lengths[0]:
         return False
+    # (2, 2): both ends along the other line and across it.
     away = (one - other[0]) @ np.array([along, [-along[1], along[0]]]).T
     (low, high), aside = np.sort(away[:, 0]), np.abs(away[:, 1])
     return bool(low < lengths[1] and high > 0.0 and aside.min() < 0.8 * _WALK_GAP_PX)

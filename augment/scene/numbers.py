@@ -12,9 +12,11 @@ import numpy as np
 from augment.errors import InvalidDocument, check_names
 from augment.scene.schema import path
 
+# Of one sweep.
 MOST_VALUES = 100
 _FRAME = ("format", "version")
 _LOW, _HIGH = "low", "high"
+# Decimals of a swept value.
 _DIGITS = 6
 
 

@@ -15,6 +15,7 @@ from pydantic_core import CoreSchema, core_schema
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.schema import CLOSED, Id, Real, Size
 
+# Of one recording, so that a file of strangers does not fill the memory.
 MOST_TRACKS = 50_000
 
 _Number = Annotated[Real, Field(ge=-1e6, le=1e6)]

@@ -21,6 +21,7 @@ STEPS = {False: 150, True: 300}
 """How long a drive lasts, by whether it goes by interPlan's rules."""
 NEAR_GOAL_M = 0.1
 """interPlan's goal is the rear axle of the recorded ego at the end; this near, it is reached."""
+# The pace at the end of a recording is that of so much time.
 _PACE_S = 1.0
 
 
@@ -94,7 +95,9 @@ def run(
         if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
             break
         plans.append(planner.plan(Situation(step=step, ego=states[-1], objects=objects[-1])))
+        # (1, T, 3) in, (1, 2, 6) out: one reference, the state now and after one step.
         following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
+        # With the ego of the same moment: neither side knows the other's next step.
         traffic.step(states[-1], objects[-1])
         states.append(following)
         objects.append(traffic.objects())
@@ -116,6 +119,7 @@ def _goal_m(setting: DriveSetting, road: Road, body: EgoBody) -> float:
     recording, options = setting.recording, setting.scene.options
     if options.interplan is None or options.goal or not (recording and recording.shows_ego):
         return math.inf
+    # Recordings are of the centre, the goal is of the rear axle.
     axle = move_ahead(recording.ego[recording.ego_is_seen][-1, :3], -body.centre_m)
     return road.centreline.station_of(axle) - NEAR_GOAL_M
 
@@ -179,6 +183,7 @@ def _read_recorded(
     before_s = max(float(times_s[-1]) - _PACE_S, float(times_s[0]))
     if missing_s > STEP_S / 2.0 and before_s < times_s[-1]:
         before_m = float(np.interp(before_s, times_s, stations_m))
+        # Metres over seconds of the last second, for as long as is missing.
         end_m += max(0.0, end_m - before_m) / (float(times_s[-1]) - before_s) * missing_s
     return Expert(
         kind=ExpertKind.RECORDED, start_m=float(stations_m[0]), end_m=min(end_m, furthest_m)

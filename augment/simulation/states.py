@@ -120,6 +120,7 @@ class Objects:
 
     def later(self, seconds: NDArray[Any]) -> FloatArray:
         """Return the boxes (..., A, 5) after times (...), each going straight on at its speed."""
+        # (..., A, 5) from (A, 5); seconds (..., 1) times speeds (A,) are ways (..., A).
         boxes = np.broadcast_to(self.boxes, (*seconds.shape, *self.boxes.shape)).copy()
         boxes[..., :3] = shapes.move_ahead(boxes, seconds[..., None] * self.speeds_mps)
         return boxes

@@ -58,6 +58,7 @@ def list_drive_events(drive: Drive, score: Score) -> list[dict[str, Any]]:
         "hard_braking": drive.states[:, ACCELERATION] <= HARD_BRAKING_MPS2,
     }
     for kind, holds in states.items():
+        # True now and not the moment before.
         begins = holds & ~np.concatenate([[False], holds[:-1]])
         events += [(int(moment), kind, "") for moment in np.flatnonzero(begins)]
     if drive.at_map_end:
@@ -113,6 +114,7 @@ def _objects(setting: DriveSetting, drive: Drive) -> list[dict[str, Any]]:
                     "poses": [],
                 }
             own = shown[name]["poses"]
+            # None for the moments at which it was not there.
             own += [None] * (moment - shown[name]["first"] - len(own)) + [poses[row]]
     for entry in shown.values():
         poses = entry["poses"]
@@ -127,6 +129,7 @@ def _plans(drive: Drive) -> list[dict[str, Any]]:
     for step in range(0, len(drive.plans), PLAN_EVERY):
         shown = drive.plans[step].proposals
         if shown is not None:
+            # (B, every eighth of T, 2): a point every 0.8 s.
             lines = drive.body.boxes(shown.states)[:, ::LINE_EVERY, :2].round(1)
             scores = [round(float(score), 3) for score in shown.scores]
             flat = [line.ravel().tolist() for line in lines]
