@@ -257,6 +257,7 @@ class _Variance(NamedTuple):
 
 def _variance(hits: FloatArray, cluster_of: IntArray) -> _Variance:
     _, cluster_of = np.unique(cluster_of, return_inverse=True)
+    # (G,) hits above the mean, added up before they are squared.
     sums = np.bincount(cluster_of, weights=hits - hits.mean())
     clusters = len(sums)
     return _Variance(
@@ -308,6 +309,7 @@ def _opinion(votes: _NumberedVotes, rater: NamedRater) -> tuple[FloatArray, Floa
     lean = np.array(
         [np.nan if opinion is None else opinion for opinion in opinions], dtype=np.float64
     )
+    # (U,) opinions on pairs become (V,), one for each vote.
     lean = lean[votes.pair_of]
     return lean, np.asarray(lean == 0.0, dtype=np.float64)
 
@@ -323,6 +325,7 @@ def _other_experts(votes: _NumberedVotes) -> tuple[FloatArray, FloatArray]:
         return np.asarray(totals[0] - totals[1])
 
     others = of_others(np.ones(len(own)))
+    # 0 / 0 where nobody else judged the pair: not a number, which is unknown.
     with np.errstate(invalid="ignore"):
         return (
             np.asarray(of_others(votes.sign) / others),

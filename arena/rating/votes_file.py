@@ -136,6 +136,7 @@ def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparis
     outcome = np.array([2 * WINNERS[winner] for winner in columns["winner"]], dtype=np.int64)
     codes = [_number(columns[name])[1] for name in clusters]
     rows = np.column_stack([*np.split(ends, 2), outcome, *codes])
+    # (R, 3 to 5): votes that agree in everything become one row with their number.
     rows, count = np.unique(rows, axis=0, return_counts=True)
     nobody = np.zeros(len(rows), dtype=np.int64)
     of_clusters = dict(zip(clusters, rows.T[len(NEEDED) :], strict=True))
@@ -150,6 +151,7 @@ def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparis
     )
     if len(clusters) < len(OPTIONAL):
         return comparisons, None
+    # Who met, whichever way round, by whom and on what.
     keys = np.column_stack([np.sort(rows[:, :2], axis=1), rows[:, len(NEEDED) :]])
     return comparisons, comparisons.votes - len(np.unique(keys, axis=0))
 

@@ -11,6 +11,7 @@ from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Bearing, CrashedCar, CrashRequest, Facing, LaneChoice
 
+# Vehicles of which every order is tried: 120 of them.
 MOST_ORDERED = 5
 _MISPLACED = 10.0
 """An order with somebody on the wrong side of the one before is only taken for want of another."""
@@ -47,11 +48,13 @@ def _turn_deg(agent: TrafficAgent, other: TrafficAgent, car: CrashedCar) -> floa
         return turn_deg
     if not car.is_signed:
         return math.copysign(turn_deg, car.turn_deg)
+    # The same turn, as the number nearest to the one that is said.
     return car.turn_deg + math.remainder(turn_deg - car.turn_deg, 360.0)
 
 
 def _misfit(order: Sequence[TrafficAgent], request: CrashRequest, route: EgoRoute) -> float:
     places = {agent.id: route.locate_agent(agent) for agent in order}
+    # Each part is divided by its tolerance, so that metres and degrees add up.
     misfit, span_m = 0.0, request.spot.span_m
     if span_m is not None:
         misfit = Bounds(*span_m, 0.0).off(places[order[0].id].ahead_m) / USUAL.distance_m

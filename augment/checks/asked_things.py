@@ -17,6 +17,7 @@ _ON_ROAD_M = 1.0
 _ALONG_SHARE = 0.2
 """Who looks less than this across the road (some 12 degrees) looks along it."""
 _NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN, Body.TRAFFIC_CONE, Body.PEDESTRIAN})
+# To the left of the lane's direction.
 _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}
 
 
@@ -96,6 +97,7 @@ def check_heading(case: Case) -> Iterator[Finding]:
                 continue
             turn_rad = agent.heading_rad - band.tangent_rad
             turns_deg = [unwrap_deg(turn_rad, wanted_deg)]
+            # Across is either way, and what has no front may be turned round.
             if facing is Facing.ACROSS or request.body in _NO_FRONT:
                 turns_deg.append(unwrap_deg(turn_rad + math.pi, wanted_deg))
             yield hold(
@@ -149,6 +151,7 @@ def _crossing(case: Case, agent: TrafficAgent, side: Side | None) -> Finding:
     # From here on, numbers to the side of the start are positive.
     from_m = place.left_m * side.sign
     to_m = math.nan if end is None else case.route.locate(*end).left_m * side.sign
+    # Negative towards the other side of the road, 0 along it.
     looks = math.sin(agent.heading_rad - place.tangent_rad) * side.sign
     goes_back = to_m - from_m > _ON_ROAD_M
     if from_m < -_ON_ROAD_M and goes_back:
@@ -169,6 +172,7 @@ def _in_file(
     if not request.behind or request.start is None:
         return
     sign = request.start.sign
+    # Who is furthest from the side of the start is the first of the file.
     first, *others = sorted(walkers, key=lambda agent: sign * case.left_m(agent))
     if any(apart_m(*pair) < first.length_m for pair in combinations(walkers, 2)):
         return  # who stands in another is a fault of its own

@@ -35,8 +35,11 @@ from augment.scene.intent_statements import list_motion_facts
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.schema import MOST_OBJECTS
 
+# Smaller turns are not said.
 _STRAIGHT_DEG = 5.0
+# Nearer to the middle of a lane nothing is beside it; who is moved by less stays.
 _BESIDE_M = 0.1
+# Off the ego's way by more, something is nudged around; else it is overtaken.
 _ASIDE_M = 0.5
 _ON_ROAD_M = 1.0
 _ACROSS_SHARE = 0.25
@@ -147,6 +150,7 @@ def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
         _find_ends(agent, lanes),
     )
     walk_m = math.hypot(x_m - agent.x_m, y_m - agent.y_m)
+    # From one side of the lane's middle to the other, or begun in it.
     is_over = first.left_m * last.left_m < 0.0 or abs(first.left_m) < _ON_ROAD_M
     return (
         walk_m > SHORT_M and is_over and abs(first.left_m - last.left_m) > _ACROSS_SHARE * walk_m
@@ -254,6 +258,7 @@ def _spot(place: LanePlace) -> wish.Spot:
 
 
 def _length(metres: float) -> wish.Length:
+    # To a decimetre: sentences say no more.
     return wish.Length(low_m=round(metres, 1), high_m=round(metres, 1))
 
 
@@ -286,6 +291,7 @@ def _facing(agent: TrafficAgent, place: LanePlace) -> tuple[wish.Facing, float]:
     """Return the facing against the lane, and the remaining angle in degrees."""
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     is_turned = abs(turn_deg) > 90.0
+    # What is left against the nearer of the lane's two directions, from -180 up to 180.
     off_deg = round((turn_deg - 180.0 * is_turned + 180.0) % 360.0 - 180.0)
     is_against = is_turned and agent.type not in _FRONTLESS
     facing = wish.Facing.AGAINST_LANE if is_against else wish.Facing.WITH_LANE

@@ -127,6 +127,7 @@ def measure_passage(situation: ChangedScene) -> float:
         begins = shapely.distance(rooms, begin) <= _SETS_OUT_WITHIN_M
         return bool((begins & shapely.intersects(rooms, goal)).any())
 
+    # Halved, as a way that lets one disc through lets every smaller one through.
     low_m, high_m = 0.0, WIDEST_M
     if lets_through(high_m):
         return high_m
@@ -145,6 +146,7 @@ def _stays(agent: TrafficAgent) -> bool:
 
 def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:
     """Return whether its body gets in front of the ego's, before the ego has passed."""
+    # Half of both widths: nearer to the way than this the bodies would touch.
     half_m = (walker.agent.width_m + ego.agent.width_m) / 2.0
     there = walker.is_present
     ways = zip(ego.states[there, :2].tolist(), walker.states[there, :2].tolist(), strict=True)

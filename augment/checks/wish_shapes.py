@@ -130,6 +130,7 @@ def find_nearest_cones(
     best: FloatArray | None = None
     bend_rad = difference(here[-1].tangent_rad, here[0].tangent_rad)
     readings = _list_readings(request, count, lanes, band.width_m)
+    # On a straight lane both readings of a gap are the same.
     if abs(bend_rad) < _BENT_RAD:
         readings = [reading for reading in readings if not reading.is_straight]
     for pattern in _list_patterns(request, count, lanes, readings):
@@ -252,6 +253,7 @@ def _list_patterns(
             if reading.is_straight and request.reach_m is None:
                 placed = _straighten(placed, float(numbers[1]), partial(_position, lanes, lane))
             points = np.array([_position(lanes, lane, spot) for spot in placed])
+            # (N, 2, 2): each slot is a point, so both ends of its line are the same.
             return np.repeat(points[:, None], 2, axis=1)
 
         for stations in list_stations(request.spot, lanes):

@@ -254,6 +254,7 @@ def _is_inside(points_m: FloatArray | Iterable[Point], view: Mapping[str, Any]) 
     """Return whether any point of a line lies in the picture."""
     points = np.asarray(points_m, dtype=np.float64)
     if len(points) > 1:
+        # Every 4 m: a line may cross the picture between two of its points.
         points = resample_line(points, _STEP_M)
     (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
     x, y = ego_x + points[:, 0] * scale, ego_y - points[:, 1] * scale

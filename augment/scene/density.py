@@ -154,6 +154,7 @@ def usual_size_m(scene: Scene, kind: AgentType) -> tuple[float, float]:
 
 def _strip(agent: TrafficAgent) -> TrafficAgent:
     """The agent as long as what it covers in 2 s at its speed."""
+    # The box grows ahead, so its middle moves by half of that.
     ahead_m = CLEAR_S * agent.speed_mps
     return replace(
         agent,
@@ -250,6 +251,7 @@ def _fill(
         elif has_one_exit:
             speed_mps = limit_mps or _FALLBACK_MPS
         else:
+            # way = 3 v^2 / (2 a), solved for v.
             speed_mps = math.sqrt(2.0 / 3.0 * (line.length_m - here_m) * ACCEL_MPS2)
         speed_mps = max(min(speed_mps + rng.gauss(0.0, 1.0), limit_mps or math.inf), 0.0)
         yield None if is_ego else line.pose_at(here_m), speed_mps

@@ -138,6 +138,7 @@ class LaneGraph:
 
         def bend(name: str) -> tuple[int, float]:
             lane = self.lanes[name]
+            # By the kind of turn that the map says, then by the angle.
             order = _TURN_ORDER[lane.turn_type] if isinstance(lane, LaneConnector) else 0
             return order, abs(difference(heading_rad(name), heading_rad(lane_id)))
 

@@ -53,6 +53,7 @@ _STANDS_BELOW_MPS = 0.5
 _STARTS_WALKING_S = 0.5
 _KERB_M = 1.0
 """So far past the last lane a walk ends."""
+# How far across the edge of a road is looked for, by which steps, over which gaps.
 _ACROSS_M, _ACROSS_STEP_M, _GAP_M = 30.0, 0.25, 1.5
 _DOOR_WITHIN_M, _DOOR_AHEAD_M, _DOOR_GAP_M = 8.0, 0.3, 0.05
 _PULLS_OUT_WITHIN_M = 10.0
@@ -330,6 +331,7 @@ def _u_turn(case: _Case) -> TrafficAgent:
         if not isinstance(start, AtTime):
             raise case.refusal("of somebody who drives it begins at a moment.")
         gone_m = agent.speed_mps * start.after_s
+        # From v to w by an even a: (v^2 - w^2) / (2 a).
         gone_m += max(agent.speed_mps**2 - turn_mps**2, 0.0) / (2.0 * _SPEEDING_UP_MPS2)
     here = planned_mover.HeldCourse(agent, case.route.graph).pose_at(gone_m)
     if here is None:
@@ -356,6 +358,7 @@ def _turn_points(case: _Case, begin: Pose) -> list[Point]:
     across_m, target = min(oncoming)
     radius_m = max(TURN_RADIUS_M, across_m / 2.0)
     angles = np.linspace(0.0, math.pi, round(math.pi / _ARC_RAD) + 1)[1:]
+    # (K, 2) ahead and to the side: half a circle that begins along the heading.
     arc = np.column_stack((np.sin(angles), side * (1.0 - np.cos(angles)))) * radius_m
     points = [(x, y) for x, y in begin.to_parent(arc).tolist()]
     there = graph.lane(target).centerline.project(*points[-1])
@@ -397,6 +400,7 @@ def _red_light(case: _Case) -> TrafficAgent:
             planned_mover.way_and_speed(speeds, own_mps, time_s)[0] for time_s in times_s.tolist()
         ]
         arrives_s = float(times_s[np.searchsorted(gone_m, needs_m) - 1])
+        # So far the ego is from the crossing when both have the same time to it.
         within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
         meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
         start = case.numbers.start or (meets if case.stands else AtTime())
@@ -427,6 +431,7 @@ def _emergency_stop(case: _Case) -> TrafficAgent:
     if bend_m is None:
         raise case.refusal("the ego's way has no bend ahead.")
     own_mps = case.agent.speed_mps
+    # v^2 / (2 b), so that it stands just past the bend.
     brakes_m = own_mps**2 / (2.0 * case.number("braking_mps2"))
     until_s = max(bend_m + _HIDDEN_M - brakes_m - case.place.ahead_m, 0.0) / own_mps
     if case.numbers.start is None and until_s > _LATEST_S:

@@ -118,6 +118,7 @@ def _trail_since(
     if started_s is None or started_s > HORIZON_S:
         return None
     start = round(started_s / STEP_S)
+    # The way counts from t0, the outlines since it set out.
     return states[: start + _STEPS + 1, :2], states[start : start + _STEPS + 1 : _EVERY]
 
 

@@ -82,6 +82,7 @@ def find_hardest(values: Sequence[TriedValue]) -> TriedValue | None:
 
     def ease(tried: TriedValue) -> tuple[float, float, float]:
         nearest = min((abs(tried.value - other) for other in passed), default=0.0)
+        # Scores that differ by less than 1e-4 are equal: then the distance decides.
         return round(tried.solution.score if tried.solution else 0.0, 4), -nearest, tried.value
 
     solved = [tried for tried in values if tried.is_passed is False and tried.solution is not None]
