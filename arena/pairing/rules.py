@@ -236,6 +236,7 @@ def draw_ties(
 MOST_OVERLAP = 0.8
 """More can't be brought together where all pairs and scenarios stay balanced for everybody."""
 
+# Shares of an expert's quota.
 MOST_CHECKS = 0.5
 MOST_REPEATS = 0.5
 ATTENTION_CHECKS = "attention checks"

@@ -41,6 +41,7 @@ _LONGEST_STEP = 1.0
 """No parameter changes by more in one step: far out a whole Newton step can overshoot."""
 _FARTHEST = 15.0
 """With a parameter of ties the likelihood may have no top: odds of e^15 are no answer."""
+# Numbers in the largest array of a block of rounds.
 _NUMBERS_AT_ONCE = 4_000_000
 
 

@@ -34,6 +34,7 @@ from arena.rating.comparisons import (
 )
 
 VALUES = 3
+# Percentiles.
 _TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))
 
 

@@ -30,6 +30,7 @@ def check_distance(case: Case) -> Iterator[Finding]:
         spans_m = list_stations(party.request.spot, case.lanes)
         if not party.placed or spans_m == (EVERYWHERE,):
             continue
+        # A spot may admit several ranges: the one that is nearest to what is there counts.
         nearest_m = case.ahead_m(party.placed[0])
         span_m = min(spans_m, key=lambda span_m: find_off(nearest_m, [span_m]))
         allowed_m, furthest_m = case.tolerances.distance_m, max(map(abs, span_m))
@@ -55,6 +56,7 @@ def _is_ring(party: Party) -> bool:
 def _measure_ahead(case: Case, party: Party, wanted: Bounds) -> tuple[TrafficAgent, float]:
     """Return the agent that defines a party's distance, and its distance ahead of the ego in m."""
     request = party.request
+    # The first is the nearest to the ego: behind it, who is furthest ahead.
     sign = -1.0 if request.spot.relation is wish.Relation.BEHIND else 1.0
     agents = [*party.placed, *party.spare]
     ahead = [(case.ahead_m(agent), agent) for agent in agents]

@@ -48,6 +48,7 @@ def check_motion(case: Case) -> Iterator[Finding]:
             wanted_mps = party.request.speed_mps
         if wanted_mps is None:
             continue
+        # Who is to stand stands: the tolerance of speeds would let it creep.
         allowed_mps = max(SPEED_MPS, SPEED_SHARE * wanted_mps) if wanted_mps else STOPPED_BELOW_MPS
         wanted = Bounds(wanted_mps, wanted_mps, allowed_mps)
         for agent in party.agents:
@@ -113,6 +114,7 @@ def check_heading(case: Case) -> Iterator[Finding]:
 def unwrap_deg(turn_rad: float, near_deg: float) -> float:
     """Return a turn in degrees, as the number of it that is nearest to another."""
     turn_deg = math.degrees(difference(turn_rad, 0.0))
+    # Of equally near ones the smallest turn.
     turns_deg = (turn_deg, turn_deg + 360.0, turn_deg - 360.0)
     return min(turns_deg, key=lambda turn: (round(abs(turn - near_deg), 6), abs(turn)))
 

@@ -137,6 +137,7 @@ def _find_ends(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, Lane
     """Return where a walk begins and ends along the lane in its middle."""
     here = (agent.x_m, agent.y_m)
     end = end_of_walk(agent) or here
+    # Both ends by one lane: each by its own would have them on different ways.
     via = find_place(lanes, ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)).via
     return find_place_along(lanes, via, here), find_place_along(lanes, via, end)
 
@@ -169,10 +170,12 @@ def _wishes(change: Modification, scene: Scene) -> _Wishes:
 
 
 def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
+    # In order along the ego's way, as a sentence would go through them.
     added = sorted(change.added, key=lambda agent: lanes.route.locate_agent(agent).ahead_m)
     doors = [
         wishes[agent.id] for agent in added if agent.id in wishes and agent.type not in _MOVERS
     ]
+    # A door's car needs a name where it is added too; else it is picked from the scene.
     anchors = {car.id for _, car in doors} & {agent.id for agent in added}
     for agent in added:
         motion = _find_motion(agent, wishes)
@@ -234,6 +237,7 @@ def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
     for relation in wish.Relation if kind else ():
         assert kind is not None
         alike = find_picked(lanes, wish.Pick(kind=kind, relation=relation, every=True))
+        # Ordinals are counted from the ego, up to as many as a document may say.
         if agent in alike[:MOST_OBJECTS]:
             return wish.Pick(kind=kind, relation=relation, ordinal=alike.index(agent) + 1)
     return None

@@ -99,6 +99,7 @@ def heading(situation: ChangedScene) -> Iterator[Finding]:
         place = situation.under[agent.id] or situation.nearest[agent.id]
         if agent.type not in _STEERED or place is None or place.off_m > ROADSIDE_M:
             continue
+        # Positive to the left of the lane, from -180 to 180.
         turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
         yield find(
             FindingKind.HEADING,
@@ -169,6 +170,7 @@ class Stray:
 
 def stray(ground: Ground, kind: AgentType, box: Box) -> Stray:
     """Measure a box against the limits of its kind, as `off_road` has them."""
+    # People and things may be wherever the map shows anything.
     surface = ground.road if kind in VEHICLES | _EDGE else ground.everything
     share = surface.share_outside(box.corners_m)
     gap_m = surface.distance_m(box.pose.x_m, box.pose.y_m)

@@ -108,6 +108,7 @@ def measure_passage(situation: ChangedScene) -> float:
     if route is None:
         return 0.0
     ends_m = [route.locate_agent(agent).ahead_m for agent in situation.changed]
+    # Past the furthest change, but not past where the map ends.
     end_m = min(max(ends_m, default=_LOOKS_M) + _BEYOND_M, route.ends_m[-1] - _BEYOND_M)
     line = shapely.LineString(route.line.points_m)
     span = substring(line, route.ego_s_m - _BEYOND_M, route.ego_s_m + end_m + _BEYOND_M)

@@ -118,6 +118,7 @@ class Displacement:
         """The mean over all objects, `MISS_M` for each missing or surplus one; 0 without any."""
         # Capped, or dropping a misplaced object would be better than keeping it.
         errors_m = [min(error, MISS_M) for error in self.errors_m]
+        # What is missing or surplus counts as an object that is as far off as any can be.
         errors_m += [MISS_M] * (len(self.missing) + len(self.surplus))
         return float(np.mean(errors_m)) if errors_m else 0.0
 
@@ -182,6 +183,7 @@ def displacement(
     moves = reference.has_motion or (generated is not None and generated.has_motion)
     if moves and matches and generated is not None and ground is not None:
         matches = _follow(matches, generated, reference, ground)
+    # What the smaller side of a class leaves over: counted, as it has no distance.
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
     return Displacement(
@@ -331,6 +333,7 @@ def summarize_box(values_m: Sequence[float]) -> BoxSummary:
     values = np.sort(np.asarray(values_m, dtype=float))
     q1, median, q3 = (float(value) for value in np.percentile(values, (25.0, 50.0, 75.0)))
     reach = WHISKER * (q3 - q1)
+    # Tukey's fences; what lies beyond is drawn one by one.
     inside = (values >= q1 - reach) & (values <= q3 + reach)
     # Interpolated quartiles may leave no value between a box's edge and its whisker's reach.
     low, high = min(float(values[inside][0]), q1), max(float(values[inside][-1]), q3)

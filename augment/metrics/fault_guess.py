@@ -43,6 +43,7 @@ def _follows(finding: Finding, misplaced: set[str], turned: set[str]) -> bool:
     if finding.kind is FindingKind.WALK_BLOCKED and turned.intersection(finding.agents):
         return True
     if finding.kind is FindingKind.OVERLAP:
+        # One of the two is misplaced: the overlap follows from that. Both are: it is their own.
         is_alone = len(misplaced.intersection(finding.agents)) == 1
         return is_alone or bool(turned.intersection(finding.agents))
     return finding.kind in _FOLLOWS_PLACE and bool(misplaced.intersection(finding.agents))

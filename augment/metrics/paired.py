@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 FEWEST_PAIRS = 6
 """With fewer pairs that differ no two-sided signed-rank test can come below 0.05 (2 / 2^5)."""
 
+# Resamples of the scenarios, and the level of the intervals from them.
 ROUNDS = 10_000
 LEVEL = 0.95
 

@@ -204,6 +204,7 @@ def _measure(
     situation: ChangedScene, agent: TrafficAgent, gap_m: float
 ) -> dict[Feature, float | None]:
     lane = situation.under[agent.id] or situation.nearest[agent.id]
+    # A map without lanes has no direction to turn from: the feature is left out.
     turn_deg = None
     if lane is not None:
         turn_deg = abs(math.degrees(difference(agent.heading_rad, lane.tangent_rad)))

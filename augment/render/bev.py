@@ -38,9 +38,11 @@ NEAR_M = 8.0
 SMALL_PX = 60.0
 """What is shorter than this in the picture is shown enlarged, too: a car at 12 px/m."""
 
+# How many times narrower an enlarged window is at least, else there is none.
 _LEAST_GAIN = 1.4
 _AROUND_M = 7.0
 _LEAST_WIDTH_M = 20.0
+# Width to height of an enlarged window.
 _CLOSER_RATIO = 1.5
 
 
@@ -227,6 +229,7 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
     if longest_px >= SMALL_PX:
         return None
     points = np.vstack([agent.box.corners_m for agent in seen])
+    # (2,) each, around all corners (4 N, 2) of what was changed.
     low, high = points.min(axis=0) - _AROUND_M, points.max(axis=0) + _AROUND_M
     width_m = float(max(high[0] - low[0], (high[1] - low[1]) * _CLOSER_RATIO, _LEAST_WIDTH_M))
     if (camera.x_max_m - camera.x_min_m) / width_m < _LEAST_GAIN:

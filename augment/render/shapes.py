@@ -11,7 +11,7 @@ from augment.scene.lane_graph import AnyLane
 
 # Where a line turns sharply its offset is held back to this multiple of the distance.
 _MITER_LIMIT = 2.0
-# How far the surface of a lane goes on beyond its ends.
+# How far the surface of a lane goes on beyond its ends, in metres.
 _REACH = 0.1
 
 

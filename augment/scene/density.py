@@ -239,6 +239,7 @@ def _fill(
         here_m -= gap_m
         if here_m < 0.0:
             return
+        # On its own lane the ego takes the place that falls within 10 m of it.
         is_ego = is_egos and abs(here_m - ego_m) < NARROWEST_M
         if is_ego:
             gap_m, here_m = gap_m + here_m - ego_m, ego_m
@@ -247,6 +248,7 @@ def _fill(
             way_m = share * speed_mps**2 + gap_m
             # The speed v that solves share v^2 + delay v = way.
             root = math.sqrt(delay_s**2 + 4.0 * share * way_m)
+            # The gap is at least 2 s of way.
             speed_mps = min(gap_m / 2.0, (root - delay_s) / (2.0 * share))
         elif has_one_exit:
             speed_mps = limit_mps or _FALLBACK_MPS

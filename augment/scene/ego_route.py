@@ -84,6 +84,7 @@ class EgoRoute:
             return None
         way, abreast = [own], graph.abreast(own)
         if via is not None:
+            # From a lane abreast to it; else, as its way may lead here, from it to a lane abreast.
             way = graph.find_way(abreast, [via], _ROUND_M) or [via]
             if way == [via]:
                 way = graph.find_way([via], abreast, _ROUND_M) or way

@@ -346,6 +346,7 @@ def apply(scene: Scene, modification: Modification) -> Scene:
     """
     check_fits(scene, modification)
     moved = {agent.id: agent for agent in modification.moved}
+    # Who stays keeps its place in the order; who is added comes last.
     gone = set(modification.removed)
     agents = tuple(moved.get(agent.id, agent) for agent in scene.agents if agent.id not in gone)
     return replace(scene, agents=agents + modification.added)

@@ -233,6 +233,7 @@ class LaneGraph:
         Where the lanes part, the lane of that `turn` is taken, else the straightest.
         """
         here, s_m = lane_id, start_m + distance_m
+        # Lanes that lead in a ring end where they began.
         seen = {here}
         while s_m > self.lanes[here].centerline.length_m:
             following = self._choose(here, turn)
@@ -293,6 +294,7 @@ class LaneGraph:
             for name in options
             if isinstance(lane := self.lanes[name], LaneConnector) and lane.turn_type is turn
         ]
+        # Successors come straightest first.
         return next(iter(wanted or options), None)
 
 

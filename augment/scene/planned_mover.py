@@ -133,6 +133,7 @@ class PlannedMover:
         if self._line is None:  # its path ends where it is
             stays = isinstance(path, PointPath) or gone_m == 0.0
             return _row(self._held.pose_at(own_mps * self.started_s) if stays else None, 0.0)
+        # Lanes lead off the map; at the last of some points somebody stands.
         if gone_m >= self._line.length_m:
             if isinstance(path, LanePath):
                 return np.full(4, np.nan)
@@ -165,6 +166,7 @@ class PlannedMover:
         if self.started_s is not None:
             return
         self.started_s, path = at_s, self._motion.path
+        # The path begins where it is at that moment, not where it was at t0.
         here = self._held.pose_at(self._own_mps * at_s)
         if here is not None and isinstance(path, PointPath):
             self._line = smooth_line([here[:2], *path.points_m])
@@ -366,6 +368,7 @@ def _join_run(graph: LaneGraph, run: list[str]) -> tuple[Polyline, float]:
 
 def _samples(start_m: float, end_m: float, *, most: int = MOST_SAMPLES) -> list[float]:
     """Stations after the start up to the end."""
+    # 1e-9: a length that is rounded up gets no sample more.
     count = min(math.ceil((end_m - start_m) / SAMPLE_M - 1e-9), most)
     return np.linspace(start_m, end_m, count + 1)[1:].tolist() if count > 0 else []
 

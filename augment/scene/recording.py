@@ -44,6 +44,7 @@ def _array(rows: list[Any]) -> NDArray[np.float64]:
 
 
 def _rows(array: NDArray[np.float64]) -> list[Any]:
+    # JSON has no NaN: an unseen state is null.
     return [None if np.isnan(row).all() else row.tolist() for row in array]
 
 

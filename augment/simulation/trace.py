@@ -19,6 +19,7 @@ FORMAT = "scenario-arena/drive"
 HARD_BRAKING_MPS2 = -3.0
 PLAN_EVERY = 5
 """So many steps lie between two plans that are kept."""
+# Every so many states of a proposal are the points of its line.
 LINE_EVERY = 8
 _AROUND_M = 90.0
 

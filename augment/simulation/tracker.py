@@ -41,6 +41,7 @@ HORIZON = 10
 SPEED_WEIGHT, SPEED_COST = 10.0, 1.0
 LATERAL_WEIGHT, HEADING_WEIGHT, STEERING_RATE_COST = 1.0, 10.0, 1.0
 STOPPING_SPEED_MPS = 0.2
+# 1/s: acceleration for each m/s that is missing.
 STOPPING_GAIN = 0.5
 _B_S = HORIZON * STEP_S
 # One-step LQR of v' = v + B a: the least q (v + B a - w)^2 + r a^2 is at
