@@ -107,7 +107,7 @@ def test_a_fault_of_one_kind_of_work_leaves_the_others_theirs(
         raise RuntimeError("nothing is tidy")
 
     launch()
-    monkeypatch.setattr(DRIVES, "tidy", fail)
+    monkeypatch.setattr(DRIVES, "cleanup", fail)
     tasks.recover(now=timezone.now(), at_start=True)
     assert "Could not take back lost work of Simulation." in caplog.text
     assert len(broker) == 1

@@ -42,7 +42,7 @@ def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed()
     assert admin.get("/").content.decode().count(offered) == 6
     assert use_demo("contestants").count(offered) == 4, "with the stand-in that they ask"
     assert use_demo("scenarios").count(offered) == 3
-    assert "of 70 are settled" in use_demo("job")
+    assert "of 80 are settled" in use_demo("job")
     assert "No job is finished yet" in use_demo("study")
     close_study(study=study_rows.a_study())
     assert offered not in admin.get("/").content.decode()
