@@ -75,7 +75,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         },
         "--resample": {
             "choices": [unit.value for unit in Unit],
-            "help": "what hangs together: votes of an expert (judge), on a scenario (item), or "
+            "help": "clusters of dependent votes: by expert (judge), by scenario (item), or "
             "two-way; two-way where judge and item are there, else what there is",
         },
         "--intervals": {
@@ -158,8 +158,8 @@ def _notes(board: Leaderboard, there: Sequence[str], unseen: Sequence[str]) -> l
     ]:
         notes.insert(
             1,
-            f"The file has no column {' and no column '.join(unknown)}: if votes hang together "
-            "by that, the intervals are too narrow.",
+            f"The file has no column {' and no column '.join(unknown)}: if votes are "
+            "correlated by it, the intervals are too narrow.",
         )
     return notes + remark_on_ignored(unseen)
 
@@ -184,7 +184,7 @@ class RatedCsv:
 
     Attributes:
         told_apart: The pairs that differ with all judged at once; None where the intervals do not
-            know of every column by which votes hang together.
+            know of every column by which votes are clustered.
     """
 
     board: Leaderboard

@@ -236,7 +236,7 @@ def ranks_across(votes: Comparisons, chains: Chains, unit: Unit, rank: IntArray)
     Args:
         votes: Of contestants who all have votes.
         chains: Of these votes.
-        unit: What hangs together.
+        unit: The clusters of votes.
         rank: (C,) within the own part, 0 where withheld.
     """
     is_shown = _find_shown_parts(votes, chains, unit)
@@ -257,7 +257,7 @@ def judge_across(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
     Args:
         votes: Of C contestants who all have votes.
         chains: Of these votes.
-        unit: What hangs together.
+        unit: The clusters of votes.
     """
     parts, pairs = len(chains.sizes), len(votes.names) * (len(votes.names) - 1)
     loser = chains.part_of[np.where(votes.score == 1.0, votes.second, votes.first)]
@@ -284,7 +284,7 @@ def _winner_parts(votes: Comparisons, chains: Chains) -> IntArray:
 def _independent(votes: Comparisons, group: IntArray, groups: int, unit: Unit) -> FloatArray:
     """(G,) how many independent votes each group has, by the group (R,) of each row.
 
-    Votes that hang together count as one. What there is only one of is left out.
+    Votes of one cluster count as one. What there is only one of is left out.
     """
     fewest = np.bincount(group, weights=votes.count, minlength=groups)
     for kind in unit.kinds:

@@ -90,9 +90,9 @@ class Leaderboard:
 
     @property
     def judged(self) -> Separation | None:
-        """All pairs judged at once, if the intervals know of all by which votes hang together.
+        """All pairs judged at once, if the intervals know of all by which votes are clustered.
 
-        Votes that hang together unseen tell equals apart in every second study, and those of one
+        Votes clustered unseen tell equals apart in every second study, and those of one
         expert, or on one scenario, say nothing of others.
         """
         several = _several(self.experts, self.scenarios)
@@ -136,7 +136,7 @@ def rate(
         method: Bradley-Terry, Davidson's tie model, or online Elo.
         rounds: Of the bootstrap; for intervals in closed form, of what is drawn to see who is
             determined and how far apart equals come to lie.
-        unit: What hangs together: both ways by default, single votes for online Elo, which knows
+        unit: Clusters of votes: both ways by default, single votes for online Elo, which knows
             no other.
         intervals: In closed form by default, but resampled where the unit is single votes.
         seed: Of its draws; the same votes and seed give the same table.

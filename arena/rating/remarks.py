@@ -107,7 +107,7 @@ def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) 
 
 
 def remark_on_ignored(kinds: Sequence[str]) -> list[str]:
-    """Say that votes hang together in ways that the intervals do not know of; or nothing."""
+    """Say that votes are clustered in ways that the intervals do not know of; or nothing."""
     sentence = (
         f"Votes are known by {' and '.join(kinds)}, and intervals that take those of one for "
         "independent are too narrow: nobody is called better by them."

@@ -25,7 +25,7 @@ class Unit(StrEnum):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The arrays of votes by which they hang together."""
+        """The arrays of votes by which they are clustered."""
         return {"vote": (), "two-way": ("expert", "scenario")}.get(self.value, (self.value,))
 
 
@@ -60,7 +60,7 @@ class TooManyContestants(ValueError):
 
 
 def default_intervals(method: Method, unit: Unit) -> Intervals:
-    """In closed form wherever votes hang together; single votes are resampled as in the paper."""
+    """In closed form wherever votes are clustered; single votes are resampled as in the paper."""
     if method is Method.ELO or unit is Unit.VOTE:
         return Intervals.RESAMPLES
     return Intervals.CLOSED_FORM

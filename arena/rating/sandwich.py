@@ -231,11 +231,11 @@ def _restrict(value: _Arrays, members: IntArray) -> _Arrays:
 
 
 def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> Spread:
-    """The spread of ratings by votes that hang together as the unit says.
+    """The spread of ratings by votes clustered as the unit says.
 
     Args:
         pulls: What each row pulls at its contestants.
-        unit: What hangs together. Where all votes are of one expert, or on one scenario, that
+        unit: The clusters of votes. Where all votes are of one expert, or on one scenario, that
             side says nothing and is left out.
         reference: (C,) those whose mean is fixed, by default everybody. Only they say what
             contestants have in common: who has hardly any votes widens nobody else's interval.
@@ -247,7 +247,7 @@ def estimate_spread(pulls: Pulls, unit: Unit, reference: BoolArray | None = None
     base = pulls.by_row()
     single = base.diagonal()
     if len(kinds) > 1:
-        # A cell is one expert on one scenario: votes of a cell hang together both ways.
+        # A cell is one expert on one scenario: votes of a cell are in both clusters.
         cells, cell_of = np.unique(kinds[0][1] * kinds[1][0] + kinds[1][1], return_inverse=True)
         base = pulls.by_cluster(cell_of, len(cells))
     components = tuple(

@@ -72,7 +72,7 @@ class BoardRemarks:
         order: Slugs, best first.
         parts: Whose ratings compare: those with the same number.
         above: The pairs that differ with all of them judged at once, the higher one first; None
-            where votes hang together in ways that the intervals do not know of.
+            where votes are clustered in ways that the intervals do not know of.
         p_values: Of pairs, adjusted for all of them; None as `above`.
         seems_above: As `above` where that is None, because it rests on few experts or scenarios.
         settled: How many ties of pairs that nobody was shown count for whom; none for those

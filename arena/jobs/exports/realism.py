@@ -1,4 +1,4 @@
-"""The realism of a job's contestants between floor and ceiling: what its files and page show."""
+"""The realism of a job's contestants: what its files and page show."""
 
 from functools import partial
 from typing import Any
@@ -21,7 +21,7 @@ def realism_notes(table: RealismTable) -> list[str]:
         "Recorded there: recorded traffic in the scenes in which this line could be judged.": True,
         f"Learned from {table.scenes} scenes of this installation, never from the scene itself; "
         f"objects at random are placed {RANDOM_DRAWS} times in the picture's window.": True,
-        "Recorded traffic is the ceiling and random placement the floor of a fair comparison; "
+        "Recorded traffic is the upper and random placement the lower end of a fair comparison; "
         "objects that all stand in the most usual way can lie above.": True,
         "Not judged: answers without an object, and classes that were hardly recorded.": True,
         SIMULATED_NOTE: any(line.is_simulated for line in table.lines),

@@ -10,7 +10,7 @@ from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.studies.services.opening.cancel_study."""
+    """Entry point of arena.studies.services.opening.cancel_study."""
 
     help = "Cancel an open study for good: no more votes, never any results; its votes stay."
 

@@ -8,7 +8,7 @@ from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.studies.services.opening.close_study."""
+    """Entry point of arena.studies.services.opening.close_study."""
 
     help = "Close a study: it takes no more votes, and its results may be seen."
 

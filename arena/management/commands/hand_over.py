@@ -8,7 +8,7 @@ from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.studies.services.taking_part."""
+    """Entry point of arena.studies.services.taking_part."""
 
     help = "Hand an expert's remaining pairs over to others, re-planned in one go."
 

@@ -8,7 +8,7 @@ from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.results.services.vote_files.import_votes."""
+    """Entry point of arena.results.services.vote_files.import_votes."""
 
     help = (
         "Import votes from a file (CSV, JSON, Parquet, Excel) with the columns model_a, "

@@ -8,7 +8,7 @@ from augment.services import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.people.links.mark_author."""
+    """Entry point of arena.people.links.mark_author."""
 
     help = "Mark an expert of a study as author of a contestant; experts see nothing of it."
 

@@ -14,7 +14,7 @@ from augment.services.scenarios import resolve_scenarios
 
 
 class Command(TerminalCommand):
-    """The door to arena.studies.services.opening.open_study."""
+    """Entry point of arena.studies.services.opening.open_study."""
 
     help = "Plan blind, balanced matchups for experts and open the study."
 

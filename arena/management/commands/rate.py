@@ -12,7 +12,7 @@ from augment.services import TerminalCommand, read_request
 
 
 class Command(TerminalCommand):
-    """The door to arena.results.services.ratings.rate_now."""
+    """Entry point of arena.results.services.ratings.rate_now."""
 
     help = "Rate the contestants of a study by its votes and keep the result."
 

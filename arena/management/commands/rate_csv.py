@@ -12,7 +12,7 @@ _OPTIONS = tuple(signature(rate_csv.run).parameters)
 
 
 class Command(TerminalCommand):
-    """The door for Django to arena.management.rate_csv; manage.py goes there itself."""
+    """Entry point of arena.management.rate_csv for Django; manage.py goes there itself."""
 
     help = rate_csv.HELP
     requires_system_checks = []

@@ -28,7 +28,7 @@ class RatingRequest:
     )
     resample: str | None = input_field(
         InputKind.CHOICE,
-        "What hangs together",
+        "Votes clustered by",
         "As the votes allow unless given.",
         choices=UNIT_TEXTS,
         default=None,

@@ -71,7 +71,7 @@ class ComputedRating:
     competitors: tuple[vote_queries.Competitor, ...]
 
 
-# --- Doors -------------------------------------------------------------------------------------
+# --- Entry points ------------------------------------------------------------------------------
 
 
 def rate_now(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:

@@ -219,8 +219,8 @@ class StudyPlan:
     )
     show_alike: bool = _switch(
         "Also show pairs that nobody can tell apart",
-        "Pairs that differ by at most 0.15 m and 2° in every object are otherwise settled as "
-        "ties, but for a tenth that is shown as a check.",
+        "Pairs that differ by at most 0.15 m and 2° in every object otherwise count as "
+        "ties and are not shown, but for a tenth that is shown as a check.",
     )
     allow_replay: bool = _switch(
         "Experts may play the drives",
@@ -240,7 +240,7 @@ class StudyPlan:
 
     @classmethod
     def read(cls, entered: Mapping[str, Any]) -> Self:
-        """Make a plan of what a door has parsed: lists, and words for choices."""
+        """Make a plan of what an entry point has parsed: lists, and words for choices."""
         values: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value
             for name, value in entered.items()

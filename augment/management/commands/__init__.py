@@ -1,1 +1,1 @@
-"""One command a file; each is a door to a service."""
+"""One command a file; each is an entry point of a service."""

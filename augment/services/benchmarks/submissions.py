@@ -39,7 +39,7 @@ LONGEST_REASON = 2_000
 def keep_submission(
     benchmark: Benchmark, *, name: str, content: File[bytes], actor: User
 ) -> Submission:
-    """Store a submission for a worker to read; the door sends the message.
+    """Store a submission for a worker to read; the entry point sends the message.
 
     Args:
         benchmark: Whose tasks it answers.

@@ -1,4 +1,4 @@
-"""Realism of stored augmentations: single, and between floor and ceiling."""
+"""Realism of stored augmentations: single, and between random and recorded traffic."""
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence

@@ -60,7 +60,7 @@ def plain_name(name: str) -> str:
 def keep_upload(
     *, name: str, content: File[bytes], source: str = "", actor: User | None = None
 ) -> SceneUpload:
-    """Store a file for a worker to read; the door sends the message.
+    """Store a file for a worker to read; the entry point sends the message.
 
     Args:
         name: As the sender called it; kept in plain letters.
