@@ -8,7 +8,8 @@ A document: `window`, which films over one ground share; `step_s`, `steps`; `wid
 picture pixels; `marks`, each a list of shapes {fill or stroke, points or disc, width} in tenths of
 a pixel about the middle of who faces right (x right, y down); `movers` in the order of painting,
 each [mark, first step, last step, values]: x and y in tenths of a pixel and the turn in degrees,
-clockwise, at the first step, then, of who moves, what is added at each.
+clockwise, at the first step, then, of who moves, what is added at each. The last `changed` movers
+are what the change adds or moves; `ticks` are the steps at which one of them sets out.
 """
 
 import io
@@ -84,6 +85,8 @@ def make_film(
     # By what they look like and where they are: their order tells nothing of their ids.
     movers.sort(key=lambda entry: (*entry[0], entry[1]))
     marks = sorted({entry[0] for _, entry in movers})
+    starts_s = [one.started_s for one in motion.others if one.agent.id in changed]
+    steps = {round(start_s / STEP_S) for start_s in starts_s if start_s is not None}
     document = {
         "window": camera.key,
         "step_s": STEP_S,
@@ -92,6 +95,8 @@ def make_film(
         "height": camera.height_px,
         "marks": [json.loads(mark) for mark in marks],
         "movers": [[marks.index(entry[0]), *entry[1:]] for _, entry in movers],
+        "changed": sum(is_changed for (is_changed, *_), _ in movers),
+        "ticks": sorted(step for step in steps if 0 < step < STEPS),
     }
     return json.dumps(document, separators=(",", ":")).encode()
 

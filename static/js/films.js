@@ -1,8 +1,10 @@
 // Films of pictures that stand side by side, on one clock: data that is drawn over the picture of
-// the empty scene, as the still was. After each round, and at 0 s where nothing plays, the stills
-// themselves are seen.
+// the empty scene, as the still was. At 0 s where nothing plays the stills themselves are seen; the
+// last moment stays.
 const RATES = [1, 0.5, 0.25, 2];
-const [END_STEPS, STILL_STEPS] = [5, 15];
+const [OUTLINE, RING] = ["#284cc8", "#b5006f"];
+// A ring is so much larger than what it is round, and no smaller than this.
+const [RING_FACTOR, LEAST_RING_PX] = [1.4, 22];
 const KEPT = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -28,7 +30,8 @@ function drawing({ fill, stroke, width, points = [], disc }) {
   const path = new Path2D();
   for (let n = 0; n < points.length; n += 2) path.lineTo(points[n] / 10, points[n + 1] / 10);
   if (disc) path.arc(disc[0] / 10, disc[1] / 10, disc[2] / 10, 0, 2 * Math.PI);
-  return { path, fill, stroke, width };
+  if (fill) path.closePath(); // for its outline
+  return { path, fill, stroke, width, reach: disc ? disc[2] / 10 : Math.max(...points.map(Math.abs)) / 10 };
 }
 
 // Sums of what is added at each step.
@@ -53,26 +56,65 @@ function fit(canvas, film) {
   film.back = surface(canvas.width, canvas.height);
   const pen = Object.assign(film.back.getContext("2d"), { imageSmoothingQuality: "high" });
   pen.drawImage(film.ground, 0, 0, canvas.width, canvas.height);
+  drawPaths(pen, film);
 }
 
+// The ways of what is changed: a line, and an outline each second.
+function drawPaths(pen, film) {
+  const fine = pen.canvas.width / film.width;
+  Object.assign(pen, { strokeStyle: OUTLINE, lineWidth: 1.5, globalAlpha: 0.6 });
+  for (const { mark, poses } of film.changes) {
+    if (poses.length === 1) continue;
+    const way = new Path2D();
+    for (const [x, y] of poses) way.lineTo(x, y);
+    pen.setTransform(fine, 0, 0, fine, 0, 0);
+    pen.stroke(way);
+    for (let at = 0; at < poses.length; at += Math.round(1 / film.step_s)) {
+      place(pen, poses[at], fine);
+      pen.stroke(film.marks[mark][0].path);
+    }
+  }
+}
+
+function place(pen, [x, y, turn], fine) {
+  pen.setTransform(fine, 0, 0, fine, x * fine, y * fine);
+  pen.rotate((turn * Math.PI) / 180);
+}
+
+// The pose at a step, between two of them; undefined for who is not there.
+export function poseOf({ first, last, poses }, step) {
+  if (step < first || step > last) return undefined;
+  const at = Math.min(step - first, poses.length - 1);
+  const [from, to] = [poses[Math.floor(at)], poses[Math.ceil(at)]];
+  return from.map((value, part) => value + (to[part] - value) * (at % 1));
+}
+
+// What is changed is ringed for the first second.
 function draw(canvas, film, step) {
   fit(canvas, film);
   const pen = canvas.getContext("2d");
-  const { back, marks, movers } = film;
+  const { back, marks, movers, changes } = film;
   const fine = canvas.width / film.width;
   pen.setTransform(1, 0, 0, 1, 0, 0);
   pen.drawImage(back, 0, 0);
-  for (const { mark, first, last, poses } of movers) {
-    if (step < first || step > last) continue;
-    const at = Math.min(step - first, poses.length - 1);
-    const [from, to] = [poses[Math.floor(at)], poses[Math.ceil(at)]];
-    const [x, y, turn] = from.map((value, place) => value + (to[place] - value) * (at % 1));
-    pen.setTransform(fine, 0, 0, fine, x * fine, y * fine);
-    pen.rotate((turn * Math.PI) / 180);
-    for (const { path, fill, stroke, width: line } of marks[mark]) {
+  for (const mover of movers) {
+    const pose = poseOf(mover, step);
+    if (!pose) continue;
+    place(pen, pose, fine);
+    for (const { path, fill, stroke, width: line } of marks[mover.mark]) {
       if (fill) Object.assign(pen, { fillStyle: fill }).fill(path);
       else Object.assign(pen, { strokeStyle: stroke, lineWidth: line }).stroke(path);
     }
+  }
+  if (step * film.step_s >= 1) return;
+  Object.assign(pen, { strokeStyle: RING, lineWidth: 3 });
+  for (const mover of changes) {
+    const pose = poseOf(mover, step);
+    if (!pose) continue;
+    place(pen, pose, fine);
+    const ring = new Path2D();
+    ring.arc(0, 0, Math.max(LEAST_RING_PX, RING_FACTOR * Math.max(...marks[mover.mark].map(({ reach }) => reach))), 0, 2 * Math.PI);
+    pen.stroke(ring);
   }
 }
 
@@ -96,16 +138,33 @@ export class Player {
     return this.#from !== null;
   }
 
-  // Lays films over their stills, each the last but one in its frame, and begins.
+  // Lays films over their stills, each the last but one in its frame, and begins. Films from before
+  // they said what is changed show no ways, and neither do those beside one.
   show(films, frames, plays = !isCalm()) {
     this.clear();
-    this.films = films;
+    const areNew = films.every(({ changed }) => changed !== undefined);
+    this.films = films.map((film) => ({ ...film, changes: areNew && film.changed ? film.movers.slice(-film.changed) : [] }));
     this.canvases = films.map(() => surface(0, 0, { className: "reel", hidden: true }));
     this.canvases.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
     this.range.max = this.last = films[0].steps - 1;
     this.bar.hidden = false;
+    this.#mark(areNew ? films.map(({ ticks }) => ticks) : [], frames);
     this.jump(0);
     if (plays) this.play();
+  }
+
+  // Ticks on the range where somebody sets out, those of the first film above it.
+  #mark(ticks, frames) {
+    const letters = frames.map((frame) => frame.closest("figure")?.querySelector("figcaption b")?.textContent ?? "");
+    const marks = ticks.flatMap((steps, side) => steps.map((step) => {
+      const tick = Object.assign(document.createElement("i"), { textContent: letters[side] });
+      tick.className = side ? "is-below" : "";
+      tick.style.setProperty("--at", step / this.last);
+      return tick;
+    }));
+    this.range.nextElementSibling.replaceChildren(...marks);
+    const starts = ticks.flatMap((steps, side) => steps.map((step) => `${letters[side]} ${(step * this.films[side].step_s).toFixed(1)} s`.trim()));
+    this.range.title = starts.length ? this.bar.dataset.starts.replace("{}", starts.join(", ")) : "";
   }
 
   clear() {
@@ -118,6 +177,7 @@ export class Player {
   play() {
     if (!this.films.length) return;
     if (this.isPlaying) return this.pause();
+    if (this.step >= this.last) this.step = 0;
     [this.#from, this.begun] = [this.step, performance.now()];
     this.#tell();
     this.paint();
@@ -154,17 +214,16 @@ export class Player {
   #tick(now) {
     if (!this.isPlaying) return;
     const gone = this.#from + (Math.max(0, now - this.begun) * RATES[this.#rate]) / (1000 * this.films[0].step_s);
-    const at = gone % (this.last + END_STEPS + STILL_STEPS);
-    const rests = at > this.last + END_STEPS;
-    this.step = rests ? 0 : Math.min(at, this.last);
-    this.paint(rests);
+    if (gone >= this.last) return this.jump(this.last);
+    this.step = gone;
+    this.paint();
     requestAnimationFrame((later) => this.#tick(later));
   }
 
   // Also where the stills are zoomed meanwhile.
-  paint(rests = !this.isPlaying) {
+  paint() {
     if (!this.films.length) return;
-    const isStill = rests && this.step === 0;
+    const isStill = !this.isPlaying && this.step === 0;
     this.canvases.forEach((canvas, place) => {
       canvas.hidden = isStill;
       if (!isStill) draw(canvas, this.films[place], this.step);

@@ -119,6 +119,27 @@ def test_films_begin_by_themselves_at_once_and_go_with_their_pair(moving: Booth)
     expect(page.locator(FILMS).first).to_be_visible()
 
 
+def test_the_range_says_who_sets_out_when_and_the_last_moment_stays(moving: Booth) -> None:
+    starts = {"ann": ["0.5"], "bob": [], "cid": ["2.0"]}  # as `a_moving_study` has it
+    page = moving.enter()
+    expect(page.locator(FILMS)).to_have_count(2)
+    pair = moving.study.matchups.get(position=1)
+    said = [
+        f"{side} {start_s} s"
+        for side, row in (("A", pair.left), ("B", pair.right))
+        for start_s in starts[row.contestant.slug]
+    ]
+    time = page.get_by_role("slider", name="Time")
+    expect(time).to_have_attribute("title", f"Begins to move: {', '.join(said)}")
+    expect(page.locator(".film-time i")).to_have_count(len(said))
+    page.keyboard.press("p")
+    time.fill("59")
+    page.keyboard.press("p")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()  # it came to its end
+    assert page.inner_text(".film-bar output") == "6.0 s"
+    expect(page.locator(FILMS)).to_have_count(2)
+
+
 def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     page = moving.enter(reduced_motion="reduce")
     expect(page.locator(".film-bar")).to_be_visible()

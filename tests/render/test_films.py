@@ -122,6 +122,7 @@ def test_a_film_says_where_everybody_is_when() -> None:
     camera = camera_for(STREET, change)
     document = json.loads(make_film(STREET, change, camera))
     assert (document["steps"], document["step_s"]) == (STEPS, 0.1) == (61, 0.1)
+    assert (document["changed"], document["ticks"]) == (1, [5])  # it sets out after 0.5 s
     mark, first, last, values = document["movers"][-1]  # what is changed is painted last
     assert palette.CHANGED_MARK.fill in {
         ImageColor.getrgb(shape["fill"]) for shape in document["marks"][mark]
