@@ -8,7 +8,7 @@ costs a part alone, `Doubts` makes a note of it, so that no default takes its pl
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, Final, SupportsInt, TypeVar
 
@@ -217,6 +217,12 @@ class Doubts:
     ) -> None:
         """Count each name that a table does not have as a fault."""
         self.read_all(kind, look_up, ((table, name, place) for name in names))
+
+    def index_last(self, kind: str, pairs: Collection[tuple[Key, Value]]) -> dict[Key, Value]:
+        """Return the values by id; where several have one, the last counts and a note says so."""
+        by_id = dict(pairs)
+        self.assume(f"Of two {kind} with one id the last counts", len(pairs) - len(by_id))
+        return by_id
 
     def assume(self, sentence: str, times: SupportsInt = 1) -> None:
         """Count an assumption, told as a sentence without its full stop."""

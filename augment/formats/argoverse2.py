@@ -104,7 +104,9 @@ class ArgoverseSensor(LogReader):
         boxes = _read_table(path / BOXES, _BOX_COLUMNS, doubts)
         poses = _read_table(path / POSES, _POSE_COLUMNS, doubts)
         boxes = _select_known(boxes, "category", {**TYPE_OF, EGO: None}, doubts)
-        poses = poses.drop_duplicates("timestamp_ns").set_index("timestamp_ns")
+        is_repeat = poses.duplicated("timestamp_ns")
+        doubts.assume("Of two poses at one time the first counts", is_repeat.sum())
+        poses = poses[~is_repeat].set_index("timestamp_ns")
         has_pose = boxes["timestamp_ns"].isin(poses.index)
         doubts.assume("A box at a time without a pose was left out", (~has_pose).sum())
         boxes = boxes[has_pose]
@@ -127,11 +129,12 @@ class ArgoverseSensor(LogReader):
             y_m=box_places[:, 1],
             heading_rad=np.arctan2(ahead[:, 1], ahead[:, 0]),
         )
+        tracks = read_tracks(table[table["kind"] != EGO], TYPE_OF, times_s, doubts)
         yield Log(
             times_s=times_s,
             ego=np.column_stack([center, heading, speeds(times_s, center)]),
             ego_size_m=EGO_SIZE_M,
-            tracks=[*read_tracks(table[table["kind"] != EGO], TYPE_OF, times_s).values()],
+            tracks=[*tracks.values()],
             map_at=lambda _: _read_map(path / "map"),
             world=WORLD,
             title=f"Argoverse 2 Sensor data set, log {path.resolve().name}",
@@ -171,9 +174,8 @@ class ArgoverseMotion(LogReader):
         names |= {"position_x": "x_m", "position_y": "y_m", "heading": "heading_rad"}
         speeds_mps = np.hypot(table["velocity_x"], table["velocity_y"])
         times_s = np.arange(steps.max() + 1) * STEP_S
-        tracks = read_tracks(
-            table.rename(columns=names).assign(speed_mps=speeds_mps), MOTION_TYPE_OF, times_s
-        )
+        table = table.rename(columns=names).assign(speed_mps=speeds_mps)
+        tracks = read_tracks(table, MOTION_TYPE_OF, times_s, doubts)
         ego_id = item or MOTION_EGO
         ego = look_up(tracks, ego_id, "track_id")
         yield Log(

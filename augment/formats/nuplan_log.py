@@ -180,7 +180,7 @@ def _motion(
     speed_mps = np.where(np.isnan(speed_mps), reading.speeds(times_s, center_m), speed_mps)
     boxes = _boxes(base, poses["token"].tolist(), doubts)
     ego = np.column_stack([center_m, yaw, speed_mps])
-    return times_s, ego, reading.read_tracks(boxes, TYPE_OF, times_s)
+    return times_s, ego, reading.read_tracks(boxes, TYPE_OF, times_s, doubts)
 
 
 def _numbers(

@@ -2,8 +2,7 @@
 
 A reader knows one format of recorded data and opens a path as `Log`s. What all need once times,
 ego, tracks and map are known is done here: who is near, in which order they are named, which lane
-lies under them. What is wrong with a file is raised as `InvalidDocument`. Metres are rounded to
-millimetres, so that documents can be read by people. T steps.
+lies under them. Metres are rounded to millimetres, so that people can read documents. T steps.
 """
 
 from abc import ABC, abstractmethod
@@ -241,9 +240,8 @@ class Log:
             raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
         if not np.isfinite(self.ego[frame]).all():
-            raise fault_at(
-                "frame", f"{frame} has no ego in it, or one beyond the earth or 100 m/s"
-            )
+            odd = f"{frame} has no ego in it, or one beyond the earth or 100 m/s"
+            raise fault_at("frame", odd)
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
@@ -346,10 +344,10 @@ class LogReader(Reader):
 
 def frames_every(times_s: Sequence[float], every_s: float) -> Iterator[int]:
     """Yield the frames that lie at least `every_s` after the one before, the first among them."""
-    last: float | None = None
+    last_s = -np.inf
     for frame, time_s in enumerate(times_s):
-        if last is None or time_s - last >= every_s - 1e-6:
-            last = time_s
+        if time_s - last_s >= every_s - 1e-6:
+            last_s = time_s
             yield frame
 
 
@@ -368,7 +366,7 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
 
 
 def read_tracks(
-    table: "pd.DataFrame", types: Mapping[str, AgentType], times_s: FloatArray
+    table: "pd.DataFrame", types: Mapping[str, AgentType], times_s: FloatArray, doubts: Doubts
 ) -> dict[str, LoggedTrack]:
     """Return the tracks in a table with a row for each object and step.
 
@@ -377,27 +375,27 @@ def read_tracks(
             `heading_rad`, and where they are known `speed_mps`, `length_m` and `width_m`.
         types: What the kinds are here.
         times_s: (T,), by which speeds are taken from places where there is no such column.
+        doubts: Told of objects that are at one step twice.
     """
-    if "speed_mps" not in table:
-        table = table.assign(speed_mps=np.nan)
-    states = foreign.read_finite(table[[*STATE[:3]]], "places")
-    speeds_mps = table["speed_mps"].to_numpy()
-    steps = table["step"].to_numpy()
-    tracks = {}
-    for name, every_row in table.groupby("track", observed=True).indices.items():
-        seen, first = np.unique(steps[every_row], return_index=True)
-        rows = np.asarray(every_row)[first]
-        own = np.column_stack([states[rows], speeds_mps[rows]])
+    is_repeat = table.duplicated(["track", "step"])
+    doubts.assume("Of two boxes of one object at one step the first counts", is_repeat.sum())
+    table = table[~is_repeat].sort_values("step")
+    places = foreign.read_finite(table[[*STATE[:3]]], "places")
+    unknown = np.full(len(table), np.nan)
+    states = np.column_stack([places, table.get("speed_mps", unknown)])  # (R, 4)
+    steps, tracks = table["step"].to_numpy(), {}
+    for name, rows in table.groupby("track", observed=True).indices.items():
+        seen, own = steps[rows], states[rows]
         if np.isnan(own[:, 3]).any():
             own[:, 3] = speeds(times_s[seen], own[:, :2])
         every = np.full((len(times_s), 4), np.nan)
         every[seen] = own
-        lone = table.iloc[rows[0]]
+        box = table.iloc[rows[0]]
         tracks[str(name)] = LoggedTrack(
             name=str(name),
-            type=types[lone["kind"]],
-            length_m=float(lone.get("length_m", 0.0)),
-            width_m=float(lone.get("width_m", 0.0)),
+            type=types[box["kind"]],
+            length_m=float(box.get("length_m", 0.0)),
+            width_m=float(box.get("width_m", 0.0)),
             states=every,
         )
     return tracks
@@ -430,6 +428,8 @@ def _bound(log: Log) -> tuple[Log, Doubts]:
         return np.where(odd[:, None], np.nan, states)
 
     tracks = [replace(track, states=bound(track.states)) for track in log.tracks]
+    shared = len(tracks) - len({track.name for track in tracks})
+    doubts.assume("Two objects have one id; both are taken", shared)
     return replace(log, ego=bound(log.ego), tracks=tracks), doubts
 
 
@@ -481,8 +481,8 @@ def _is_size(*sizes_m: float) -> bool:
 
 
 def _ego(log: Log, frame: int) -> TrafficAgent:
-    is_size = _is_size(*log.ego_size_m)
-    length_m, width_m = log.ego_size_m if is_size else (EGO_LENGTH_M, EGO_WIDTH_M)
+    usual_m = EGO_LENGTH_M, EGO_WIDTH_M
+    length_m, width_m = log.ego_size_m if _is_size(*log.ego_size_m) else usual_m
     return TrafficAgent(
         id="Agent1",
         type=AgentType.EGO_VEHICLE,

@@ -82,6 +82,7 @@ def test_folder_and_file_are_recognised(folder: Path) -> None:
         ({"position_x": float("nan")}, "with a gap or an odd number was left out."),
         ({"timestep": 2**40}, "not from 0 to 9999 was left out."),
         ({"track_id": None}, "with a gap or an odd number was left out."),
+        ({"track_id": "9"}, "Of two boxes of one object at one step the first counts."),
     ],
 )
 def test_a_broken_row_is_left_out_with_a_note(

@@ -189,6 +189,7 @@ BACK = "<point><x>0</x><y>60</y></point>"
         ("sidewalk", "moon", "types of lanelets (1); first lanelet 4: unknown", (3, 1, 2)),
         ("<y>90.0</y></point>", f"<y>90.0</y></point>{BACK}", "lanelet.3: folds back", (1, 1, 2)),
         ('id="3"', 'id="2"', "Of two lanelets with one id the last counts", (1, 1, 2)),
+        ("<exact>2</exact>", "<exact>1</exact>", "Of two states with one id the last", (2, 1, 2)),
         (
             'trafficSignRef ref="40"',
             'trafficSignRef ref="41"',

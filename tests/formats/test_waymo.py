@@ -113,6 +113,14 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
         (track(9, 1, state(0, 0, 0, 0)), "first tracks[2]: has 1 states for 3 times"),
         (lane(5, (2, 2), *points(8, (990, 503))), "lanes (1); first map_features.5: a line needs"),
         ((8, message((1, 6), (8, message(*points(1, (990, 503), (991, 503)))))), "areas (1)"),
+        (
+            lane(4, (2, 2), *points(8, (1060, 500), (1080, 500))),
+            "Of two lanes with one id the last",
+        ),
+        (
+            track(8, 1, *[state(1030, 500, 0.0, 0.0)] * 3),
+            "Two objects have one id; both are taken.",
+        ),
     ],
 )
 def test_one_bad_part_is_left_out_with_a_note(

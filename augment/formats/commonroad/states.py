@@ -58,9 +58,9 @@ class StateReader:
         later = owner.findall("trajectory/*")
         self.doubts.assume("The motion of what is static was left out", stands and bool(later))
         later = [] if stands else later
-        by_step = dict([self._state(first, place)])
         rows = ((element, place) for element in later)
-        by_step |= dict(self.doubts.read_all("states", self._state, rows))
+        read = self.doubts.read_all("states", self._state, rows)
+        by_step = self.doubts.index_last("states", [self._state(first, place), *read])
         steps = sorted(by_step)
         states = np.array([by_step[step] for step in steps])
         states[:, 3] = 0.0 if stands else states[:, 3]

@@ -213,14 +213,14 @@ def _track(index: int, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
 
 def read_city(scenario: Any, frame: int) -> RoadMap:
     """Return the map with the lights of one step."""
-    lanes, edges, areas = dict[int, Any](), dict[int, FloatArray](), []
+    lanes, edges, areas = list[tuple[int, Any]](), dict[int, FloatArray](), []
     left_out, doubts = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}, Doubts()
     for feature in scenario.map_features:
         kind, place = feature.WhichOneof("feature_data"), f"map_features.{feature.id}"
         if kind == "lane" and feature.lane.type == BICYCLE_LANE:
             left_out["bicycle lanes"] += 1
         elif kind == "lane":
-            lanes[feature.id] = feature.lane
+            lanes.append((feature.id, feature.lane))
         elif kind in ("road_line", "road_edge"):
             with doubts.about("road lines"):
                 edges[feature.id] = _points(getattr(feature, kind).points, place)
@@ -239,7 +239,8 @@ def read_city(scenario: Any, frame: int) -> RoadMap:
     controlled = {light.lane for step in states for light in step}
     idle = len(controlled - {feature.id for feature in scenario.map_features})
     doubts.assume("A traffic light governs no lane that is there", idle)
-    rows = ((*lane, edges, lights, controlled, doubts) for lane in lanes.items())
+    segments = doubts.index_last("lanes", lanes).items()
+    rows = ((*lane, edges, lights, controlled, doubts) for lane in segments)
     return RoadMap(
         place="map_features",
         segments=tuple(doubts.read_all("lanes", _segment, rows)),
