@@ -83,5 +83,5 @@ async function loop() {
   setTimeout(loop, Math.max(document.hidden ? HIDDEN_MS : SHOWN_MS, PAUSE_PER_ANSWER * took));
 }
 
-for (const name of ["input", "submit"]) addEventListener(name, () => (isTouched = true));
+for (const name of ["input", "submit"]) addEventListener(name, () => { isTouched = true; });
 setTimeout(loop, SHOWN_MS);

@@ -10,4 +10,4 @@ addEventListener("submit", (event) => {
   setTimeout(() => pressed.delete(form), AGAIN_MS);
 });
 // Who goes back to the page may send it again.
-addEventListener("pageshow", () => (pressed = new WeakSet()));
+addEventListener("pageshow", () => { pressed = new WeakSet(); });
