@@ -11,6 +11,7 @@ from augment.errors import InvalidDocument, check_names
 from augment.formats.argoverse2 import ArgoverseMotion, ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan_log import NuPlan
+from augment.formats.opendrive.reader import OpenDrive
 from augment.formats.own_json import OwnJson
 from augment.formats.reading import Reader
 from augment.formats.scenarionet.scenario import ScenarioNet
@@ -26,6 +27,7 @@ READERS: dict[str, Reader] = {
         NuPlan(),
         ScenarioNet(),
         ArgoverseMotion(),
+        OpenDrive(),
     )
 }
 """In the order in which a file is tried; each is asked about what is its own alone."""
@@ -63,14 +65,23 @@ def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Rea
     Raises:
         InvalidDocument: Nothing is in one of the formats, or several things are.
     """
-    level = [path]
+    level, others = [path], list[tuple[Reader, Path]]()
     while level:
-        matches = [
+        recognised = [
             (reader, candidate)
             for candidate in sorted(level)
             for reader in readers
             if reader.recognises(candidate)
         ]
+        others += [match for match in recognised if match[0].goes_with_others]
+        level = [
+            below
+            for candidate in level
+            if is_deep and candidate.is_dir()
+            for below in candidate.iterdir()
+        ]
+        matches = [match for match in recognised if not match[0].goes_with_others]
+        matches = matches or ([] if level else others)
         if len(matches) == 1:
             return matches[0]
         if matches:
@@ -80,11 +91,5 @@ def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Rea
             ]
             text = f"holds {len(matches)} recordings, one is needed: {', '.join(names)}"
             raise InvalidDocument("input", [("", text)])
-        level = [
-            below
-            for candidate in level
-            if is_deep and candidate.is_dir()
-            for below in candidate.iterdir()
-        ]
     formats = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
     raise InvalidDocument("input", [(str(path), f"looks like none of the formats: {formats}")])

@@ -252,12 +252,12 @@ class Reader(ABC):
         name: How the format is called where one is asked for.
         title: What it is, for people.
         suffix, marker: What its files end in, and what stands near their beginning.
+        goes_with_others: Whether its files may lie beside those of a format that needs them.
     """
 
     name: str
     title: str
-    suffix = ""
-    marker = b""
+    suffix, marker, goes_with_others = "", b"", False
 
     def recognises(self, path: Path) -> bool:
         """Return whether the file or folder looks like this format; nothing is raised."""

@@ -1,0 +1,188 @@
+"""OpenDRIVE maps: lanes lie where another evaluation has them; constructs, and what is broken."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from augment.errors import InvalidDocument
+from augment.formats.opendrive.reader import OpenDrive
+from augment.formats.reading import Reading
+from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
+from augment.scene.lane_graph import AnyLane
+from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand, lane_lines, make_map, write
+
+WITHIN_M = 0.01
+
+
+def read(file: Path, item: str | None = None) -> Reading:
+    return OpenDrive().read(file, item=item, frame=None, name="map")
+
+
+def read_text(folder: Path, text: str, item: str | None = "@1,-1,50") -> Reading:
+    file = folder / "made.xodr"
+    file.write_text(text)
+    return read(file, item)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_lanes_lie_where_sums_over_short_steps_have_them(seed: int, tmp_path: Path) -> None:
+    root = make_map(seed)
+    scene = read(write(root, tmp_path / "made.xodr")).scene
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    ways = [shapely.LineString(lane.centerline.points_m) for lane in lanes]
+    lines = lane_lines(root)
+    assert lines
+    for name, line in lines.items():
+        points = shapely.points(scene.origin.pose.to_local(line)[::10])
+        furthest_m = min(shapely.distance(way, points).max() for way in ways)
+        assert furthest_m < WITHIN_M, name
+    # No lane of ours is longer than theirs, or lies elsewhere.
+    lengths_m = sum(shapely.length(shapely.LineString(line)) for line in lines.values())
+    assert sum(way.length for way in ways) == pytest.approx(lengths_m, rel=3e-3)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 4])
+def test_lanes_that_follow_each_other_are_joined_and_meet(seed: int, tmp_path: Path) -> None:
+    scene = read(write(make_map(seed), tmp_path / "made.xodr")).scene
+    lines = {lane.id: lane.centerline for lane in scene.lanes}
+    joints = [(lane.centerline, lines[after]) for lane in scene.lanes for after in lane.successors]
+    for way in scene.connectors:
+        assert way.from_lane
+        assert way.to_lane
+        joints += [(lines[way.from_lane], way.centerline), (way.centerline, lines[way.to_lane])]
+    for before, after in joints:
+        assert math.dist(before.points_m[-1], after.points_m[0]) < 0.02
+    assert len(joints) >= {0: 12, 2: 12, 3: 12, 4: 3}[seed]
+    assert bool(scene.connectors) == (seed == 3)
+
+
+SIGNAL = (
+    '<signals><signal s="90" t="-4" id="7" dynamic="yes" orientation="+" type="1000001"/>'
+    '<signal s="50" t="-4" id="8" dynamic="no" orientation="+" type="206"/></signals>'
+)
+JUNCTION = (
+    ROAD.format(
+        **{"id": "2", "junction": "9", "more": "", "type": "", "x": "100", "shape": "<line/>"},
+        **{"offset": "", "end": "", "lanes": LANES.format(width=WIDTH, outer="")},
+        link='<link><predecessor elementType="road" elementId="1" contactPoint="end"/></link>',
+    )
+    + '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="2" '
+    'contactPoint="start"><laneLink from="-1" to="-1"/></connection></junction>'
+)
+
+
+def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
+    reading = read_text(tmp_path, by_hand(end=SIGNAL, rest=JUNCTION))
+    (there, back) = sorted(reading.scene.connectors, key=lambda way: way.from_lane is None)
+    assert there.traffic_light is TrafficLight.UNKNOWN
+    assert back.traffic_light is TrafficLight.NONE
+    assert any("signal 206" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        ({"type": '<type s="0"><speed max="50" unit="km/h"/></type>'}, "speed_limit_mps=13.889"),
+        ({"type": '<type s="0"><speed max="30" unit="mph"/></type>'}, "speed_limit_mps=13.411"),
+        ({"width": f'{WIDTH}<speed sOffset="0" max="7" unit="m/s"/>'}, "speed_limit_mps=7.0"),
+        ({"width": '<border sOffset="0" a="-3" b="0" c="0" d="0"/>', "x": "0"}, "width_m=3.0"),
+        ({"outer": f'<lane id="-2" type="bus">{WIDTH}</lane>'}, "right_neighbor='Lane2'"),
+        ({"offset": '<laneOffset s="0" a="1" b="0" c="0" d="0"/>'}, "y_m=-0.75"),
+        ({"shape": '<poly3 a="0" b="0" c="0.001" d="0"/>'}, "y_m=0.7"),
+        ({"more": 'rule="LHT"'}, "heading_rad=3.14"),
+    ],
+)
+def test_a_construct_of_a_lane_is_read(parts: dict[str, str], says: str, tmp_path: Path) -> None:
+    scene = read_text(tmp_path, by_hand(**parts)).scene
+    assert says in f"{scene.lanes[0]}{scene.origin}"
+
+
+@pytest.mark.parametrize(
+    ("kind", "area"),
+    [
+        ("sidewalk", AreaKind.WALKWAY),
+        ("shoulder", AreaKind.DRIVABLE),
+        ("parking", AreaKind.CARPARK),
+    ],
+)
+def test_a_lane_that_is_not_driven_on_is_an_area(
+    kind: str, area: AreaKind, tmp_path: Path
+) -> None:
+    outer = f'<lane id="-2" type="{kind}">{WIDTH}</lane>'
+    (only,) = read_text(tmp_path, by_hand(outer=outer)).scene.areas
+    assert only.kind is area
+    # From 50 m behind the ego to 50 m ahead, right of its lane, whose middle it is on.
+    low, high = np.min(only.boundary_m, axis=0), np.max(only.boundary_m, axis=0)
+    assert [*low, *high] == pytest.approx([-50.0, -5.25, 50.0, -1.75], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        '<outlines><outline><cornerRoad s="60" t="-4"/><cornerRoad s="63" t="-4"/>'
+        '<cornerRoad s="63" t="4"/><cornerRoad s="60" t="4"/></outline></outlines>',
+        '<outline><cornerLocal u="-4" v="-1.5"/><cornerLocal u="4" v="-1.5"/>'
+        '<cornerLocal u="4" v="1.5"/><cornerLocal u="-4" v="1.5"/></outline>',
+        "",
+    ],
+)
+def test_a_crosswalk_is_an_area_whatever_its_outline(outline: str, tmp_path: Path) -> None:
+    thing = f'type="crosswalk" s="61.5" t="0" hdg="{math.pi / 2}" length="8" width="3"'
+    end = f'<objects><object id="3" {thing}>{outline}</object><object type="tree"/></objects>'
+    reading = read_text(tmp_path, by_hand(end=end))
+    (area,) = reading.scene.areas
+    assert area.kind is AreaKind.CROSSWALK
+    low, high = np.min(area.boundary_m, axis=0), np.max(area.boundary_m, axis=0)
+    assert [*low, *high] == pytest.approx([10.0, -2.25, 13.0, 5.75], abs=1e-3)
+    assert any("object tree" in note for note in reading.notes)
+
+
+@pytest.mark.parametrize(
+    ("parts", "note"),
+    [
+        ({"end": '<lateralProfile><superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
+                 "</lateralProfile>"}, "slopes and superelevation were left out"),
+        ({"outer": f'<lane id="-2" type="rail">{WIDTH}</lane>'}, "lane rail"),
+        ({"type": '<type s="0"><speed max="fast"/></type>'}, "road 1.speed: expected a finite"),
+        ({"rest": '<junction id="5" type="virtual"/>'}, "a virtual junction were left out"),
+        ({"rest": ROAD.format(
+            **{"id": "2", "junction": "-1", "more": "", "type": "", "link": "", "offset": ""},
+            **{"x": "100", "shape": "<bezier/>", "end": "", "lanes": LANES},
+        )}, "road 2.planView: unknown 'bezier'"),
+        ({"end": SIGNAL.replace('"+"', '"-"')}, "A light governs no way"),
+    ],
+)  # fmt: skip
+def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: Path) -> None:
+    assert any(note in said for said in read_text(tmp_path, by_hand(**parts)).notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "item", "says"),
+    [
+        (by_hand(), "@1,-2,5", "road 1.lane: unknown '-2'; known: 1, -1"),
+        (by_hand(), "@2,-1,5", "road: unknown '2'; known: 1"),
+        (by_hand(), "@1,-1,500", "road 1.s: expected a finite number from -0.01 to 100.01"),
+        (by_hand(), "1,-1", "needs ROAD,LANE,S"),
+        (by_hand(width=WIDTH.replace("3.5", "NaN")), None, "road 1.lane 1.a: expected a finite"),
+        (by_hand(shape='<arc curvature="1e9"/>'), None, "planView.curvature: expected a finite"),
+        (by_hand(lanes='<laneSection s="0"/>' * 5_001), None, "has 5001 lane sections"),
+        (by_hand(lanes='<laneSection s="0"/>'), None, "no lane that cars drive on"),
+        (by_hand().replace('Major="1"', 'Major="2"'), None, "version '2.7' is not read"),
+        ("<OpenDRIVE/>", None, "version ''"),
+        ("<!DOCTYPE a><OpenDRIVE/>", None, "declares a document type"),
+    ],
+)
+def test_a_fault_names_its_place(text: str, item: str | None, says: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidDocument, match=re.escape(says)):
+        read_text(tmp_path, text, item)
+
+
+def test_left_hand_traffic_is_that_of_the_rule(tmp_path: Path) -> None:
+    assert read_text(tmp_path, by_hand(more='rule="LHT"')).scene.traffic_side is TrafficSide.LEFT
+    reading = read_text(tmp_path, by_hand(), None)
+    assert reading.scene.traffic_side is TrafficSide.RIGHT
+    assert reading.moment.item == "@1,1,50"
