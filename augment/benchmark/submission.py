@@ -36,6 +36,7 @@ from augment.metrics.displacement import displacement
 from augment.scene.codec import SCENE
 from augment.scene.entities import Modification, apply
 from augment.scene.planned_mover import check_motions
+from augment.simulation.expected import expect_recording
 
 MOST_DEATHS = 25
 """Files that may end their process; each takes it some seconds."""
@@ -172,7 +173,7 @@ class _Checker:
         entry = self._read(task, sample, files)
         if task.split is not Split.PRACTICE or task.reference is None:
             return entry
-        ground = Ground.of(task.scene, lambda: task.replayed)
+        ground = Ground.of(task.scene, lambda *change: expect_recording(*change, task.replayed))
         distance = displacement(entry.modification, task.reference, ground)
         return replace(entry, displacement=distance)
 

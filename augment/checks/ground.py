@@ -4,7 +4,7 @@ Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,8 +25,7 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
-from augment.scene.motion import Motion, Movement, find_motion, with_movers_alone
-from augment.scene.recording import Recording
+from augment.scene.motion import Expectation, Motion, Movement, find_motion, with_movers_alone
 
 SEAM_M = 0.3
 """A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
@@ -164,24 +163,17 @@ class Ground:
     Attributes:
         scene: The scene before the change.
         graph: Its lanes and connectors.
-        read_recording: Reads what was recorded after t0; asked only where something moves.
+        expect: Returns what is expected after t0; asked only where something moves.
     """
 
     scene: Scene
     graph: LaneGraph
-    read_recording: Callable[[], Recording | None]
+    expect: Expectation
 
     @classmethod
-    def of(
-        cls, scene: Scene, read_recording: Callable[[], Recording | None] = lambda: None
-    ) -> "Ground":
+    def of(cls, scene: Scene, expect: Expectation = lambda scene, modification: None) -> "Ground":
         """Return the ground of a scene, by default one without a recording."""
-        return cls(scene=scene, graph=LaneGraph(scene), read_recording=read_recording)
-
-    @cached_property
-    def recording(self) -> Recording | None:
-        """Recording after t0 of the ego and of the traffic that stays."""
-        return self.read_recording()
+        return cls(scene=scene, graph=LaneGraph(scene), expect=expect)
 
     def motion_after(self, modification: Modification, *, of_all: bool = True) -> Motion:
         """Return everybody's motion after a change, including agents recorded later.
@@ -196,9 +188,8 @@ class Ground:
         after = apply(self.scene, modification)
         if not of_all:
             after = with_movers_alone(after, {agent.id for agent in modification.changed})
-        return find_motion(
-            after, recording=self.recording, replaced=modification.replaced, with_later=of_all
-        )
+        recording = self.expect(self.scene, modification)
+        return find_motion(after, recording=recording, with_later=of_all)
 
     def _areas(self, *kinds: AreaKind) -> list[Area]:
         return [area for area in self.scene.areas if area.kind in kinds]

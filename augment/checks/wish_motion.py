@@ -80,7 +80,12 @@ class MotionCase:
         return math.inf if self.answer.started_s is None else self.answer.started_s
 
     def carry_out(self, agent: TrafficAgent, until_s: float = HORIZON_S) -> FloatArray:
-        """Return the states (T, 4) of an agent whose motion waits for nobody."""
+        """Return the states (T, 4) of an agent whose motion, if any, waits for nobody."""
+        if agent.motion is None:
+            change = self.whole.modification.with_changed(agent)
+            movements = self.whole.ground.motion_after(change, of_all=False).others
+            (states,) = (one.states for one in movements if one.agent.id == agent.id)
+            return states[: round(until_s / STEP_S) + 1]
         mover, rows = PlannedMover(agent, self.whole.route.graph), []
         # Half a step more, so that rounding loses no last step.
         for time_s in np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist():
@@ -101,7 +106,7 @@ class MotionCase:
     def find_nearest(self) -> TrafficAgent:
         """Return the agent with the nearest admissible motion."""
         if self.wish is None:
-            return replace(self.placed, motion=planned_motion.PlannedMotion())
+            return replace(self.placed, motion=None)
         if self.car is not None:
             return min(_list_doors(self, self.car, self.wish), key=self.measure)
         return _Search(self, self.wish).run()

@@ -64,12 +64,8 @@ class Cell:
     @cached_property
     def motion(self) -> Motion:
         """Everybody's motion after t0."""
-        return find_motion(
-            self.after,
-            recording=self.recording,
-            replaced=self.modification.replaced,
-            with_later=self.keeps_traffic,
-        )
+        recording = self.recording and self.recording.without(self.modification.replaced)
+        return find_motion(self.after, recording=recording, with_later=self.keeps_traffic)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -265,10 +265,10 @@ def _follow(
     for match in matches:
         movement, other = wanted[match.reference], placed[match.generated]
         average_m, final_m, start_s = match.distance_m, match.distance_m, None
-        if movement.agent.motion is not None or other.agent.motion is not None:
-            apart_m = np.hypot(*(movement.states[compared, :2] - other.states[compared, :2]).T)
-            # NaN where one of the two has left the map: only common steps count.
-            apart_m = apart_m[~np.isnan(apart_m)]
+        apart_m = np.hypot(*(movement.states[compared, :2] - other.states[compared, :2]).T)
+        # NaN where one of the two is not there: only common steps count.
+        apart_m = apart_m[~np.isnan(apart_m)]
+        if len(apart_m) and (movement.agent.motion or other.agent.motion):
             # ADE and FDE of trajectory forecasting, on steps at which both are there.
             average_m, final_m = float(apart_m.mean()), float(apart_m[-1])
             if movement.started_s is not None and other.started_s is not None:

@@ -213,6 +213,13 @@ def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
     return straight_curve(*points) if len(points) == 2 else CubicBezier(points)
 
 
+_DRIVEN_BY_RULES = (
+    "Without a motion, whatever is said elsewhere, who moves on a lane follows it at the speed "
+    "limit, behind who is ahead, and stops at red; who walks is there once the ego is within 50 m "
+    "along its lane, and takes 15 s for the way and as long again as that took."
+)
+
+
 @lru_cache(maxsize=16)
 def scene_text(
     scene: entities.Scene,
@@ -239,6 +246,8 @@ def scene_text(
             f"in their order {', '.join(boxes_m)} m (width x length), whatever is said elsewhere"
         )
         parts.append(f"New agents of type VEHICLE are {order}.")
+    if rules is not None:
+        parts.append(_DRIVEN_BY_RULES)
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
 

@@ -31,7 +31,7 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import AnyLane
 from augment.scene.recording import Recording
-from augment.scene.trails import find_trails, plan_held
+from augment.scene.trails import find_trails
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named for reviewers, and lie over the boxes."""
@@ -138,8 +138,8 @@ def _paint_scene(
     ground = _draw_unchanged(rest, camera, corner).copy()
     if ghosts:
         draw_ghosts(ground, scene, modification)
-    shown = plan_held(modification) if camera.is_filmed else modification
-    draw_trails(ground, find_trails(scene, shown, recording))
+    trails = find_trails(scene, modification, recording, with_held=camera.is_filmed)
+    draw_trails(ground, trails)
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
     lost = [
         agent

@@ -22,7 +22,7 @@ from augment.geometry.polyline import FloatArray
 from augment.render.shapes import lane_ring, sides
 from augment.scene.entities import Modification, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
-from augment.scene.recording import Recording
+from augment.scene.motion import Expectation
 from augment.scene.trails import ego_spots, find_trails
 
 WIDTH_PX = 1200
@@ -112,7 +112,7 @@ def camera_for(
     scene: Scene,
     reference: Modification | None,
     changes: tuple[Modification, ...] = (),
-    recording: Recording | None = None,
+    expect: Expectation = lambda scene, modification: None,
 ) -> Camera:
     """Return the window of a scenario, the same for all its contestants.
 
@@ -129,7 +129,7 @@ def camera_for(
             into the picture as well.
         reference: The scenario's reference, None without one.
         changes: What the scenario's contestants made of it.
-        recording: What was recorded after t0, for motions.
+        expect: Returns what is expected after t0, for motions.
     """
     moving = [
         change for change in (reference, *changes) if change is not None and change.has_motion
@@ -137,10 +137,10 @@ def camera_for(
     spots = [
         spot
         for change in moving
-        for trail in find_trails(scene, change, recording)
+        for trail in find_trails(scene, change, expect(scene, change))
         for spot in trail.spots
     ]
-    spots += ego_spots(scene, recording) if moving else ()
+    spots += ego_spots(scene, expect(scene, Modification())) if moving else ()
     boxes = [spot.box.corners_m for spot in spots]
     near = [box for box in boxes if _distance_m(box) <= FOLLOWED_M]
     places = [tuple(map(tuple, box.tolist())) for box in near]

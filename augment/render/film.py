@@ -59,18 +59,14 @@ def make_film(
         scene: The scene before the change.
         modification: What changes.
         camera: The window.
-        recording: What was recorded after t0; the ego drives as it did, and reacts to nobody.
+        recording: What is expected after t0; the ego drives as it did, and reacts to nobody.
         keeps_traffic: Whether who was recorded later comes into the picture.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    motion = find_motion(
-        apply(scene, modification),
-        recording=recording,
-        replaced=modification.replaced,
-        with_later=keeps_traffic,
-    )
+    after = apply(scene, modification)
+    motion = find_motion(after, recording=recording, with_later=keeps_traffic)
     changed = {agent.id for agent in modification.changed}
     styled = [(motion.ego, palette.EGO_MARK)]
     styled += [

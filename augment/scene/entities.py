@@ -337,6 +337,14 @@ class Modification:
         """True if an agent has a motion after t0."""
         return any(agent.motion is not None for agent in self.changed)
 
+    def with_changed(self, agent: TrafficAgent) -> Modification:
+        """Return the same with a changed agent in another state."""
+        added, moved = (
+            tuple(agent if other.id == agent.id else other for other in part)
+            for part in (self.added, self.moved)
+        )
+        return replace(self, added=added, moved=moved)
+
 
 def apply(scene: Scene, modification: Modification) -> Scene:
     """The scene after the change; the given one stays as it is.

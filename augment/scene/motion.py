@@ -3,7 +3,7 @@
 Frame: ego frame of t0. T steps.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import AtPlace
 from augment.scene.planned_mover import HeldCourse, PlannedMover
@@ -81,16 +81,16 @@ class Motion:
         return float(self.times_s[1] - self.times_s[0])
 
 
+Expectation = Callable[[Scene, Modification], Recording | None]
+"""Tracks of a scene after a change, of who was recorded or drives by rules, and the ego's."""
+
+
 def find_motion(
-    scene: Scene,
-    *,
-    recording: Recording | None = None,
-    replaced: frozenset[str] = frozenset(),
-    with_later: bool = False,
+    scene: Scene, *, recording: Recording | None = None, with_later: bool = False
 ) -> Motion:
     """Return the motion of the scene's agents after t0, with assumptions where it is unknown.
 
-    Who has a planned motion or a walk carries it out; who was recorded does what was recorded;
+    Who has a planned motion carries it out; who has a track follows it, else carries a walk out;
     who moves otherwise holds the speed of t0 along its lane, or straight on where there is none;
     all others stand. Nobody reacts to the ego but by the start of a motion. The ego is there at
     every step: where its recording has a gap it goes straight across, and after the last step
@@ -98,8 +98,7 @@ def find_motion(
 
     Args:
         scene: After its change.
-        recording: What was recorded after t0 in the scene before its change.
-        replaced: Ids whose tracks count no longer: moved, removed.
+        recording: What was recorded after t0, without those whom a change moves or removes.
         with_later: Whether who appears after t0 is part of it.
     """
     if recording is not None and round(float(recording.times_s[-1]) / STEP_S) < 1:
@@ -112,17 +111,22 @@ def find_motion(
     others: dict[str, Movement] = {}
     for agent in scene.agents:
         track = tracks.get(agent.id)
-        if recording is not None and track is not None and agent.id not in replaced:
-            others[agent.id] = _resample_track(agent, track.states, recording, times_s)
+        if recording is not None and track is not None:
+            is_ruled = scene.options.interplan is not None
+            start = track.states[0] if is_ruled else _state(agent)
+            others[agent.id] = _resample_track(agent, track.states, recording, times_s, start)
         else:
             others[agent.id] = _assume_movement(agent, times_s, graph)
     if recording is not None and with_later:
         taken = {agent.id for agent in scene.everyone}
-        others |= {
-            movement.agent.id: movement for movement in _later(recording, times_s, taken, replaced)
-        }
+        others |= {movement.agent.id: movement for movement in _later(recording, times_s, taken)}
     # Last of all: triggers watch where everybody else is.
-    others |= _plan_movements(scene, times_s, graph, {ego.agent.id: ego} | others)
+    movers = [
+        PlannedMover(agent, graph)
+        for agent in scene.agents
+        if agent.motion or (agent.walk_to_m and agent.id not in tracks)
+    ]
+    others |= _plan_movements(movers, times_s, {ego.agent.id: ego} | others)
     return Motion(times_s=times_s, ego=ego, others=tuple(others.values()))
 
 
@@ -138,12 +142,9 @@ def with_movers_alone(scene: Scene, besides: Collection[str] = ()) -> Scene:
 
 
 def _plan_movements(
-    scene: Scene, times_s: FloatArray, graph: LaneGraph, moves: Mapping[str, Movement]
+    movers: Sequence[PlannedMover], times_s: FloatArray, moves: Mapping[str, Movement]
 ) -> dict[str, Movement]:
     """Return the agents with a motion or a walk, who watch everybody for their triggers."""
-    movers = [
-        PlannedMover(agent, graph) for agent in scene.agents if agent.motion or agent.walk_to_m
-    ]
     if not movers:
         return {}
     rows: dict[str, list[FloatArray]] = {mover.agent.id: [] for mover in movers}
@@ -176,7 +177,7 @@ def _ego_movement(
     """The ego's recorded motion, completed so that it is there at every step."""
     if recording is None or not recording.shows_ego:
         return _assume_movement(ego, times_s, graph, stays=True)
-    read = _resample_track(ego, recording.ego, recording, times_s)
+    read = _resample_track(ego, recording.ego, recording, times_s, _state(ego))
     # (T, 4), and the steps at which the ego was seen.
     states, seen = read.states, np.flatnonzero(read.is_present)
     last = int(seen[-1])
@@ -201,11 +202,18 @@ def _ego_movement(
 
 
 def _resample_track(
-    agent: TrafficAgent, states: FloatArray, recording: Recording, times_s: FloatArray
+    agent: TrafficAgent,
+    states: FloatArray,
+    recording: Recording,
+    times_s: FloatArray,
+    start: FloatArray | tuple[float, ...],
 ) -> Movement:
-    """A track, read at even times; its first state is that of the scene, to the last digit."""
+    """A track, read at even times; its first state is that of the scene, to the last digit.
+
+    By interPlan's rules drivers begin on the middle of their lanes, and some are not there.
+    """
     read = read_at(states, recording.times_s, times_s)
-    read[0] = _state(agent)
+    read[0] = start
     return Movement(agent=agent, source=MotionSource.RECORDED, states=read)
 
 
@@ -226,11 +234,9 @@ def read_at(states: FloatArray, recorded_s: FloatArray, times_s: FloatArray) -> 
     return np.asarray(read, dtype=np.float64)
 
 
-def _later(
-    recording: Recording, times_s: FloatArray, taken: set[str], replaced: frozenset[str]
-) -> Iterator[Movement]:
+def _later(recording: Recording, times_s: FloatArray, taken: set[str]) -> Iterator[Movement]:
     for track in recording.tracks:
-        if track.agent_id in taken or track.agent_id in replaced:
+        if track.agent_id in taken:
             continue
         states = read_at(track.states, recording.times_s, times_s)
         seen = np.flatnonzero(~np.isnan(states).any(axis=1))

@@ -3,6 +3,7 @@
 Frame: the ego frame of t0 (the Scene's frame). T steps.
 """
 
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -92,6 +93,11 @@ class Recording:
     def ego_alone(self) -> "Recording":
         """The same without tracks; one value, so that what depends on it is kept."""
         return replace(self, tracks=())
+
+    def without(self, ids: Set[str]) -> "Recording":
+        """Return the same without the tracks of those agents."""
+        left = tuple(track for track in self.tracks if track.agent_id not in ids)
+        return self if len(left) == len(self.tracks) else replace(self, tracks=left)
 
     @property
     def ego_is_seen(self) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from augment.scene.entities import Modification, Scene, TrafficAgent, apply
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, find_motion, with_movers_alone
-from augment.scene.planned_motion import AtTime, PlannedMotion
+from augment.scene.planned_motion import AtTime
 from augment.scene.recording import Recording
 
 # Between the outlines of a trail.
@@ -23,7 +23,7 @@ _STEPS, _EVERY = round(HORIZON_S / STEP_S), round(EVERY_S / STEP_S)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trail:
-    """One changed agent with a motion.
+    """One changed agent that moves.
 
     Attributes:
         way_m: (P, 2) centres from t0 to `HORIZON_S` after it set out; of one that does not set out
@@ -40,26 +40,36 @@ class Trail:
 
 @lru_cache(maxsize=32)
 def find_trails(
-    scene: Scene, modification: Modification, recording: Recording | None = None
+    scene: Scene,
+    modification: Modification,
+    recording: Recording | None = None,
+    *,
+    with_held: bool = False,
 ) -> tuple[Trail, ...]:
     """Return the trail of every changed agent with a motion, in the order of the modification.
 
     Args:
         scene: Before the change.
         modification: What changes.
-        recording: What was recorded after t0; triggers fire by it as they do in `find_motion`.
+        recording: What is expected after t0, as in `find_motion`.
+        with_held: Whether who drives on without a motion has a trail as well.
 
     Raises:
         InvalidModification: The change does not fit the scene, or a path its lanes.
     """
-    if not modification.has_motion:
+    driving_on = {
+        agent.id
+        for agent in modification.changed
+        if with_held and agent.speed_mps > 0.0 and not (agent.motion or agent.walk_to_m)
+    }
+    if not (driving_on or modification.has_motion):
         return ()
     after = apply(scene, modification)
-    motion = find_motion(
-        with_movers_alone(after), recording=recording, replaced=modification.replaced
-    )
+    motion = find_motion(with_movers_alone(after, driving_on), recording=recording)
     started = {
-        movement.agent.id: _trail_since(movement.started_s, movement.states)
+        movement.agent.id: _trail_since(
+            0.0 if movement.agent.id in driving_on else movement.started_s, movement.states
+        )
         for movement in motion.others
     }
     waiting = {name for name, trail in started.items() if trail is None}
@@ -77,7 +87,7 @@ def find_trails(
     }
     trails = []
     for agent in modification.changed:
-        if agent.motion is None:
+        if agent.motion is None and agent.id not in driving_on:
             continue
         states = started[agent.id]
         if states is None:
@@ -88,17 +98,6 @@ def find_trails(
             spots = _spots(agent, spots_at)
             trails.append(Trail(agent=agent, way_m=_there(way_m), spots=spots, sets_out=True))
     return tuple(trails)
-
-
-def plan_held(modification: Modification) -> Modification:
-    """Return a change in which who holds a velocity has a motion that says so, for its trail."""
-
-    def plan(agent: TrafficAgent) -> TrafficAgent:
-        holds = agent.speed_mps > 0.0 and agent.motion is None and agent.walk_to_m is None
-        return replace(agent, motion=PlannedMotion()) if holds else agent
-
-    added, moved = (tuple(map(plan, part)) for part in (modification.added, modification.moved))
-    return replace(modification, added=added, moved=moved)
 
 
 @lru_cache(maxsize=8)

@@ -155,19 +155,14 @@ class Replay:
     def __init__(self, recording: Recording, tracks: Sequence[Track]) -> None:
         self.steps_left = round(float(recording.times_s[-1]) / STEP_S)
         times_s: FloatArray = np.asarray(STEP_S * np.arange(self.steps_left + 1), np.float64)
-        self._rows = [
-            (
-                one,
-                read_at(one.states, recording.times_s, times_s) if self.steps_left else one.states,
-            )
-            for one in tracks
-        ]
+        read = read_at if self.steps_left else lambda states, recorded_s, times_s: states
+        self._rows = [(one, read(one.states, recording.times_s, times_s)) for one in tracks]
         self._step = 0
 
     def agents(self) -> list[TrafficAgent]:
         """Return those who are seen now, as agents."""
-        rows = [(track, states[self._step]) for track, states in self._rows]
-        return [track_agent(track, state) for track, state in rows if not np.isnan(state).any()]
+        now = ((track, states[self._step]) for track, states in self._rows)
+        return [track_agent(track, state) for track, state in now if not np.isnan(state).any()]
 
     def objects(self) -> Objects:
         """Return those who are seen now."""
@@ -452,8 +447,8 @@ class Traffic:
         """Return everybody who is there now."""
         return join_objects([mover.objects() for mover in self._movers])
 
-    def step(self, ego: FloatArray, objects: Objects) -> None:
-        """Go one step on, given the ego's state (6,) and the objects of this moment."""
+    def step(self, ego: FloatArray, objects: Objects, *, sees_ego: bool = True) -> None:
+        """Go one step on, given the ego's state (6,), whom drivers may not see, and the others."""
         ego_box = self._body.boxes(ego)
         me = Objects(
             ids=(EGO_ID,),
@@ -470,7 +465,8 @@ class Traffic:
             self._movers += _set_moving(going_on, self._road)
         everybody = join_objects([objects, me])
         for mover in self._movers:
-            mover.step(ego_box, everybody)
+            is_blind = not sees_ego and isinstance(mover, LaneDrivers)
+            mover.step(ego_box, objects if is_blind else everybody)
 
 
 def _list_replayed(setting: DriveSetting, road: Road) -> list[Track]:
@@ -495,6 +491,6 @@ def _list_replayed(setting: DriveSetting, road: Road) -> list[Track]:
 
 
 def _moves(track: Track) -> bool:
-    """Return whether a track moves a metre or more from its first seen place."""
+    """Return whether a track moves a metre or more from its first place."""
     seen = track.states[~np.isnan(track.states).any(axis=1), :2]
     return bool(len(seen) and np.hypot(*(seen - seen[0]).T).max() >= 1.0)

@@ -29,6 +29,7 @@ from augment.prompts.reply import ReadReply, block_schema, read_intent, read_rep
 from augment.prompts.vectors import changes_text
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
+from augment.simulation.expected import expect_recording
 from augment.variants.pose_tool import PoseTool
 from augment.variants.recipes import Keep, Recipe
 from augment.variants.respondents import (
@@ -190,7 +191,7 @@ class _Work:
     @cached_property
     def ground(self) -> Ground:
         """The scene, laid out for the checks once for all rounds."""
-        return Ground.of(self.task.scene)
+        return Ground.of(self.task.scene, expect_recording)
 
     def outcome(self) -> Outcome:
         """Return the outcome, also of a missing answer."""

@@ -34,6 +34,7 @@ from augment.scene.motion import LENGTH_S, Motion, Movement
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
 from augment.scene.schema import list_problems
+from augment.simulation.expected import expect_recording
 
 TOOL = Tools.POSE_ON_LANE
 LANE_START = "lane"
@@ -251,7 +252,7 @@ class PoseTool:
 
     @cached_property
     def _ground(self) -> Ground:
-        return Ground.of(self._shown)
+        return Ground.of(self._shown, expect_recording)
 
     @cached_property
     def _ego_route(self) -> frozenset[str]:

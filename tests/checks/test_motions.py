@@ -206,7 +206,7 @@ def test_whether_a_trigger_fires(
 ) -> None:
     base: Scene = replace(two_lanes(), agents=(vehicle("Agent9", -30.0, 3.5),))
     stands = car(PlannedMotion(speeds=((3.0, 5.0),), start=start), speed_mps=0.0)
-    ground = Ground.of(base, lambda: recording)
+    ground = Ground.of(base, lambda *_: recording)
     found = of_kind(findings_on(ground, Modification(added=(stands,))), FindingKind.MOTION_TRIGGER)
     assert [one.severity for one in found] == [severity]
     assert next(iter(found[0].measured.values())) == pytest.approx(seconds)
@@ -217,5 +217,7 @@ def test_a_recording_of_a_moment_is_no_reason_to_fail(step_s: float) -> None:
     states = np.array([(0.0, 0.0, 0.0, 8.0), (8.0 * step_s, 0.0, 0.0, 8.0)])
     recording = Recording(times_s=np.array([0.0, step_s]), ego=states)
     brakes = car(PlannedMotion(speeds=((0.05, 0.0),)))
-    found = findings_on(Ground.of(two_lanes(), lambda: recording), Modification(added=(brakes,)))
+    found = findings_on(
+        Ground.of(two_lanes(), lambda *_: recording), Modification(added=(brakes,))
+    )
     assert [one.severity for one in of_kind(found, FindingKind.MOTION_LIMITS)] == [WRONG]

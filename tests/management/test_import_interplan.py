@@ -47,6 +47,7 @@ from augment.simulation.states import EgoBody
 from augment.simulation.traffic import DriveSetting, Walkers
 from tests.formats.interplan_files import ELSEWHERE, HERE, fifty_entries, write_folder
 from tests.jobs import rows
+from tests.simulation.places import assert_everybody_is_at_one_place
 
 pytestmark = pytest.mark.django_db
 
@@ -287,6 +288,16 @@ def test_scenarios_are_what_interplans_own_code_builds_and_score_as_in_nuplan(
         assert 100.0 * scored.value == pytest.approx(score, abs=0.1), name
         ratio = next(one.value for one in scored.metrics if "expert_route" in one.name)
         assert ratio == pytest.approx(progress or 1.0, abs=0.01), name
+
+
+@pytest.mark.realdata
+def test_everybody_is_where_interplans_drive_has_them(worlds: dict[str, World]) -> None:
+    for world in worlds.values():
+        for change in (world.reference, Modification()):
+            setting = DriveSetting(
+                scene=world.scene, modification=change, recording=world.recording.ego_alone
+            )
+            assert_everybody_is_at_one_place(setting)
 
 
 def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def starts(start: Trigger, *more: TrafficAgent) -> Modification:
 def followed(
     generated: Modification, reference: Modification, recording: Recording | None = None
 ) -> Displacement:
-    return displacement(generated, reference, Ground.of(two_lanes(), lambda: recording))
+    return displacement(generated, reference, Ground.of(two_lanes(), lambda *_: recording))
 
 
 def test_two_starts_a_second_apart() -> None:
@@ -126,7 +126,7 @@ def test_ego_and_traffic_are_the_recorded_ones(
     recording: Recording | None, start: Trigger, begins_s: float
 ) -> None:
     there = replace(vehicle("Agent9", 0.0, 7.0), speed_mps=5.0)
-    ground = Ground.of(replace(two_lanes(), agents=(there,)), lambda: recording)
+    ground = Ground.of(replace(two_lanes(), agents=(there,)), lambda *_: recording)
     (match,) = displacement(starts(start), starts(AtTime()), ground).matches
     assert match.start_s == pytest.approx(begins_s)
 

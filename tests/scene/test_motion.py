@@ -47,7 +47,7 @@ def test_whoever_was_recorded_does_what_was_recorded_unless_moved() -> None:
     kept = find_motion(before, recording=recording, with_later=True)
     assert [one.agent.id for one in kept.others] == ["Agent2", "Agent3"]
     assert kept.others[0].states[10, 0] == pytest.approx(30.0)
-    moved = find_motion(before, recording=recording, replaced=frozenset({"Agent2"}))
+    moved = find_motion(before, recording=recording.without({"Agent2"}))
     assert [one.source for one in moved.others] == [MotionSource.HELD_SPEED]
 
 

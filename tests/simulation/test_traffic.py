@@ -1,16 +1,12 @@
 """Who moves how: walkers, lane drivers, recorded tracks, and what stands."""
 
-import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from augment.checks import Ground
 from augment.geometry.polyline import Polyline
-from augment.render.camera import camera_for
-from augment.render.film import make_film
 from augment.scene.entities import (
     InterplanRules,
     LaneConnector,
@@ -23,11 +19,11 @@ from augment.scene.motion import find_motion
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.recording import Recording
 from augment.simulation.road import Road
-from augment.simulation.shapes import move_ahead
 from augment.simulation.states import Objects, start_state
-from augment.simulation.traffic import DriveSetting, LaneDrivers, Traffic
+from augment.simulation.traffic import DriveSetting, Traffic
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import pedestrian, vehicle
+from tests.simulation.places import assert_everybody_is_at_one_place, place
 from tests.simulation.worlds import BODY, street, track
 
 
@@ -52,11 +48,6 @@ def with_agents(*agents: TrafficAgent, length_m: float = 400.0) -> DriveSetting:
 def by_interplans_rules(given: DriveSetting) -> DriveSetting:
     options = SceneOptions(interplan=InterplanRules())
     return replace(given, scene=replace(given.scene, options=options))
-
-
-def place(objects: Objects, name: str) -> tuple[float, float]:
-    x, y = objects.boxes[objects.ids.index(name), :2]
-    return float(x), float(y)
 
 
 @pytest.mark.parametrize(
@@ -89,36 +80,43 @@ def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego(keeps_rule: bool)
 
 
 @pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS, *MOVING_SLUGS])
-def test_everybody_is_at_one_place_in_checks_films_and_drives(
-    slug: str, monkeypatch: pytest.MonkeyPatch
+def test_everybody_is_at_one_place_in_checks_films_stills_and_drives(slug: str) -> None:
+    assert_everybody_is_at_one_place(
+        DriveSetting(scene=shown_scene(slug), modification=entry(slug).reference)
+    )
+
+
+@pytest.mark.parametrize("lasts_s", [None, 2.0, 15.0])
+@pytest.mark.parametrize("goes_by_interplan", [True, False])
+def test_so_it_is_where_others_drive_by_rules_and_where_a_recording_ends_early(
+    goes_by_interplan: bool, lasts_s: float | None
 ) -> None:
-    scene, reference = shown_scene(slug), entry(slug).reference
-    free = np.array(math.inf), np.array(0.0)
-    monkeypatch.setattr(LaneDrivers, "_leaders", lambda self, everybody: free)
-    setting = DriveSetting(scene=scene, modification=reference)
-    motion = Ground.of(scene).motion_after(reference)
-    camera = camera_for(scene, reference)
-    film = json.loads(make_film(scene, reference, camera))
-    tracks = [
-        (first, np.array(values).reshape(-1, 3)[:, :2].cumsum(axis=0) / 10.0)
-        for _, first, _, values in film["movers"]
-    ]
-    traffic = Traffic(setting, Road(scene), BODY, start_state(scene.ego, BODY))
-    for step in range(61):
-        objects, at_t = traffic.objects(), [one for one in motion.others if one.is_present[step]]
-        assert sorted(objects.ids) == sorted(one.agent.id for one in at_t)
-        drawn = [track[min(step - first, len(track) - 1)] for first, track in tracks]
-        for one in at_t:
-            x_m, y_m = one.states[step, :2].tolist()
-            assert math.dist(place(objects, one.agent.id), (x_m, y_m)) < 0.1
-            (pixel,) = camera.to_pixels(np.array([[x_m, y_m]]))
-            if camera.shows(np.array([[x_m, y_m]])):
-                off_px = np.hypot(*(np.array(drawn) - pixel).T).min()
-                assert off_px / camera.px_per_m < 0.1
-        states = np.zeros(6)
-        states[:4] = motion.ego.states[step]
-        states[:3] = move_ahead(states[None, :3], -BODY.centre_m)[0]
-        traffic.step(states, objects)
+    setting = recorded(
+        modification=Modification(
+            added=(
+                replace(vehicle("New1", 60.0, 0.3), speed_mps=3.0),
+                replace(vehicle("New2", 35.0, 0.4), speed_mps=8.0),
+                vehicle("New3", 90.0, 0.0),
+                pedestrian("New4", 55.0, -6.0, (55.0, 6.0)),
+                replace(
+                    vehicle("New5", -30.0, 0.0),
+                    speed_mps=6.0,
+                    motion=PlannedMotion(speeds=((3.0, 9.0),)),
+                ),
+            )
+        )
+    )
+    assert setting.recording is not None
+    steps = round(10.0 * (lasts_s or 0.0)) + 1
+    shorter = Recording(
+        times_s=setting.recording.times_s[:steps],
+        ego=setting.recording.ego[:steps],
+        tracks=tuple(replace(one, states=one.states[:steps]) for one in setting.recording.tracks),
+    )
+    setting = replace(setting, recording=None if lasts_s is None else shorter)
+    assert_everybody_is_at_one_place(
+        by_interplans_rules(setting) if goes_by_interplan else setting
+    )
 
 
 def test_interplans_drivers_stop_at_a_red_light_and_ours_hold_their_speed() -> None:

@@ -118,7 +118,7 @@ def test_a_moving_pair_of_a_busy_street_takes_less_than_300_kb(realdata: Path) -
     cars = [one for one in scene.agents if one.type is AgentType.VEHICLE][:3]
     motion = PlannedMotion(speeds=((2.0, 5.0),), start=AtTime())
     change = Modification(moved=tuple(replace(car, motion=motion) for car in cars))
-    camera = camera_for(scene, change, recording=recording)
+    camera = camera_for(scene, change, expect=lambda *_: recording)
     side = len(draw(scene, change, camera, recording))
     side += len(make_film(scene, change, camera, recording, keeps_traffic=True))
     before = len(draw(scene, Modification(), camera, recording))

@@ -58,8 +58,8 @@ def motion_in(agent: TrafficAgent) -> PlannedMotion:
 def list_unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
     """Return states (T, 4) of an agent whose motion never starts; NaN past the map."""
     alone = replace(cell.after, agents=(replace(agent, motion=None),))
-    name = frozenset([agent.id])
-    return find_motion(alone, recording=cell.recording, replaced=name).others[0].states
+    recording = cell.recording and cell.recording.without({agent.id})
+    return find_motion(alone, recording=recording).others[0].states
 
 
 def states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> FloatArray:

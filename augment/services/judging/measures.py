@@ -24,7 +24,7 @@ from augment.services.scenarios.pictures import store_as
 Value = TypeVar("Value")
 Compute = Callable[[Collection[int]], Mapping[int, Value]]
 
-MEASURING = "metrics", "checks", "scene", "geometry", "services/judging"
+MEASURING = "metrics", "checks", "scene", "geometry", "simulation", "services/judging"
 """The packages of augment whose code decides what comes out."""
 
 _ROOT = Path(__file__).parents[2]

@@ -153,11 +153,10 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
     graph = editable_ground(scenario).graph
-    added, moved = (
-        tuple(_snap(agent, graph) if agent.id == agent_id else agent for agent in agents)
-        for agents in (modification.added, modification.moved)
-    )
-    return replace(modification, added=added, moved=moved)
+    for agent in modification.changed:
+        if agent.id == agent_id:
+            modification = modification.with_changed(_snap(agent, graph))
+    return modification
 
 
 def give_preset(scenario: Scenario, change: Modification, document_part: object) -> Modification:

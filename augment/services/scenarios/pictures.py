@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from augment.scene.entities import Modification, without_traffic
 from augment.services.events import log_change
 from augment.services.scenarios.scenes import (
     content_hash,
-    load_recording,
+    load_expected,
     load_reference,
     load_scene,
     scene_key,
@@ -96,13 +97,7 @@ def _window_around(scenario: Scenario, documents: Iterable[dict[str, Any] | None
         codec.modification_from_document(document) for document in documents if document
     )
     reference = load_reference(scenario)
-    moves = any(
-        modification.has_motion
-        for modification in (reference, *changes)
-        if modification is not None
-    )
-    recording = load_recording(scenario) if moves else None
-    return camera_for(load_scene(scenario), reference, changes, recording)
+    return camera_for(load_scene(scenario), reference, changes, partial(load_expected, scenario))
 
 
 def picture_view(camera: Camera) -> dict[str, Any]:
@@ -223,7 +218,7 @@ def _draw(scenario: Scenario, modification: Modification, camera: Camera) -> tup
     scene = load_scene(scenario)
     if not camera.is_filmed:
         return draw(scene, modification, camera), b""
-    recording = load_recording(scenario)
+    recording = load_expected(scenario, scene, modification)
     film = make_film(scene, modification, camera, recording, keeps_traffic=scenario.keep_traffic)
     ground = store(draw_empty(scene, camera), folder=f"{FOLDER}/{camera.key}")
     document = {"ground": ground} | json.loads(film)
@@ -310,8 +305,7 @@ def draw_scenario(scenario_pk: int) -> None:
     name, reference = reference_picture(row), load_reference(row)
     if reference is None or is_drawn(name):
         return
-    recording = load_recording(row) if reference.has_motion else None
-    camera = camera_for(load_scene(row), reference, recording=recording)
+    camera = camera_for(load_scene(row), reference, expect=partial(load_expected, row))
     _keep(name, *_draw(row, reference, camera))
 
 

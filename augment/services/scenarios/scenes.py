@@ -33,6 +33,7 @@ from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
 from augment.services.texts import check_prose
+from augment.simulation.expected import expect_recording
 
 LONGEST_TYPE = 40
 
@@ -397,17 +398,15 @@ def load_scene(scenario: Scenario) -> entities.Scene:
     return replace(scene, options=options)
 
 
-def load_recording(scenario: Scenario) -> Recording | None:
-    """Return the recording after t0, None for none; the ego's alone if traffic is cleared.
-
-    Raises:
-        InvalidDocument: The stored recording can't be read.
-    """
+def load_expected(
+    scenario: Scenario, scene: entities.Scene, modification: entities.Modification
+) -> Recording | None:
+    """Return `expect_recording` of a scenario's scene, with the recorded traffic that stays."""
     document = scenario.base_scene.recording
-    if document is None:
-        return None
-    recording = codec.recording_from_document(document)
-    return recording if scenario.keep_traffic else recording.ego_alone
+    recording = None if document is None else codec.recording_from_document(document)
+    if recording is not None and not scenario.keep_traffic:
+        recording = recording.ego_alone
+    return expect_recording(scene, modification, recording)
 
 
 def load_ground(scenario: Scenario) -> Ground:
@@ -416,7 +415,7 @@ def load_ground(scenario: Scenario) -> Ground:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return Ground.of(load_scene(scenario), partial(load_recording, scenario))
+    return Ground.of(load_scene(scenario), partial(load_expected, scenario))
 
 
 def scene_key(scenario: Scenario) -> str:
