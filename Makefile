@@ -15,8 +15,10 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo serve test test-all check lint fuzz chromium screenshots bench figures real-model mutants receivers lock clean
 
-demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't)
-	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve)
+demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't); with ENDPOINT, MODEL and KEY a model of yours takes part
+	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve) \
+		$(if $(ENDPOINT),--endpoint "$(ENDPOINT)") $(if $(MODEL),--model "$(MODEL)") \
+		$(if $(KEY),--key "$(KEY)") $(if $(SCENARIOS),--scenarios "$(SCENARIOS)")
 
 serve: $(VENV)/.runtime ## Serve what is there
 	$(BIN)/python manage.py serve --port $(PORT)

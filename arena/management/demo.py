@@ -5,6 +5,7 @@ Every step can be repeated: what is there already is used again, so a second run
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from django.contrib.auth.models import User
@@ -19,26 +20,50 @@ from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
 from augment import models
+from augment.errors import KeyMissing, ModelFault
 from augment.services.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.driving import plan_scenario
 from augment.services.driving.simulations import Options
-from augment.services.running import count_rows
+from augment.services.endpoints import (
+    ContestantRequest,
+    EndpointRequest,
+    add_contestant,
+    ensure_model,
+)
+from augment.services.endpoints.contestants import free_slug
+from augment.services.running import JobRequest, count_rows
+from augment.services.running.estimates import estimate
+from augment.services.running.jobs import cancel, launch, retry_failed
 from augment.services.scenarios import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
+
+State = models.Augmentation.State
 
 PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
 PEOPLE = (("admin", "admin"), ("researcher", "researcher"), ("expert", "expert"))
 OPEN_STUDY = "Try it yourself"
+OPEN_STUDY_WITH_MODEL = f"{OPEN_STUDY}, with your model"
 YOUR_VOTES = 30
 STUCK_S = 600.0
 """A job in which nothing ends for so long is stuck; a slow computer only takes its time."""
 
 A_LINE_EVERY = 8
 DRIVEN_PER_TYPE = 2
+CALLS_PER_SCENARIO = 12
+"""So many calls a model of one's own may take, 60 on the five scenarios that it gets."""
 
 
 class DemoFailed(ArenaError):
     """A step of the demo did not end as it should; the text says which and how."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnModel:
+    """A model of one's own in the demo, the slugs of its contestants, and its probe's calls."""
+
+    name: str
+    contestants: tuple[str, ...]
+    probe_calls: int
 
 
 def prepare(say: Callable[[str], None]) -> None:
@@ -61,36 +86,94 @@ def prepare(say: Callable[[str], None]) -> None:
     demo.add_experts()
 
 
-def generate(
-    scenarios: list[str], say: Callable[[str], None], look: Callable[[], None]
+def add_model(request: EndpointRequest, model: str) -> OwnModel:
+    """Add contestants of a model that answers; of one that doesn't nothing is made.
+
+    Raises:
+        InvalidDocument: The address or the variable of its key can't be used.
+        DemoFailed: The model does not answer, or its key is not set.
+    """
+    try:
+        row = ensure_model(request, model=model)
+    except (KeyMissing, ModelFault) as fault:
+        raise DemoFailed(f"{model} at {request.base_url} can’t be asked: {fault}") from None
+    variants = ("otm", "fc", "tqa", *(["vqa"] if row.vision else []))
+    asked = {"endpoint": row.endpoint, "model": model, "options": {}, "roles": {}}
+    known = dict(models.Contestant.objects.filter(**asked).values_list("variant", "slug"))
+    for variant in variants:
+        if variant not in known:
+            slug = free_slug(model, variant, {})
+            add_contestant(
+                ContestantRequest(
+                    slug=slug, variant=variant, endpoint=row.endpoint.label, model=model
+                )
+            )
+            known[variant] = slug
+    report = row.probe_report or {}
+    slugs = tuple(known[variant] for variant in variants)
+    return OwnModel(name=model, contestants=slugs, probe_calls=1 + report.get("calls", 0))
+
+
+def launch_model(
+    own: OwnModel, scenarios: list[str], say: Callable[[str], None]
 ) -> models.GenerationJob:
-    """Every contestant on every one of the scenarios, through the workers.
+    """Launch a model's job on the scenarios within its cap, and say before what it may use."""
+    name = f"Demo: {own.name}"[:120]
+    if job := models.GenerationJob.objects.filter(name=name).first():
+        return job
+    cap = CALLS_PER_SCENARIO * len(scenarios) - own.probe_calls
+    request = JobRequest(
+        name=name, contestants=own.contestants, scenarios=scenarios, cap_calls=cap
+    )
+    _, usual, most = estimate(request).calls
+    say(
+        f"{own.name}: {', '.join(own.contestants)} on {len(scenarios)} scenarios, {usual} calls "
+        f"expected, at most {min(cap, most)}, after {own.probe_calls} of its probe; cost unknown"
+    )
+    return launch(request)
+
+
+def finish(
+    job: models.GenerationJob, say: Callable[[str], None], look: Callable[[], None]
+) -> list[str]:
+    """Have the workers run a job; what is beyond its cap is cancelled.
 
     Args:
-        scenarios: Slugs.
+        job: Which.
         say: Told the progress.
         look: Called again and again; it raises where a worker is gone for good.
+
+    Returns:
+        The scenarios that are done by all of its contestants.
 
     Raises:
         DemoFailed: It does not get on, or rows failed.
     """
-    job = demo.launch_job(scenarios=scenarios)
+    if count_rows(job).failed:
+        retry_failed(job)
     enqueue_job(job.pk)
-    ended, moved_at = -A_LINE_EVERY, time.monotonic()
-    while (now := count_rows(job)).under_way:
+    told, settled, moved_at = -A_LINE_EVERY, 0, time.monotonic()
+    while (now := count_rows(job)).is_moving:
         look()
-        if now.settled >= ended + A_LINE_EVERY:
-            ended, moved_at = now.settled, time.monotonic()
-            say(f"  {ended} of {now.total} augmentations")
+        if now.settled >= told + A_LINE_EVERY:
+            told = now.settled
+            say(f"  {told} of {now.total} augmentations")
+        if now.settled > settled:
+            settled, moved_at = now.settled, time.monotonic()
         elif time.monotonic() - moved_at > STUCK_S:
             raise DemoFailed(f"{job.name!r} does not get on: {now.settled} of {now.total}.")
         time.sleep(0.2)
+        job.refresh_from_db()
     ends = {state.value: number for state, number in now.by_state.items() if number}
     say(f"Augmentations: {', '.join(f'{number} {state}' for state, number in ends.items())}")
     if now.failed:
-        reasons = job.augmentations.filter(state=models.Augmentation.State.FAILED)
+        reasons = job.augmentations.filter(state=State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
-    return job
+    if now.under_way:
+        cancel(job)
+        say(f"{job.name!r} is at its cap of {job.cap_calls} calls; the rest is cancelled.")
+    left_out = job.augmentations.filter(state=State.CANCELLED).values("scenario")
+    return list(job.scenarios.exclude(pk__in=left_out).values_list("slug", flat=True))
 
 
 def start_drives() -> list[int]:
@@ -122,13 +205,20 @@ def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
         time.sleep(0.2)
 
 
-def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:
+def vote_and_rate(
+    scenarios: list[str], folder: Path, own: OwnModel | None = None
+) -> tuple[str, list[Path]]:
     """Return the table of a study with simulated votes, and the files that it is written to."""
-    study = demo.hold_study(scenarios=scenarios)
-    if not Study.objects.filter(name=OPEN_STUDY).exists():
+    name, to_try = demo.SIMULATED_STUDY, OPEN_STUDY
+    contestants: tuple[str, ...] = demo.RATED
+    if own is not None:
+        name, to_try = f"Demo with {own.name[:80]} (simulated votes)", OPEN_STUDY_WITH_MODEL
+        contestants += own.contestants
+    study = demo.hold_study(scenarios=scenarios, name=name, contestants=contestants)
+    if not Study.objects.filter(name=to_try).exists():
         # Two of a scenario's six pairs can be decided, and nobody sees one twice.
         votes = min(YOUR_VOTES, 2 * len(scenarios))
-        values = demo.study_asked(OPEN_STUDY, scenarios) | {"experts": ["expert"]}
+        values = demo.study_asked(to_try, scenarios, contestants) | {"experts": ["expert"]}
         open_study(StudyPlan.read(values | {"votes_per_expert": votes}))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)

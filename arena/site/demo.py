@@ -95,24 +95,32 @@ def add_experts(actor: User | None = None) -> None:
             )
 
 
-def launch_job(actor: User | None = None, scenarios: Sequence[str] = ()) -> GenerationJob:
+def launch_job(
+    actor: User | None = None, scenarios: Sequence[str] = (), *, leave_out: Sequence[str] = ()
+) -> GenerationJob:
     """Launch the demo's job, all contestants on the scenarios, by default a few of each type."""
     if job := GenerationJob.objects.filter(name=JOB).first():
         return job
     chosen = scenarios or list_slugs(A_FEW) or resolve_scenarios([ALL])
-    request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=chosen)
+    contestants = [slug for slug in resolve_contestants([ALL]) if slug not in leave_out]
+    request = JobRequest(name=JOB, contestants=contestants, scenarios=chosen)
     return launch(request, actor)
 
 
-def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Study:
+def hold_study(
+    actor: User | None = None,
+    scenarios: Sequence[str] = (),
+    *,
+    name: str = SIMULATED_STUDY,
+    contestants: Sequence[str] = RATED,
+) -> Study:
     """Open a study, let simulated experts vote, close and rate it; by default of the last job.
 
     Raises:
         Conflict: No job is finished.
     """
-    if study := Study.objects.filter(name=SIMULATED_STUDY).first():
+    if study := Study.objects.filter(name=name).first():
         return study
-    contestants: Sequence[str] = RATED
     if not scenarios:
         job = GenerationJob.objects.filter(state=GenerationJob.State.FINISHED).first()
         if job is None:
@@ -121,7 +129,7 @@ def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Stud
         ran = set(job.contestants.values_list("slug", flat=True))
         contestants = RATED if set(RATED) <= ran else sorted(ran)
     add_experts(actor)
-    values = study_asked(SIMULATED_STUDY, scenarios, contestants)
+    values = study_asked(name, scenarios, contestants)
     values |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
     plan = StudyPlan.read(values | {"votes_per_expert": SIMULATED_VOTES_EACH})
     study = open_study(plan, actor=actor)

@@ -103,12 +103,39 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             Unwanted: Nobody needs it any more, and nothing was sent.
             ModelFault: There was none; whether it may come later is said by `retryable`.
         """
-        import httpx2
-        import openai
-
         sent = request.to_document()
         sending()
         started = time.monotonic()
+        reply = self._exchange("/chat/completions", sent)
+        latency_s = time.monotonic() - started
+        if not isinstance(reply, Reply):
+            least = sum(least_tokens(message.text) for message in request.messages)
+            reply = read_completion(reply, least_prompt=least)
+        return replace(reply, latency_s=latency_s)
+
+    def list_models(self) -> list[str]:
+        """Return the ids of the models that the endpoint lists.
+
+        Raises:
+            ModelFault: It lists none.
+        """
+        document = self._exchange("/models")
+        rows = document.get("data") if isinstance(document, dict) else None
+        lines = [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
+        names = {name for row in lines if isinstance(name := row.get("id"), str)}
+        if not names:
+            raise ModelFault("the endpoint lists no models", retryable=False)
+        return sorted(names)
+
+    def _exchange(self, path: str, sent: dict[str, object] | None = None) -> object:
+        """Return the document that is answered to a POST, or to a GET where nothing is sent.
+
+        Raises:
+            Abandoned, Unwanted, ModelFault: As `complete`.
+        """
+        import httpx2
+        import openai
+
         watch = wire_transport.Watch(
             longest_s=self._timeout_s,
             most_bytes=self._most_bytes,
@@ -118,13 +145,14 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         try:
             with wire_transport.watch_over(watch):
                 # Raw: the package passes on what has wrong types as if it had the right ones.
-                answer = self._client.post("/chat/completions", cast_to=httpx2.Response, body=sent)
-            latency_s = time.monotonic() - started
+                answer = (
+                    self._client.get(path, cast_to=httpx2.Response)
+                    if sent is None
+                    else self._client.post(path, cast_to=httpx2.Response, body=sent)
+                )
             document = self._read(answer.text)
             if not isinstance(document, str):
-                least = sum(least_tokens(message.text) for message in request.messages)
-                reply = read_completion(document, least_prompt=least)
-                return replace(reply, latency_s=latency_s)
+                return document
             is_json = "json" in answer.headers.get("content-type", "")
             is_stream = document.startswith(("data:", "event:", ":"))
             problem = _STREAM if is_stream else _BROKEN_JSON if is_json else _PAGE
@@ -136,7 +164,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
                 error.status_code,
                 self._read(error.response.text),
                 dict(error.response.headers),
-                sent=sent,
+                sent=sent or {},
             )
         except NotNeeded as why:
             fault = CallDropped(why) if watch.has_written else why
@@ -149,7 +177,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         except openai.OpenAIError as error:
             fault = ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
         if isinstance(fault, Reply):
-            return replace(fault, latency_s=time.monotonic() - started)
+            return fault
         # Outside the handlers, so that nothing of the package's errors (which hold the request
         # with its headers) hangs on ours.
         if isinstance(fault, ModelFault):

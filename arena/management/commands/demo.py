@@ -1,6 +1,7 @@
 """`manage.py demo`: the main job on the catalogue, unattended, then served."""
 
 import time
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -14,8 +15,9 @@ from arena.models import Snapshot
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
 from arena.shell.sending import send_charts
-from arena.site.demo import JOB, list_slugs
+from arena.site.demo import JOB, launch_job, list_slugs
 from augment.services import TerminalCommand, at_least
+from augment.services.endpoints import EndpointRequest
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
 
@@ -37,36 +39,54 @@ class Command(TerminalCommand):
             "metavar": "N",
             "help": "only N scenarios of each type; default: all",
         },
+        "--endpoint": {"default": "", "help": "address of a model of your own, up to /v1"},
+        "--model": {"default": "", "help": "its id there; it runs on five scenarios"},
+        "--key": {"default": "", "metavar": "VARIABLE", "help": "that holds the endpoint's key"},
+        "--scenarios": {
+            "choices": ("few", "all"),
+            "default": "few",
+            "help": "which of the demo's the model of your own runs on; default: few",
+        },
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run the demo; a fault of any step ends it with a sentence."""
-        web = Web(host=options["host"], port=options["port"])
+        if bool(options["endpoint"]) != bool(options["model"]):
+            raise CommandError("--endpoint and --model name a model together: give both.")
         try:
             with hold_alone():
-                self._run(web, options["per_type"], serve=not options["no_serve"])
+                self._run(options, serve=not options["no_serve"])
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 
-    def _run(self, web: Web, per_type: int | None, *, serve: bool) -> None:
-        started = time.monotonic()
+    def _run(self, options: Mapping[str, Any], *, serve: bool) -> None:
+        started, say = time.monotonic(), self.stdout.write
+        web = Web(host=options["host"], port=options["port"])
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
-        demo.prepare(self.stdout.write)
-        scenarios = [*list_slugs(per_type), *list_slugs(1, "moving")]
+        own = None
+        if options["endpoint"]:
+            request = EndpointRequest(base_url=options["endpoint"], key_variable=options["key"])
+            own = demo.add_model(request, options["model"])
+        demo.prepare(say)
+        scenarios = [*list_slugs(options["per_type"]), *list_slugs(1, "moving")]
+        jobs = [launch_job(scenarios=scenarios, leave_out=own.contestants if own else ())]
+        if own is not None:
+            chosen = scenarios if options["scenarios"] == "all" else list_slugs(1)
+            jobs.append(demo.launch_model(own, chosen, say))
         supervisor = Supervisor([*background(concurrency=4), *server], self._keep)
         with supervisor.signals():
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)
-                demo.generate(scenarios, self.stdout.write, look)
-                folder = settings.VAR_DIR / "demo"
-                text, files = demo.vote_and_rate(scenarios, folder)
+                for job in jobs:  # the last one's scenarios are those of the studies
+                    scenarios = demo.finish(job, say, look)
+                text, files = demo.vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
                 send_charts(Snapshot.objects.latest("made_at").pk)
                 drives = demo.start_drives()
-                self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
+                say(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
                 if drives:
-                    self.stdout.write(f"{len(drives)} drives follow in the background.")
+                    say(f"{len(drives)} drives follow in the background.")
                 if not serve:
                     demo.finish_drives(drives, look)
                 self._show(web, time.monotonic() - started, serve=serve)

@@ -18,7 +18,7 @@ from augment.services.endpoints.known_endpoints import (
     read_key,
 )
 from augment.services.endpoints.known_models import Spending, sum_spending, vendor_family
-from augment.services.endpoints.probing import add_model, plan_probe
+from augment.services.endpoints.probing import add_model, ensure_model, list_models, plan_probe
 from augment.services.endpoints.treatments import (
     list_unsent_options,
     read_options,

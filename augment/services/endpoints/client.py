@@ -127,7 +127,12 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         self._wire.close()
 
 
-def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_nothing) -> OpenAIWire:
+def wire_to(
+    endpoint: Endpoint,
+    *,
+    still_wanted: Callable[[], None] = watch_nothing,
+    timeout_s: float | None = None,
+) -> OpenAIWire:
     """Return a wire with the endpoint's key; its calls are given up where `still_wanted` raises.
 
     Raises:
@@ -138,7 +143,7 @@ def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_noth
     return OpenAIWire(
         base_url=endpoint.base_url,
         api_key=read_key(endpoint),
-        timeout_s=settings.LLM_TIMEOUT_S,
+        timeout_s=timeout_s or settings.LLM_TIMEOUT_S,
         most_bytes=settings.LLM_ANSWER_MB * MEGABYTE,
         still_wanted=still_wanted,
         proxy_url=settings.LLM_PROXY,

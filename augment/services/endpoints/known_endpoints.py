@@ -10,7 +10,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import resources
 from typing import Any
@@ -66,7 +66,9 @@ class EndpointFacts:
 class EndpointRequest(EndpointFacts):
     """A new endpoint; label and kind stay for ever."""
 
-    label: str = input_field(InputKind.TEXT, "Name", SLUG_RULE, most=80)
+    label: str = input_field(
+        InputKind.TEXT, "Name", f"{SLUG_RULE} Empty: made of the address.", default="", most=80
+    )
     is_simulated: bool = input_field(
         InputKind.SWITCH, "A stand-in: what it answers counts as simulated", default=False
     )
@@ -89,6 +91,7 @@ def add_endpoint(request: EndpointRequest, actor: User | None = None) -> Endpoin
         InvalidDocument: Something can't be used, each with what is allowed.
         Conflict: There is one of that label.
     """
+    request = replace(request, label=request.label or _make_label(request.base_url))
     check_slug(request.label, what="endpoint", key="label")
     if Endpoint.objects.filter(label=request.label).exists():
         raise Conflict(f"There is an endpoint “{request.label}” already; choose another label.")
@@ -279,6 +282,18 @@ def _read_bindings() -> dict[str, str]:
         name, _, hosts = entry.partition("=")
         bindings[name] = hosts or bindings.get(name, "")
     return bindings
+
+
+def _make_label(base_url: str) -> str:
+    """Return the host of an address as a label that no endpoint has."""
+    server = host_and_port(base_url).removesuffix(":443").removesuffix(":80")
+    stem = re.sub(r"[^a-z0-9]+", "-", server).strip("-")[:70] or "endpoint"
+    taken = set(Endpoint.objects.values_list("label", flat=True))
+    return next(
+        name
+        for name in (stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3)))
+        if name not in taken
+    )
 
 
 def _change(

@@ -4,6 +4,7 @@ A fault that says nothing about the ability (a busy server) leaves the ability a
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from decimal import Decimal
@@ -21,6 +22,7 @@ from augment.llm.messages import LengthName, Reply, Request, SchemaForm, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
+from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, check_facts
 from augment.services.endpoints.known_models import TEMPERATURE, find_price, model_at
 from augment.services.endpoints.treatments import SAMPLING
 from augment.services.events import log_change
@@ -35,6 +37,11 @@ _REFUSALS = frozenset({400, 404, 415, 422})
 
 _STORED = (Ability.TEMPERATURE, Ability.NATIVE_TOOLS, Ability.VISION)
 _LONGEST_NOTE = 200
+
+LIST_WITHIN_S = 5.0
+"""Somebody looks at a page meanwhile."""
+
+MOST_LISTED = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +132,45 @@ def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> P
     row = model_at(endpoint=endpoint, model=model)
     log_change(row, "add", actor, after={"model": model, "endpoint": endpoint.label})
     return plan_probe(row, actor=actor)
+
+
+def ensure_model(request: EndpointRequest, *, model: str) -> EndpointModel:
+    """Return a model that was probed, added with its endpoint where it answers.
+
+    Raises:
+        InvalidDocument: The address or the variable of its key can't be used.
+        KeyMissing: The variable is not set here.
+        ModelFault: It does not answer; no row is made then.
+    """
+    facts = check_facts(request)
+    where = {name: facts[name] for name in ("base_url", "key_variable", "is_simulated")}
+    endpoint = Endpoint.objects.filter(**where).first()
+    known = EndpointModel.objects.filter(endpoint=endpoint, model=model).exclude(probed_at=None)
+    if row := known.first():
+        return row
+    with wire_to(Endpoint(**facts)) as wire:
+        try:
+            with suppress(ParameterRefused):
+                wire.complete(questions_for(model)[0].request)
+        except ModelFault as fault:
+            with suppress(ModelFault):  # many endpoints list none
+                fault.args = (f"{fault} It lists: {', '.join(wire.list_models()[:MOST_LISTED])}.",)
+            raise
+    row = model_at(endpoint=endpoint or add_endpoint(request), model=model)
+    probe(row)
+    row.refresh_from_db()
+    return row
+
+
+def list_models(endpoint: Endpoint) -> list[str]:
+    """Return the ids of the models that an endpoint lists, soon or not at all.
+
+    Raises:
+        KeyNotAllowed, KeyMissing: The key's variable is not meant for keys, or not set here.
+        ModelFault: It lists none.
+    """
+    with wire_to(endpoint, timeout_s=LIST_WITHIN_S) as wire:
+        return wire.list_models()
 
 
 def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:
