@@ -1,14 +1,16 @@
 """Pages of contestants, and of the endpoints and models that they ask."""
 
 import uuid
+from collections.abc import Iterator
 from typing import Any
 
 from django import forms
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
+from django.db import transaction
 from django.db.models import Count
 from django.forms import model_to_dict
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.contestants.queries import probe_lines, probe_state, show_options
@@ -29,6 +31,8 @@ from augment.services.endpoints import (
     add_contestant,
     add_model,
     known_endpoints,
+    list_models,
+    paper_variants,
     plan_probe,
     read_respondents,
 )
@@ -56,14 +60,21 @@ class OptionsForm(RequestForm):
         return any(field.value() not in (None, "") for field in self.option_fields)
 
 
-class ContestantForm(OptionsForm):
-    """A model, a variant, and how it asks."""
+REQUEST = to_inputs(ContestantRequest)
 
-    inputs = (
-        *(field for field in to_inputs(ContestantRequest) if field.name in ("variant", "name")),
-        *OPTION_INPUTS,
-    )
+
+class ContestantForm(OptionsForm):
+    """A model, its variants, and how it asks."""
+
+    inputs = (*(field for field in REQUEST if field.name == "name"), *OPTION_INPUTS)
     model = forms.ChoiceField(label="Model")
+    variant = forms.MultipleChoiceField(
+        label="Variants",
+        choices=[*next(field.choices for field in REQUEST if field.name == "variant").items()],
+        widget=forms.CheckboxSelectMultiple,
+        help_text="Each is a contestant. "
+        + next(field.help for field in REQUEST if field.name == "variant"),
+    )
     slug = forms.CharField(
         required=False,
         max_length=80,
@@ -78,14 +89,23 @@ class ContestantForm(OptionsForm):
         choices = [(f"{at}{SEPARATOR}{model}", f"{model} at {at}") for at, model in pairs]
         offer(self, "model", choices)
 
-    def to_request(self) -> ContestantRequest:
-        """Return the request; the short name is made where none is entered."""
+    def clean(self) -> dict[str, Any]:
+        """Refuse one name for several contestants."""
+        values: dict[str, Any] = super().clean() or self.cleaned_data
+        for name in ("name", "slug"):
+            if values.get(name) and len(values.get("variant", ())) > 1:
+                self.add_error(name, "Two contestants can’t have one name: tick one variant.")
+        return values
+
+    def to_requests(self) -> Iterator[ContestantRequest]:
+        """Yield a request for each variant; the short name is made where none is entered."""
         values = self.cleaned_data
         options = read_values(OPTION_INPUTS, values)
         endpoint, model = values["model"].split(SEPARATOR, 1)
-        slug = values["slug"] or free_slug(model, values["variant"], options)
-        whole = values | {"endpoint": endpoint, "model": model, "slug": slug}
-        return read_request(ContestantRequest, whole, options=options)
+        for variant in values["variant"]:
+            slug = values["slug"] or free_slug(model, variant, options)
+            whole = values | {"endpoint": endpoint, "model": model, "slug": slug}
+            yield read_request(ContestantRequest, whole | {"variant": variant}, options=options)
 
 
 class EndpointForm(RequestForm):
@@ -153,13 +173,22 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @form_for(ADMIN)
 def new_contestant_page(request: HttpRequest) -> HttpResponse:
-    """Add a contestant that asks a model."""
-    form = ContestantForm(request.POST or None, initial=request.GET.dict())
+    """Add contestants that ask a model, by default in the paper's variants."""
+    model = EndpointModel.objects.order_by("-pk").first()
+    where = request.GET.get("model", "").partition(SEPARATOR)
+    asked = EndpointModel.objects.filter(endpoint__label=where[0], model=where[2]).first()
+    initial: dict[str, Any] = {}
+    if model := asked or model:
+        initial = {"model": f"{model.endpoint.label}{SEPARATOR}{model.model}"}
+        initial["variant"] = paper_variants(model)
+    form = ContestantForm(request.POST or None, initial=initial)
     if form.is_valid():
-        with refusals_in(form):
-            row = add_contestant(form.to_request(), get_user(request))
-            messages.success(request, f"“{row.name}” is added.")
-            return redirect("contestant", code=row.code)
+        with refusals_in(form), transaction.atomic():
+            rows = [add_contestant(wanted, get_user(request)) for wanted in form.to_requests()]
+            messages.success(request, f"Added: {', '.join(row.name for row in rows)}.")
+            if len(rows) > 1:
+                return redirect("contestants")
+            return redirect("contestant", code=rows[0].code)
     return render(request, "contestants/new.html", {"form": form})
 
 
@@ -225,6 +254,18 @@ def _sent_by_admin(request: HttpRequest) -> Any:
     if request.method == "POST" and top_role(request.user) != ADMIN:
         raise PermissionDenied
     return request.POST or None
+
+
+@page_for(ADMIN)
+def listed_models(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Return the models that an endpoint lists and nobody named yet, or why there are none."""
+    row = get_object_or_404(Endpoint, code=code)
+    try:
+        named = set(row.models.values_list("model", flat=True))
+        names = [name for name in list_models(row) if name not in named]
+    except AugmentError as error:
+        return JsonResponse({"models": [], "problem": str(error)})
+    return JsonResponse({"models": names, "problem": ""})
 
 
 @act_for(ADMIN, back="endpoint")

@@ -13,6 +13,7 @@ urlpatterns: list[URLPattern] = [
     path("endpoints/new/", pages.new_endpoint_page, name="endpoint-new"),
     path("endpoints/<uuid:code>/", pages.endpoint_page, name="endpoint"),
     path("endpoints/<uuid:code>/models/", pages.new_model, name="endpoint-model-new"),
+    path("endpoints/<uuid:code>/listed/", pages.listed_models, name="endpoint-listed"),
     path("models/<uuid:code>/", pages.model_page, name="endpoint-model"),
     path("models/<uuid:code>/probe/", pages.probe_model, name="endpoint-probe"),
 ]

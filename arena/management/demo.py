@@ -29,6 +29,7 @@ from augment.services.endpoints import (
     EndpointRequest,
     add_contestant,
     ensure_model,
+    paper_variants,
 )
 from augment.services.endpoints.contestants import free_slug
 from augment.services.running import JobRequest, count_rows
@@ -97,7 +98,7 @@ def add_model(request: EndpointRequest, model: str) -> OwnModel:
         row = ensure_model(request, model=model)
     except (KeyMissing, ModelFault) as fault:
         raise DemoFailed(f"{model} at {request.base_url} can’t be asked: {fault}") from None
-    variants = ("otm", "fc", "tqa", *(["vqa"] if row.vision else []))
+    variants = paper_variants(row)
     asked = {"endpoint": row.endpoint, "model": model, "options": {}, "roles": {}}
     known = dict(models.Contestant.objects.filter(**asked).values_list("variant", "slug"))
     for variant in variants:

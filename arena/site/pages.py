@@ -24,9 +24,10 @@ from arena.shell.access import ADMIN, act_for, get_user, page_for
 from arena.shell.accounts import Language, Theme, top_role
 from arena.shell.acts import send_later
 from arena.shell.listing import read_listing, read_page
+from arena.shell.steps import first_steps
 from arena.site import demo
 from arena.site.language import use_english
-from arena.site.queries import actors, count_failed, distinct, first_steps, read_gauges
+from arena.site.queries import actors, count_failed, distinct, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
 from arena.voting.queries.blinding import ResultsAccess, results_access

@@ -1,7 +1,6 @@
 """Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from django.apps import apps
@@ -84,51 +83,7 @@ def _by_state(name: str, text: str, numbers: Mapping[Any, int]) -> GaugeMetricFa
     return family
 
 
-# --- Counts ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """One of the first steps: what is done there, and whether there is something of it.
-
-    Attributes:
-        name: What *Use the demo's* does; see `arena.site.demo`.
-        mine: The name of the page where one's own is made.
-        found: So many there are.
-    """
-
-    name: str
-    title: str
-    text: str
-    mine: str
-    found: int
-
-
-def first_steps() -> list[Step]:
-    """Return the steps from an empty installation to a rated table."""
-    is_there = [
-        models.Endpoint.objects.count(),
-        models.Scenario.objects.count(),
-        models.Contestant.objects.exclude(endpoint=None).count(),
-        models.Augmentation.objects.filter(state=models.Augmentation.State.DONE).count(),
-        User.objects.filter(groups__name="expert").count(),
-        Study.objects.filter(state=Study.State.CLOSED).count(),
-    ]
-    return [
-        Step(name=name, title=title, text=text, mine=mine, found=is_done)
-        for (name, mine, title, text), is_done in zip(_STEPS, is_there, strict=True)
-    ]
-
-
-_STEPS = (
-    ("models", "endpoint-new", "Language models", "Where they answer; the demo’s need no key."),
-    ("scenarios", "scenes", "Scenarios", "Recorded scenes, each with a sentence to carry out."),
-    ("contestants", "contestant-new", "Contestants", "Models with a way of asking them."),
-    ("job", "job-new", "A job", "Every contestant edits every scenario."),
-    ("experts", "people", "Experts", "They compare the pictures blindly, two at a time."),
-    ("study", "study-new", "A study", "Experts vote; closed, it ends at the table."),
-)
-"""Names, pages for one's own, titles and texts."""
+# --- Counts ----------------------------------------------------------------------------------
 
 
 def count_failed() -> int:

@@ -10,6 +10,7 @@ from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
 from arena.shell.accounts import frame_profile
+from arena.shell.steps import next_step
 
 register = template.Library()
 
@@ -41,7 +42,7 @@ _MENU = {
 
 @register.simple_tag(takes_context=True)
 def shell(context: Context) -> dict[str, Any]:
-    """Return profile and navigation of whoever made the request."""
+    """Return profile, navigation and the next of the first steps of whoever made the request."""
     request: HttpRequest | None = context.get("request")
     user = getattr(request, "user", None)
     profile = frame_profile(user) if user is not None else None
@@ -54,4 +55,5 @@ def shell(context: Context) -> dict[str, Any]:
         for name, (label, beginnings) in _SECTIONS.items()
         if name in _MENU[profile.role]
     ]
-    return {"profile": profile, "links": links}
+    is_led = profile.role == "admin" and here not in {"", None}  # home lists all of the steps
+    return {"profile": profile, "links": links, "next": next_step() if is_led else None}

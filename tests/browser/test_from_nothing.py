@@ -155,7 +155,8 @@ def _enter_models(page: Page, model: str) -> None:
 def _enter_contestant(page: Page) -> None:
     page.click("a:has-text('New contestant')")
     expect(page.locator("[name=model]")).to_have_value("stand-in|fake-careless")
-    page.select_option("[name=variant]", "otm")
+    for variant in ("fc", "tqa", "vqa"):
+        page.uncheck(f"[name=variant][value={variant}]")
     page.get_by_text("Advanced").click()
     page.fill("[name=slug]", "careless-otm")
     page.fill("[name=temperature]", "0.7")

@@ -32,7 +32,7 @@ PAGES = _table(
             "submissions submission submission-new sweeps sweep sweep-file"
         ),
         ADMIN: (
-            "job-new contestant-new endpoint-new audit people person-forget "
+            "job-new contestant-new endpoint-new endpoint-listed audit people person-forget "
             "import-votes study-new study-draft enrolment benchmark-new"
         ),
         (404, 404, 403): (

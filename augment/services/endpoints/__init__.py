@@ -8,6 +8,7 @@ from augment.services.endpoints.contestants import (
     add_contestant,
     ensure_builtin,
     make_free_slug,
+    paper_variants,
 )
 from augment.services.endpoints.known_endpoints import (
     MODEL_FACTS,

@@ -10,7 +10,7 @@ from django.db import transaction
 
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict
-from augment.models import Contestant
+from augment.models import Contestant, EndpointModel
 from augment.services.endpoints.known_endpoints import SLUG_RULE, find_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.treatments import Respondent, check_roles
@@ -138,6 +138,11 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
             "choose another slug."
         )
     return row
+
+
+def paper_variants(model: EndpointModel) -> tuple[str, ...]:
+    """Return the paper's variants that a model can play, as far as its probe shows."""
+    return ("otm", "fc", "tqa", *(["vqa"] if model.vision else []))
 
 
 def free_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
