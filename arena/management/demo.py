@@ -19,6 +19,7 @@ from arena.results.exports.writers import FORMATS, plain_text
 from arena.site import demo
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
+from arena.voting.services.drawing import draw_pictures
 from augment import models
 from augment.errors import KeyMissing, ModelFault
 from augment.services.benchmarks import BenchmarkRequest, make_benchmark
@@ -220,7 +221,7 @@ def vote_and_rate(
         # Two of a scenario's six pairs can be decided, and nobody sees one twice.
         votes = min(YOUR_VOTES, 2 * len(scenarios))
         values = demo.study_asked(to_try, scenarios, contestants) | {"experts": ["expert"]}
-        open_study(StudyPlan.read(values | {"votes_per_expert": votes}))
+        draw_pictures(open_study(StudyPlan.read(values | {"votes_per_expert": votes})))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []

@@ -12,6 +12,7 @@ from arena.api.fields import Field, StrictSerializer, body_field
 from arena.api.views import ApiView, PageQuery, Params, operation, page_serializer
 from arena.models import Study
 from arena.shell.accounts import top_role
+from arena.shell.sending import send_pictures
 from arena.studies.queries import StudyProgress, count_progress, list_studies
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
@@ -102,9 +103,11 @@ class StudiesView(ApiView):
     def post(self, params: Params) -> StudyProgress:
         """Plan a study and open it.
 
-        Its experts can vote at once.
+        Its experts can vote as soon as workers have drawn their first pairs.
         """
-        return _progress(open_study(StudyPlan.read(params), actor=self.user))
+        study = open_study(StudyPlan.read(params), actor=self.user)
+        send_pictures(study.pk)
+        return _progress(study)
 
 
 class StudyView(ApiView):

@@ -16,7 +16,8 @@ from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Study, Vote
 from arena.shell.access import ADMIN, EXPERT, form_for, get_user, page_for
 from arena.shell.pictures import send_picture
-from arena.voting.queries.ballots import own_votes
+from arena.shell.sending import send_pictures
+from arena.voting.queries.ballots import is_being_drawn, own_votes
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import drives_of_pair, picture_shown
 from arena.voting.screen import no_pair_context, vote_context
@@ -49,7 +50,12 @@ def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("vote-practice", code=study.code)
     context = vote_context(study, expert, change=request.GET.get("change", ""))
     if context is None:
-        return render(request, "vote/done.html", no_pair_context(study, expert))
+        context = no_pair_context(study, expert)
+        if not context["progress"].left:
+            return render(request, "vote/done.html", context)
+        if not is_being_drawn(study):
+            send_pictures(study.pk)
+        return render(request, "vote/waiting.html", context)
     return render(request, "vote/vote.html", context)
 
 

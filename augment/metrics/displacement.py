@@ -354,35 +354,74 @@ _ARROW_S = 1.0
 """A picture shows the motion of so much time as an arrow."""
 
 
-_ALIKE_M, _ALIKE_RAD = 0.15, math.radians(2.0)
-"""Up to which differences two objects look the same, the limits included."""
+_SAME_M, _SAME_RAD = 0.15, math.radians(2.0)
+"""Up to which differences an object was left as it was, the limits included."""
+
+ALIKE = {"metres": 0.1, "degrees": 10.0, "seconds": 0.1, "px_per_m": 40.0}
+"""What nobody sees: less than 4 pixels at that scale, as studies freeze it. Degrees bind for the
+small alone; the corners of whoever is longer come farther than the metres before."""
 
 
 def are_alike(first: Modification, other: Modification) -> bool:
-    """Return whether every object of either change has a counterpart that looks the same.
+    """Return whether every object of either change has a counterpart that nobody tells from it.
 
-    Place, size, end of a walk and way in a second are held against the distance; so are the
-    metres, seconds and m/s of motions. What is moved and what is removed must be the same.
+    What is moved and what is removed must be the same.
     """
-    moved = [{agent.id: agent for agent in change.moved} for change in (first, other)]
-    return (
-        set(first.removed) == set(other.removed)
-        and moved[0].keys() == moved[1].keys()
-        and all(look_alike(agent, moved[1][name]) for name, agent in moved[0].items())
-        and _all_matched(first.added, other.added)
+    shifts = find_shifts(first, other)
+    return shifts is not None and all(
+        shift.metres <= ALIKE["metres"] + 1e-9 and shift.degrees <= ALIKE["degrees"] + 1e-9
+        for shift in shifts
     )
 
 
-def _all_matched(agents: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> bool:
-    """Return whether a one-to-one matching of objects that look alike exists."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shift:
+    """Two objects that stand for each other in two changes.
+
+    Attributes:
+        metres: The farthest that a corner, the end of a walk or the way of a second comes.
+        degrees: The turn, 0 to 180; 0 for what is drawn upright.
+    """
+
+    one: TrafficAgent
+    other: TrafficAgent
+    metres: float
+    degrees: float
+
+
+def find_shifts(first: Modification, other: Modification) -> tuple[Shift, ...] | None:
+    """Return the objects of two changes, matched; None where one has no counterpart."""
     from scipy.optimize import linear_sum_assignment
 
-    if len(agents) != len(other):
-        return False
-    # 1 for a pair that differs: a matching of cost 0 is one of pairs that look the same.
-    apart = np.array([[not look_alike(a, b) for b in other] for a in agents])
-    rows, columns = linear_sum_assignment(apart.reshape(len(agents), len(other)))
-    return not apart.reshape(len(agents), len(other))[rows, columns].any()
+    moved = [{agent.id: agent for agent in change.moved} for change in (first, other)]
+    is_other = moved[0].keys() != moved[1].keys() or len(first.added) != len(other.added)
+    if is_other or set(first.removed) != set(other.removed):
+        return None
+    found = [_find_shift(agent, moved[1][name]) for name, agent in moved[0].items()]
+    table = [[_find_shift(a, b) for b in other.added] for a in first.added]
+    # (A, B) metres; what can't stand for each other costs more than any sum of distances.
+    costs = np.array([[1e9 if cell is None else cell.metres for cell in row] for row in table])
+    rows, columns = linear_sum_assignment(costs.reshape(len(table), len(table)))
+    found += [table[row][column] for row, column in zip(rows, columns, strict=True)]
+    shifts = tuple(shift for shift in found if shift is not None)
+    return shifts if len(shifts) == len(found) else None
+
+
+def _find_shift(one: TrafficAgent, other: TrafficAgent) -> Shift | None:
+    """Return the difference of two objects, None where they are not of one kind."""
+    mine, theirs = (agent.motion and asdict(agent.motion) for agent in (one, other))
+    is_walk = [agent.walk_to_m is None for agent in (one, other)]
+    is_other = one.type is not other.type or is_walk[0] != is_walk[1]
+    if is_other or not _are_close(mine, theirs, ALIKE["seconds"]):
+        return None
+    is_upright = one.type in _UPRIGHT
+    turn_rad = 0.0 if is_upright else difference(one.heading_rad, other.heading_rad)
+    turned = replace(other, heading_rad=one.heading_rad) if is_upright else other
+    gaps_m = np.hypot(*(one.box.corners_m - turned.box.corners_m).T).tolist()
+    gaps_m.append(abs(one.speed_mps - other.speed_mps) * _ARROW_S)
+    if one.walk_to_m is not None and other.walk_to_m is not None:
+        gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
+    return Shift(one=one, other=other, metres=max(gaps_m), degrees=abs(math.degrees(turn_rad)))
 
 
 def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
@@ -390,8 +429,8 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
     # As documents, whose numbers alone may differ a little.
-    motions = [agent.motion and asdict(agent.motion) for agent in (one, other)]
-    if not _are_close(*motions):
+    mine, theirs = (agent.motion and asdict(agent.motion) for agent in (one, other))
+    if not _are_close(mine, theirs, _SAME_M):
         return False
     gaps_m = [
         math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),
@@ -402,19 +441,21 @@ def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     if one.walk_to_m is not None and other.walk_to_m is not None:
         gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
     turn_rad = 0.0 if one.type in _UPRIGHT else difference(one.heading_rad, other.heading_rad)
-    return max(gaps_m) <= _ALIKE_M + 1e-9 and abs(turn_rad) <= _ALIKE_RAD + 1e-9
+    return max(gaps_m) <= _SAME_M + 1e-9 and abs(turn_rad) <= _SAME_RAD + 1e-9
 
 
-def _are_close(value: Any, other: Any) -> bool:
+def _are_close(value: Any, other: Any, within: float) -> bool:
     """Return whether two parts of documents differ in their numbers alone, and in these little."""
     if type(value) is not type(other):
         return False
     if isinstance(value, float):
-        return bool(abs(value - other) <= _ALIKE_M + 1e-9)
+        return bool(abs(value - other) <= within + 1e-9)
     if isinstance(value, dict):
         return value.keys() == other.keys() and all(
-            _are_close(value[key], other[key]) for key in value
+            _are_close(value[key], other[key], within) for key in value
         )
     if isinstance(value, tuple):
-        return len(value) == len(other) and all(map(_are_close, value, other))
+        return len(value) == len(other) and all(
+            _are_close(mine, theirs, within) for mine, theirs in zip(value, other, strict=True)
+        )
     return bool(value == other)

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from augment.render import palette, road
-from augment.render.camera import Camera
+from augment.render.camera import Camera, Inset
 from augment.render.canvas import Box, Canvas, stack_png
 from augment.render.labels import draw_badges, draw_ghosts, draw_labels, place_badges
 from augment.render.legend import draw_legend
@@ -148,13 +148,27 @@ def _paint_scene(
     ]
     seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
     scale_px = road.scale_box(camera, corner)
-    badges = place_badges(ground, lost, seen, taken=(scale_px,))
+    inset_px = (camera.inset.box_px,) if camera.inset else ()
+    badges = place_badges(ground, lost, seen, taken=(scale_px, *inset_px))
     draw_badges(ground, badges)
+    if camera.inset is not None:
+        _draw_inset(ground, rest, modification, camera.inset)
     return ground, [scale_px, *(badge.box_px for badge in badges)]
 
 
+def _draw_inset(ground: Canvas, rest: Scene, modification: Modification, inset: Inset) -> None:
+    """Draw a part once more, enlarged, and a frame round it at its place."""
+    window = inset.camera
+    closer = _draw_unchanged(rest, window, None).copy()
+    _paint(closer, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
+    (low, high) = (window.x_min_m, window.y_min_m), (window.x_max_m, window.y_max_m)
+    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
+    ground.stroke(ground.px(np.array(corners)), palette.INK, 1.5, closed=True)
+    ground.paste(closer, inset.box_px)
+
+
 @lru_cache(maxsize=4)
-def _draw_unchanged(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
+def _draw_unchanged(rest: Scene, camera: Camera, corner: road.Corner | None) -> Canvas:
     """Draw everything that a change leaves as it is; nobody draws on it, only on copies."""
     ground = _still(rest, camera, corner)
     traffic = [(agent, palette.OTHER_MARK) for agent in rest.agents]
@@ -162,12 +176,14 @@ def _draw_unchanged(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
     return ground
 
 
-def _still(rest: Scene, camera: Camera, corner: road.Corner) -> Canvas:
-    """Draw all but who is there, on a surface of its own."""
+def _still(rest: Scene, camera: Camera, corner: road.Corner | None) -> Canvas:
+    """Draw all but who is there, on a surface of its own; the scale where it has a corner."""
     ground = _flat(replace(rest, agents=()), camera).copy()
     road.draw_goal(ground, rest)
     road.draw_signals(ground, rest)
-    road.draw_scale(ground, road.scale_box(camera, corner))
+    road.draw_ticks(ground, rest)
+    if corner is not None:
+        road.draw_scale(ground, road.scale_box(camera, corner))
     return ground
 
 

@@ -53,7 +53,9 @@ class Camera:
     """A window of the ego frame and its scale, the same on both axes.
 
     Attributes:
-        is_filmed: Whether its pictures have a film: all of a scenario, or none.
+        is_filmed: Whether its pictures have a film: all of a scenario or pair, or none.
+        ticks_m: Distances ahead of the ego that are marked on its lane.
+        inset: A part shown enlarged in the same picture, None without one.
     """
 
     x_min_m: float
@@ -62,6 +64,8 @@ class Camera:
     y_max_m: float
     px_per_m: float
     is_filmed: bool = False
+    ticks_m: tuple[float, ...] = ()
+    inset: Inset | None = None
 
     @property
     def width_px(self) -> int:
@@ -80,10 +84,18 @@ class Camera:
     @property
     def key(self) -> str:
         """Look and window in short: two pictures that share it can stand side by side."""
-        edges = (self.x_min_m, self.x_max_m, self.y_min_m, self.y_max_m, self.px_per_m)
-        shown = " ".join(f"{value:.6f}" for value in edges)
+        edges: tuple[float, ...] = (self.x_min_m, self.x_max_m, self.y_min_m, self.y_max_m)
+        edges += (self.px_per_m,)
+        if self.inset is not None:
+            edges += (*self.inset.box_px, self.inset.camera.x_min_m, self.inset.camera.y_min_m)
+        shown = " ".join(f"{value:.6f}" for value in (*edges, *self.ticks_m))
         window = f"{LOOK}-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
         return f"{window}-film" if self.is_filmed else window
+
+    def at(self, left_px: float, top_px: float) -> Inset:
+        """Return the window as an inset whose upper left corner lies there."""
+        box = (left_px, top_px, left_px + self.width_px, top_px + self.height_px)
+        return Inset(camera=self, box_px=box)
 
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
         """Return points (N, 2) of the ego frame as pixels (N, 2), also outside the picture."""
@@ -102,6 +114,14 @@ class Camera:
             and high[1] >= self.y_min_m - margin_m
             and low[1] <= self.y_max_m + margin_m
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inset:
+    """A window of its own, and where it lies in the picture: left, top, right, bottom."""
+
+    camera: Camera
+    box_px: tuple[float, float, float, float]
 
 
 AROUND_THE_EGO = Camera(x_min_m=-60.0, x_max_m=100.0, y_min_m=-60.0, y_max_m=60.0, px_per_m=10.0)
@@ -148,6 +168,13 @@ def camera_for(
     return replace(camera, is_filmed=True) if moving else camera
 
 
+def changed_places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
+    """Yield the points (N, 2) of each place that a change touches."""
+    touched = {agent.id for agent in change.moved} | set(change.removed)
+    for agent in (*(agent for agent in scene.agents if agent.id in touched), *change.changed):
+        yield _footprint(agent)
+
+
 # Private
 
 
@@ -162,8 +189,8 @@ def _camera_for(
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
     behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
-    places = [*_places(scene, reference or Modification())]
-    followed = [place for change in changes for place in _places(scene, change)]
+    places = [*changed_places(scene, reference or Modification())]
+    followed = [place for change in changes for place in changed_places(scene, change)]
     places += [place for place in followed if _distance_m(place) <= FOLLOWED_M]
     need = _widen(need, places, MAX_WIDTH_M)
     widest_m = max(PASSED_WIDTH_M, _width_m(need))
@@ -237,13 +264,6 @@ def _best(need: FloatArray, scene: Scene) -> Camera:
         y_max_m=y_m + height,
         px_per_m=WIDTH_PX / width,
     )
-
-
-def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
-    """Yield the points (N, 2) of each place that a change touches."""
-    touched = {agent.id for agent in change.moved} | set(change.removed)
-    for agent in (*(agent for agent in scene.agents if agent.id in touched), *change.changed):
-        yield _footprint(agent)
 
 
 def _footprint(agent: TrafficAgent) -> FloatArray:

@@ -151,6 +151,21 @@ class Canvas:
             )
         )
 
+    def paste(self, part: Canvas, box: Box) -> None:
+        """Put a finished picture at a place, over all but texts that come later, with a frame."""
+        left, top = (round(value * DENSITY) for value in box[:2])
+        image = part._finish_image()
+        right, bottom = left + image.width, top + image.height
+
+        def put(on: Canvas) -> None:
+            for wide, colour in ((4, palette.PAPER), (2, palette.INK)):
+                edge = wide * DENSITY
+                rim = [left - edge, top - edge, right + edge - 1, bottom + edge - 1]
+                on._pen.rectangle(rim, fill=_INKS[colour])
+            on._image.paste(image, (left, top))
+
+        self._texts.append(put)
+
     def holds(self, points: FloatArray, colours: tuple[Colour, ...]) -> NDArray[np.bool_]:
         """Return at which of points (N, 2) one of the colours lies so far, (N,)."""
         cells = np.floor(np.asarray(points) * DENSITY).astype(np.int64)

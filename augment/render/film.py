@@ -5,11 +5,12 @@ without anybody (`bev.draw_empty`). No id and no text is in it; its bytes depend
 change, the camera and the recording alone.
 
 A document: `window`, which films over one ground share; `step_s`, `steps`; `width`, `height` in
-picture pixels; `marks`, each a list of shapes {fill or stroke, points or disc, width} in tenths of
-a pixel about the middle of who faces right (x right, y down); `movers` in the order of painting,
-each [mark, first step, last step, values]: x and y in tenths of a pixel and the turn in degrees,
-clockwise, at the first step, then, of who moves, what is added at each. The last `changed` movers
-are what the change adds or moves; `ticks` are the steps at which one of them sets out.
+picture pixels; `ego`, its place in `movers`; `marks`, each a list of shapes {fill or stroke,
+points or disc, width} in tenths of a pixel about the middle of who faces right (x right, y down);
+`movers` in the order of painting, each [mark, first step, last step, values]: x and y in tenths of
+a pixel and the turn in degrees, clockwise, at the first step, then, of who moves, what is added at
+each. The last `changed` movers are what the change adds or moves; `ticks` are the steps at which
+one of them sets out.
 """
 
 import io
@@ -89,6 +90,7 @@ def make_film(
         "steps": STEPS,
         "width": camera.width_px,
         "height": camera.height_px,
+        "ego": next((n for n, (order, _) in enumerate(movers) if order[2]), None),
         "marks": [json.loads(mark) for mark in marks],
         "movers": [[marks.index(entry[0]), *entry[1:]] for _, entry in movers],
         "changed": sum(is_changed for (is_changed, *_), _ in movers),

@@ -53,6 +53,7 @@ _LAMP_PX = 5.5
 _GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
 _SCALE_TEXT_PX = 21
 _INSET_PX, _PADDING_PX, _HEIGHT_PX = 12.0, 28.0, 52.0
+_TICK_HALF_M = 1.5
 # About half a car at the usual scale.
 _NEAR_PX = 50.0
 
@@ -145,6 +146,19 @@ def draw_goal(ground: Canvas, scene: Scene) -> None:
     ground.draw_dashes(ground.px(way.points_m), palette.EGO_MARK.fill, 2.0, dash_px, dash_px)
 
 
+def draw_ticks(ground: Canvas, scene: Scene) -> None:
+    """Draw a bar across the ego's lane at each distance that the camera marks, with its metres."""
+    route = EgoRoute.of(scene) if ground.camera.ticks_m else None
+    if route is None:
+        return
+    for ahead_m in ground.camera.ticks_m:
+        pose = route.line.pose_at(route.ego_s_m + ahead_m)
+        bar = pose.to_parent(np.array([[0.0, _TICK_HALF_M], [0.0, -_TICK_HALF_M]]))
+        ground.stroke(ground.px(bar), palette.INK, 2.0)
+        x, y = ground.px(bar[1:])[0].tolist()
+        ground.text((x, y + 12.0), f"{ahead_m:g} m", palette.INK, 14, halo=palette.HALO)
+
+
 def raster(low_m: float, high_m: float) -> list[float]:
     """Return the multiples of 5 m strictly between two values."""
     first, last = math.floor(low_m / GRID_M) + 1, math.ceil(high_m / GRID_M) - 1
@@ -161,9 +175,14 @@ def scale_corner(scene: Scene, camera: Camera) -> Corner:
     places = camera.to_pixels(np.array([[agent.x_m, agent.y_m] for agent in scene.everyone]))
     boxes = {corner: scale_box(camera, corner) for corner in corners}
     spots = [(x, y, x, y) for x, y in places.tolist() if min(x, y) > 0.0]
-    return min(
-        corners, key=lambda corner: sum(overlap(boxes[corner], at, _NEAR_PX) for at in spots)
-    )
+    inset = [camera.inset.box_px] if camera.inset else []
+
+    def count_hidden(corner: Corner) -> tuple[int, int]:
+        box = boxes[corner]
+        hidden = [overlap(box, at, _NEAR_PX) for at in spots]
+        return sum(overlap(box, at, _INSET_PX) for at in inset), sum(hidden)
+
+    return min(corners, key=count_hidden)
 
 
 def scale_box(camera: Camera, corner: Corner) -> Box:

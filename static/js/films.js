@@ -227,6 +227,9 @@ export class Player {
     this.canvases.forEach((canvas, place) => {
       canvas.hidden = isStill;
       if (!isStill) draw(canvas, this.films[place], this.step);
+      const { ego, movers } = this.films[place];
+      const pose = movers[ego] && poseOf(movers[ego], this.step);
+      if (pose) canvas.dispatchEvent(new CustomEvent("egomoved", { bubbles: true, detail: pose.slice(0, 2) }));
     });
     this.range.value = Math.round(this.step);
     const said = `${(this.step * this.films[0].step_s).toFixed(1)} s`;

@@ -1,4 +1,5 @@
 // The films of the pair on the page, in studies that have some.
+import { cut } from "./vote-lens.js";
 import { note, text } from "./vote-page.js";
 
 const bar = document.querySelector(".film-bar");
@@ -16,5 +17,8 @@ export function roll(pair, frames, isShown) {
   if (!player || !pair.shown.is_filmed) return;
   if (!pair.films) note(text("film-lost"));
   else if (pair.films instanceof Promise) pair.films.then(() => isShown() && roll(pair, frames, isShown));
-  else player.show(pair.films, frames);
+  else {
+    player.show(pair.films, frames);
+    for (const canvas of player.canvases) canvas.style.clipPath = cut(pair.shown);
+  }
 }

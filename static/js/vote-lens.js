@@ -8,7 +8,8 @@ const CLOSE = 4;
 const SVG = "http://www.w3.org/2000/svg";
 const between = (low, value, high) => Math.min(high, Math.max(low, value));
 
-const RINGS_M = [10, 20, 30];
+const RING_M = 10;
+const LABEL_PX = [22, 9];
 
 function drawn(name, attributes, ...inside) {
   const element = document.createElementNS(SVG, name);
@@ -20,18 +21,35 @@ function drawn(name, attributes, ...inside) {
 // Two paths over a picture, in its pixels: the ruler and the pointer; and rings round the ego.
 function overlay(shown, say) {
   const viewBox = `0 0 ${shown.width} ${shown.height}`;
-  const inside = [drawn("path", {}), drawn("path", {}), drawn("g", { class: "rings" }, ...say ? rings(shown, say) : [])];
-  return drawn("svg", { class: "marks", "aria-hidden": true, viewBox }, ...inside);
+  const inside = [drawn("path", {}), drawn("path", {}), drawn("g", { class: "rings" }, ...say ? rings(shown, shown.ego_px, say) : [])];
+  const marks = drawn("svg", { class: "marks", "aria-hidden": true, viewBox }, ...inside);
+  marks.style.clipPath = cut(shown);
+  return marks;
 }
 
-// Each with its metres where it goes through the lower edge, or at its lowest.
-function rings({ px_per_m, ego_px: [cx, cy], height }, say) {
-  return RINGS_M.flatMap((metres) => {
+// As far as the picture goes, each with its metres where it is seen lowest, beside scale and inset.
+function rings({ px_per_m, width, height, covered_px: covered = [] }, [cx, cy], say) {
+  const [across, up] = LABEL_PX;
+  const isFree = ([x, y]) => x > across && x < width - across && y > up && y < height - up
+    && !covered.some(([left, top, right, low]) => x > left - across && x < right + across && y > top - up && y < low + up);
+  const farthest = Math.hypot(Math.max(cx, width - cx), Math.max(cy, height - cy));
+  const parts = [];
+  for (let metres = RING_M; metres * px_per_m < farthest; metres += RING_M) {
     const r = metres * px_per_m;
-    const down = between(0, height - 8 - cy, r);
-    const place = { x: cx + Math.sqrt(r * r - down * down), y: cy + down };
-    return [drawn("circle", { cx, cy, r }), drawn("text", place, say(metres))];
-  });
+    parts.push(drawn("circle", { cx, cy, r }));
+    const turns = Array.from({ length: 180 }, (_, n) => (n * Math.PI) / 90);
+    const places = turns.map((turn) => [cx + r * Math.cos(turn), cy + r * Math.sin(turn)]).filter(isFree);
+    const place = places.toSorted((one, other) => other[1] - one[1] || other[0] - one[0])[0];
+    if (place) parts.push(drawn("text", { x: place[0], y: place[1] + 5 }, say(metres)));
+  }
+  return parts;
+}
+
+// What is covered, scale and inset, shows through whatever lies over the picture.
+export function cut({ width, height, covered_px: covered = [] }) {
+  const at = (x, y) => `${(100 * x) / width}% ${(100 * y) / height}%`;
+  const holes = covered.map(([left, top, right, low]) => [at(left, top), at(left, low), at(right, low), at(right, top), at(left, top), "0 0"]);
+  return `polygon(evenodd, 0 0, 0 100%, 100% 100%, 100% 0, 0 0${holes.flat().map((point) => `, ${point}`).join("")})`;
 }
 
 export class Lens {
@@ -60,6 +78,7 @@ export class Lens {
     Object.assign(this, { panels, text, changed, hasRings, scenes: panels.map((panel) => panel.firstElementChild) });
     panels.forEach((panel, place) => this.#listen(panel, this.scenes[place]));
     addEventListener("resize", () => { this.#frame = 0; });
+    addEventListener("egomoved", ({ target, detail }) => this.#ring(target.parentNode, detail));
   }
 
   get scale() {
@@ -150,6 +169,11 @@ export class Lens {
     if (isOn) this.#at ??= this.#pair.shown.ego_px;
     this.#draw();
     this.changed(this);
+  }
+
+  // Rings travel with the ego of a film.
+  #ring(scene, ego) {
+    if (this.hasRings) scene.querySelector(".rings")?.replaceChildren(...rings(this.#pair.shown, ego, (metres) => this.text("metres", metres)));
   }
 
   // Moves the ruler's end by metres ahead and to the left, for those without a pointer.

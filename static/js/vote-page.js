@@ -46,17 +46,25 @@ export function replay(element) {
   }
 }
 
-// Of windows less long than this two stand side by side.
-const LONG = 2.5;
+const sides = document.querySelector(".sides");
+const isLow = matchMedia("(max-width: 50rem), (max-height: 33rem)");
 let ratio = 0;
+
+// Side by side or one above the other, whichever shows more pixels a metre.
+function lay() {
+  // Where the page scrolls its pictures take what is left of a window.
+  const high = isLow.matches ? innerHeight - 144 - at("ask").offsetHeight : sides.clientHeight;
+  sides.classList.toggle("is-beside", sides.clientWidth / high > ratio);
+}
+addEventListener("resize", () => ratio && lay());
 
 export function drawPair({ instruction, position, legend, unchanged = [], width, height }) {
   for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
   all(".same").forEach((same, side) => { same.hidden = !unchanged.includes("ab"[side]); });
   if (ratio !== width / height) {
     ratio = width / height;
-    document.querySelector(".sides").classList.toggle("is-beside", ratio < LONG);
     body.style.setProperty("--ratio", ratio);
+    lay();
   }
   at("instruction").textContent = instruction;
   document.title = document.title.replace(/\d+/, position);

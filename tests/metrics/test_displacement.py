@@ -224,13 +224,13 @@ def test_two_motions_against_the_tolerance(changed: PlannedMotion | None, alike:
     [
         (CAR, True),
         (replace(CAR, id="New9"), True),
-        (replace(CAR, x_m=20.15), True),
-        (replace(CAR, x_m=20.16), False),
-        (replace(CAR, x_m=20.12, y_m=0.12), False),
+        (replace(CAR, x_m=20.1), True),
+        (replace(CAR, x_m=20.11), False),
+        (replace(CAR, x_m=20.08, y_m=0.08), False),
         (replace(CAR, heading_rad=math.radians(2.0)), True),
-        (replace(CAR, heading_rad=math.radians(-2.1)), False),
+        (replace(CAR, heading_rad=math.radians(-2.5)), False),
         (replace(CAR, heading_rad=math.pi), False),
-        (replace(CAR, length_m=5.0), False),
+        (replace(CAR, length_m=5.1), False),
         (replace(CAR, speed_mps=0.2), False),
         (replace(CAR, type=AgentType.BUS), False),
     ],
@@ -253,6 +253,8 @@ def test_every_object_is_matched_once() -> None:
 
 def test_walks_cones_and_what_is_gone() -> None:
     far = replace(WALKER, walk_to_m=(10.0, 4.2))
+    aside = replace(WALKER, heading_rad=WALKER.heading_rad + math.radians(9.0))
+    assert are_alike(Modification(added=(WALKER,)), Modification(added=(aside,)))
     assert not are_alike(Modification(added=(WALKER,)), Modification(added=(far,)))
     turned = replace(cone("New1", 5.0, 0.0), heading_rad=1.0)
     assert are_alike(Modification(added=(cone("New1", 5.0, 0.0),)), Modification(added=(turned,)))

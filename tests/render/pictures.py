@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 from PIL import Image
 
-from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import Camera
 from augment.scene.entities import Modification, Scene
@@ -45,18 +44,6 @@ def patch(png: bytes, camera: Camera, x_m: float, y_m: float, half_px: int) -> n
     x, y = camera.to_pixels(np.array([[x_m, y_m]]))[0].astype(int)
     pixels = at_camera_size(png, camera).astype(int)
     return pixels[y - half_px : y + half_px, x - half_px : x + half_px]
-
-
-def blank_share(png: bytes) -> float:
-    """Of all pixels those where nothing is drawn: paper, or the plain ground beyond the road.
-
-    Lines of the grid, the scale and whatever stands beyond the road are drawn.
-    """
-    picture = opened(png)
-    counts = picture.getcolors(maxcolors=256)
-    assert counts is not None
-    empty = sum(count for count, colour in counts if colour in (palette.PAPER, palette.BEYOND))
-    return empty / (picture.width * picture.height)
 
 
 def chunks(png: bytes) -> list[str]:

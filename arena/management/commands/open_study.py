@@ -8,6 +8,8 @@ from arena.models import Study
 from arena.studies.queries import usual_checks
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
+from arena.voting.queries.ballots import find_undrawn
+from arena.voting.services.drawing import draw_pictures
 from augment.services import TerminalCommand, add_options
 from augment.services.running import resolve_contestants
 from augment.services.scenarios import resolve_scenarios
@@ -33,6 +35,9 @@ class Command(TerminalCommand):
         }
         study = open_study(StudyPlan.read(values))
         self._say(study)
+        self.stdout.write("The pictures of its pairs are drawn now; voters see what is ready.")
+        while draw_pictures(study, within_s=10.0):
+            self.stdout.write(f"{find_undrawn(study).count()} of {study.matchups.count()} wait.")
 
     def _checks(self, percent: float | None) -> float:
         """The percentage; without one it depends on what was drawn, and that is said."""

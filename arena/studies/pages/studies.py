@@ -1,5 +1,6 @@
 """Pages of studies for admins and researchers: progress, reports and files, never who leads."""
 
+import math
 import uuid
 from typing import Any
 
@@ -43,7 +44,9 @@ from arena.studies.services.files import (
 from arena.studies.services.opening import cancel_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, read_opened_plan
 from arena.studies.services.taking_part import hand_over
+from arena.voting.queries.ballots import find_undrawn, is_being_drawn
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access
+from arena.voting.services.drawing import MB_PER_PAIR
 from augment.services import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -77,11 +80,16 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("results", code=code)
     study_plan, (line,) = read_opened_plan(study), queries.count_progress([study])
     lines, export = queries.expert_lines(study), export_place(study, get_user(request))
+    undrawn_pairs = find_undrawn(study).count()
+    if undrawn_pairs and not is_being_drawn(study):
+        sending.send_pictures(study.pk)
     long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {
         "line": line,
         "export": export,
-        **wait_for_workers(waits=export["is_waiting"]),
+        **wait_for_workers(waits=export["is_waiting"] or bool(undrawn_pairs)),
+        "undrawn": undrawn_pairs,
+        "undrawn_mb": math.ceil(undrawn_pairs * MB_PER_PAIR),
         "lines": lines,
         "done": sum(not line.tally.left for line in lines),
         "without_link": sum(line.waits_for_link for line in lines),

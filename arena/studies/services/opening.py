@@ -27,13 +27,13 @@ from arena.rating.vote_columns import VERSION as VOTES_VERSION
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
-from arena.voting.services.pictures import Cells, check_pictures, require_checks, scenario_windows
+from arena.voting.services.pictures import Cells, check_pictures, require_checks
 from arena.voting.services.practice import require_practice_pictures
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
 from augment.services import check_prose, log_change, one_line
 from augment.services.endpoints import read_options
-from augment.services.judging import alike_pairs
+from augment.services.judging import ALIKE, alike_pairs
 from augment.services.running import find_job
 
 PLANNER = "balanced-2"
@@ -189,7 +189,7 @@ def _rules(
     broken: Cells = {}
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
         shows_all = study_plan.samples is shown_pictures.SampleRule.ALL
-        checks, broken = check_pictures(scenarios, scenario_windows(entries), shows_all=shows_all)
+        checks, broken = check_pictures(scenarios, shows_all=shows_all)
         require_checks(checks, wanted=wanted)
     alike = [
         triple
@@ -226,8 +226,14 @@ def _frozen(
         "scenario_gap_kept": planned.scenario_gap,
         "identical": [list(triple) for triple in planned.identical],
         "alike_shown": [list(pair) for pair in alike_shown],
+        "alike_within": ALIKE,
+        "windows": "pair",
         # Kept where it departs from the default, so that the settings can be used again.
-        **{name: True for name in ("show_alike", "hide_rings") if getattr(study_plan, name)},
+        **{
+            name: True
+            for name in ("show_alike", "hide_rings", "show_ticks")
+            if getattr(study_plan, name)
+        },
         "hypotheses": [asdict(hypothesis) for hypothesis in hypotheses],
         "samples": study_plan.samples.value,
         "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],

@@ -219,7 +219,7 @@ class StudyPlan:
     )
     show_alike: bool = _switch(
         "Also show pairs that nobody can tell apart",
-        "Pairs that differ by at most 0.15 m and 2° in every object otherwise count as "
+        "Pairs that differ by at most 0.1 m, 0.1 s and 10° in every object otherwise count as "
         "ties and are not shown, but for a tenth that is shown as a check.",
     )
     allow_replay: bool = _switch(
@@ -230,6 +230,11 @@ class StudyPlan:
     hide_rings: bool = _switch(
         "No rings round the ego",
         "Experts otherwise see how far 10, 20 and 30 m are in both images.",
+    )
+    show_ticks: bool = _switch(
+        "A tick at each distance that the sentence names",
+        "On the ego’s lane, in both images alike; it turns judging into reading off, and each "
+        "vote keeps it as an aid.",
     )
     practice: bool = _switch(
         "Practice before the first pair",
@@ -335,6 +340,7 @@ def read_opened_plan(study: Study) -> StudyPlan:
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),
         show_alike=bool(rules.get("show_alike")),
         hide_rings=bool(rules.get("hide_rings")),
+        show_ticks=bool(rules.get("show_ticks")),
         **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
         **{name: getattr(study, name) for name in SWITCH_COLUMNS},
     )

@@ -15,18 +15,16 @@ from arena.models import Matchup, Study
 from arena.pairing.later import GridUnit, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, sample_place, scenario_at
-from arena.voting.queries.showings import LEGEND
 from arena.voting.services.pictures import (
     Cells,
     check_pictures,
     find_showable,
-    scenario_windows,
     with_picture,
     without_lost_checks,
 )
-from arena.voting.services.shown_pictures import find_frames, find_sides, frames_shown
-from augment.models import Augmentation, Scenario
-from augment.services.scenarios import legends_of_changes
+from arena.voting.services.shown_pictures import Showing, find_sides, frames_shown
+from augment.models import Augmentation
+from augment.services.scenarios import camera_key
 
 _PLAIN = (
     *("votes_per_expert", "seed", "scenario_gap", "repeat_share", "repeat_distance"),
@@ -58,7 +56,7 @@ def frozen_pictures(study: Study) -> Cells:
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
     shows_all = study.shows_all_samples
-    _, cells = check_pictures(scenarios, scenario_windows(rules.entries), shows_all=shows_all)
+    _, cells = check_pictures(scenarios, shows_all=shows_all)
     rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
     for row in rows:
         slug = row.scenario.slug
@@ -117,7 +115,7 @@ def store(
     *,
     batch: int = 0,
 ) -> None:
-    """Store planned showings, each with tokens of its own.
+    """Store planned showings, each with tokens of its own; workers draw what nobody was shown yet.
 
     Args:
         study: Whose plan it is.
@@ -126,39 +124,34 @@ def store(
         experts: Everybody who is named.
         batch: 0 at the opening; later plannings count up.
 
-    Raises:
-        NothingToPlan: The pictures of a scenario are drawn in several windows.
     """
     by_name = {expert.username: expert for expert in experts}
-    fixed = frames_shown(study, {scenario_at(pair.scenario) for pair in planned}) if batch else {}
-    scenarios = _scenarios(planned, cells, reads_scenes=not fixed)
-    frames = find_frames(planned, cells, scenarios, fixed)
-    changes = legends_of_changes(
-        {
-            cell.pk: frames[plan.scenario].view
-            for plan in planned
-            for cell in find_sides(plan, cells)
-        }
-    )
-    rows = [
-        Matchup(
-            study=study,
-            expert=by_name[plan.expert],
-            position=plan.position,
-            scenario=scenarios[scenario_at(plan.scenario)],
-            left=left,
-            right=right,
-            left_image=left.image,
-            right_image=right.image,
-            original_image=frame.original_image,
-            view={**frame.view, LEGEND: {"scene": frame.legend, "pair": pair}},
-            kind=plan.kind,
-            batch=batch,
+    named = {scenario_at(pair.scenario) for pair in planned}
+    earlier = _find_earlier(study, named) if batch else {}
+    frames = frames_shown(study, named) if batch else {}
+    sides = [find_sides(pair, cells) for pair in planned]
+    rows = []
+    for pair, (left, right) in zip(planned, sides, strict=True):
+        window = (
+            camera_key(left.image) if camera_key(left.image) == camera_key(right.image) else ""
         )
-        for plan in planned
-        for frame, (left, right) in [(frames[plan.scenario], find_sides(plan, cells))]
-        for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
-    ]
+        frame = frames.get((scenario_at(pair.scenario), window))
+        shown = earlier.get((left.pk, right.pk))
+        if shown is None and frame is not None:
+            shown = frame.showing(left, right)
+        rows.append(
+            Matchup(
+                study=study,
+                expert=by_name[pair.expert],
+                position=pair.position,
+                scenario_id=left.scenario_id,
+                left=left,
+                right=right,
+                kind=pair.kind,
+                batch=batch,
+                **shown or {"view": {}},
+            )
+        )
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
     Matchup.objects.bulk_create(firsts, batch_size=500)
     pairs = zip(rows, planned, strict=True)
@@ -171,16 +164,16 @@ def store(
     Matchup.objects.bulk_create([row for row, _ in again], batch_size=500)
 
 
-def _scenarios(
-    planned: Sequence[PlannedMatchup], cells: Cells, *, reads_scenes: bool
-) -> dict[str, Scenario]:
-    """Return scenarios by slug, with their scenes where views are worked out from them."""
-    named = {pair.scenario for pair in planned}
-    keys = {cell.scenario_id for (place, _), cell in cells.items() if place in named}
-    rows = Scenario.objects.filter(pk__in=keys)
-    if reads_scenes:
-        rows = rows.select_related("base_scene").defer("base_scene__recording")
-    return {row.slug: row for row in rows}
+def _find_earlier(study: Study, scenarios: Iterable[str]) -> dict[tuple[int, int], Showing]:
+    """Return what the study shows already, by left and right side, either way round."""
+    columns = ("left", "right", "left_image", "right_image", "original_image", "view")
+    drawn = study.matchups.filter(scenario__slug__in=scenarios, view__has_key="px_per_m")
+    found: dict[tuple[int, int], Showing] = {}
+    for left, right, *images, original, view in drawn.values_list(*columns):
+        for sides, names in (((left, right), images), ((right, left), images[::-1])):
+            shown = dict(zip(("left_image", "right_image"), names, strict=True))
+            found[sides] = {**shown, "original_image": original, "view": view}
+    return found
 
 
 # --- Later plannings ---------------------------------------------------------------------------

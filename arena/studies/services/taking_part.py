@@ -71,8 +71,9 @@ def hand_over(
     planned = [
         pair for name in names for pair in planning.follow(name, dealt_before[name], dealt[name])
     ]
-    Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
+    # What they show is kept before they go.
     planning.store(planned, takers)
+    Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
     study.experts.add(*takers)
     taken = {name: len(dealt[name]) for name in names}
     withdrawn = [

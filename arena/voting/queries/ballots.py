@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import takewhile
 from typing import Any
 from uuid import UUID
 
@@ -113,7 +114,7 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """Return the next matchups of this expert, at most n, with what a browser needs of them.
 
     Each says what is `asked` next; one that is answered in part comes again. There is none of a
-    study that takes no votes.
+    study that takes no votes, and none from the first on whose pictures are still to be drawn.
     """
     if study.state != Study.State.OPEN:
         return []
@@ -121,7 +122,23 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     matchups = _PAIRS.filter(waits, study=study, expert=expert)[:n]
     for matchup in matchups:
         matchup.asked = study.questions[matchup.answered]
-    return list(matchups)
+    return list(takewhile(_is_drawn, matchups))
+
+
+def find_undrawn(study: Study) -> QuerySet[Matchup]:
+    """Return the matchups whose pictures workers have yet to draw."""
+    planned = study.matchups.filter(view__isnull=False)
+    return planned.exclude(view__has_key="px_per_m")
+
+
+def is_being_drawn(study: Study) -> bool:
+    """Return whether a worker began to draw within the last half minute."""
+    since = timezone.now().timestamp() - 30.0
+    return find_undrawn(study).filter(view__since__gt=since).exists()
+
+
+def _is_drawn(matchup: Matchup) -> bool:
+    return matchup.view is None or "px_per_m" in matchup.view
 
 
 # Written out: thousands of votes ask this, and building it anew cost as much as asking it.

@@ -1,14 +1,13 @@
 """Pictures that a study can show: of contestants, and of attention checks."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
-from functools import partial
 
 from django.db.models import F, QuerySet
 
 from arena.errors import NothingToPlan
-from arena.pairing.plan import Check, Entry, PlanRules
-from arena.pairing.rules import sample_place, scenario_at
+from arena.pairing.plan import Check, PlanRules
+from arena.pairing.rules import sample_place
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios import camera_key
 
@@ -45,36 +44,18 @@ def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augment
     return row
 
 
-def scenario_windows(entries: Iterable[Entry]) -> dict[str, str]:
-    """Return by scenario the window that its pictures in a study show."""
-    windows: dict[str, str] = {}
-    for entry in sorted(entries, key=lambda entry: entry.scenario):
-        windows.setdefault(scenario_at(entry.scenario), camera_key(entry.picture))
-    return windows
-
-
 # --- Attention checks --------------------------------------------------------------------------
 
 
-def latest_pairs(
-    scenarios: Iterable[Scenario], windows: Mapping[str, str] | None = None
-) -> dict[str, Pair]:
-    """Return by scenario the latest reference and the latest broken picture, in one window.
-
-    Args:
-        scenarios: Where to look.
-        windows: By scenario the window that is wanted; None where any will do.
-    """
+def latest_pairs(scenarios: Iterable[Scenario]) -> dict[str, Pair]:
+    """Return by scenario the latest reference and the latest broken picture, in one window."""
     kinds = Contestant.Kind.REFERENCE, Contestant.Kind.CHECK
     rows = find_showable(scenarios).filter(
         contestant__kind__in=kinds, state=Augmentation.State.DONE
     )
     latest: dict[tuple[str, str], Augmentation] = {}
     for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        slug = row.scenario.slug
-        is_wanted = partial(_is_in, (windows or {}).get(slug))
-        if windows is None or with_picture(row, is_wanted):
-            latest[slug, row.contestant.kind] = row
+        latest[row.scenario.slug, row.contestant.kind] = row
     pairs = {}
     for slug in sorted({slug for slug, _kind in latest}):
         good, broken = (latest.get((slug, kind)) for kind in kinds)
@@ -85,23 +66,18 @@ def latest_pairs(
     return pairs
 
 
-def _is_in(window: str | None, image: str) -> bool:
-    return camera_key(image) == window
-
-
 def check_pictures(
-    scenarios: Iterable[Scenario], windows: Mapping[str, str], *, shows_all: bool
+    scenarios: Iterable[Scenario], *, shows_all: bool
 ) -> tuple[tuple[Check, ...], Cells]:
     """Return the attention checks that there can be, at the places of a plan.
 
     Args:
         scenarios: Of the study.
-        windows: By scenario; pictures of another window stay out.
         shows_all: Whether samples are judged apart: then a check goes with the first one.
     """
     checks: list[Check] = []
     cells: Cells = {}
-    for slug, pair in latest_pairs(scenarios, windows).items():
+    for slug, pair in latest_pairs(scenarios).items():
         place = sample_place(slug, 1) if shows_all else slug
         good, broken = (row.contestant.slug for row in pair)
         checks.append(Check(scenario=place, good=good, broken=broken))

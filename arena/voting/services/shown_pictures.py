@@ -1,4 +1,4 @@
-"""Properties shared by all showings of a scenario: one window, and the scene before."""
+"""Pictures and drives that a study shows; frames of those opened before pairs had their own."""
 
 import hashlib
 import json
@@ -15,15 +15,19 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import sample_place, scenario_at
-from arena.voting.queries.showings import LEGEND, VIEW_OF_OLD
+from arena.voting.queries.showings import LEGEND
 from arena.voting.services.pictures import Cells, find_showable
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.driving.simulations import Options
-from augment.services.scenarios import camera_key, legend_of_scene, load_camera, picture_view
+from augment.services.scenarios import camera_key, legends_of_changes
 
 MOST_NAMED = 8
 """So many missing pictures are named, the others counted."""
+
+
+Showing = dict[str, Any]
+"""Columns of a matchup: names of its pictures, and their view."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,50 +44,26 @@ class ScenarioFrame:
     original_image: str
     legend: list[str]
 
+    def showing(self, left: Augmentation, right: Augmentation) -> Showing:
+        """Return what is shown of two pictures of its window."""
+        keys = legends_of_changes({row.pk: self.view for row in (left, right)})
+        pair = sorted(set().union(*keys.values()))  # whichever side adds what
+        return {
+            "left_image": left.image,
+            "right_image": right.image,
+            "original_image": self.original_image,
+            "view": {**self.view, LEGEND: {"scene": self.legend, "pair": pair}},
+        }
+
 
 Frames = dict[tuple[str, str], ScenarioFrame]
 """By scenario and window."""
 
 
-def find_frames(
-    planned: Sequence[PlannedMatchup],
-    cells: Cells,
-    scenarios: dict[str, Scenario],
-    frames_before: Frames,
-) -> dict[str, ScenarioFrame]:
-    """Return frames by place; both sides of every pair are drawn in one window.
-
-    Args:
-        planned: What is to be shown.
-        cells: The pictures.
-        scenarios: By slug.
-        frames_before: What the study shows already, which is not worked out from the scene again.
-
-    Raises:
-        NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
-            nobody knows any more where metres lie in them.
-    """
-    shown: dict[str, dict[str, Augmentation]] = {}
-    for pair in planned:
-        for cell in find_sides(pair, cells):
-            shown.setdefault(pair.scenario, {})[camera_key(cell.image)] = cell
-    if mixed := [scenario_at(place) for place, windows in shown.items() if len(windows) > 1]:
-        raise _other_windows(sorted(mixed))
-    frames, by_place = dict(frames_before), {}
-    for place, windows in shown.items():
-        ((window, cell),) = windows.items()
-        slug = scenario_at(place)
-        if (slug, window) not in frames:
-            frames[slug, window] = _frame(scenarios[slug], window, cell)
-        by_place[place] = frames[slug, window]
-    return by_place
-
-
 def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
-    """Return those of the first showing of each scenario.
-
-    To read a scene takes longer than all else that planning for one more expert does.
-    """
+    """Return those of the first showing of each scenario, of a study with one for all pairs."""
+    if "windows" in study.rules:
+        return {}
     shown = study.matchups.filter(scenario__slug__in=set(scenarios), view__has_key=LEGEND)
     first = shown.order_by().values("scenario").annotate(first=Min("pk")).values("first")
     rows = Matchup.objects.filter(pk__in=first).exclude(original_image="")
@@ -94,42 +74,6 @@ def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
         )
         if view
     }
-
-
-def _frame(scenario: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
-    """Return a picture's frame, whichever version drew it: today's window, or an earlier one.
-
-    Raises:
-        NothingToPlan: Nobody knows any more where metres lie in such a picture.
-    """
-    view, original = _view(scenario, window, cell)
-    return ScenarioFrame(view, original, legend_of_scene(scenario, view))
-
-
-def _view(scenario: Scenario, window: str, cell: Augmentation) -> tuple[dict[str, Any], str]:
-    if window in scenario.windows:
-        noted = scenario.windows[window]
-        return noted["view"], noted["image"]
-    original = scenario.original_image if camera_key(scenario.original_image) == window else ""
-    camera = load_camera(scenario)
-    if window == camera.key:
-        return picture_view(camera), original
-    shows = Q(left_image=cell.image) | Q(right_image=cell.image)
-    earlier = Matchup.objects.filter(shows, scenario=scenario, view__isnull=False)
-    before = earlier.order_by("pk").first()
-    if before is not None and before.view is not None:
-        return before.view, before.original_image
-    if window:
-        raise _other_windows([scenario.slug])
-    return VIEW_OF_OLD, original
-
-
-def _other_windows(scenarios: list[str]) -> NothingToPlan:
-    return NothingToPlan(
-        f"The pictures of {', '.join(scenarios[:MOST_NAMED])} show different windows, so "
-        "they can’t stand side by side. They are drawn anew when the program starts; restart "
-        "it, or choose other scenarios."
-    )
 
 
 def find_sides(pair: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:

@@ -13,6 +13,7 @@ from django.db.models import QuerySet
 
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
+from augment.metrics.displacement import ALIKE as ALIKE
 from augment.metrics.displacement import CLASS_OF, are_alike, displacement, displacement_from_wish
 from augment.metrics.displacement import BoxSummary as BoxSummary
 from augment.metrics.displacement import Displacement as Displacement

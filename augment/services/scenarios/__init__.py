@@ -9,6 +9,7 @@ from augment.services.scenarios.editing import (
     last_reading,
     waiting_reading,
 )
+from augment.services.scenarios.pair_pictures import draw_pair
 from augment.services.scenarios.pictures import (
     THUMBNAILS,
     WIDTHS_PX,
@@ -17,7 +18,6 @@ from augment.services.scenarios.pictures import (
     film_document,
     film_name,
     is_drawn,
-    legend_of_scene,
     legends_of_changes,
     load_camera,
     picture_view,

@@ -20,7 +20,7 @@ from augment.render.bev import draw, draw_empty, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink_png
 from augment.render.film import make_film
-from augment.render.legend import change_keys, scene_keys
+from augment.render.legend import change_keys
 from augment.scene import codec
 from augment.scene.entities import Modification, without_traffic
 from augment.services.events import log_change
@@ -60,19 +60,8 @@ def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     stored, camera = scenario.original_image, camera or load_camera(scenario)
     if stored and camera_key(stored) == camera.key and default_storage.exists(stored):
         return stored
-    scene = load_scene(scenario)
-    name = draw_picture(scenario, Modification(), camera)
-    noted = {camera.key: {"image": name, "view": picture_view(camera)}}
-    before = camera_for(scene, load_reference(scenario))
-    if camera_key(stored) == before.key:  # of before windows were noted
-        noted |= {before.key: {"image": stored, "view": picture_view(before)}}
-    with transaction.atomic():
-        locked = (
-            Scenario.objects.select_for_update(no_key=True).only("windows").get(pk=scenario.pk)
-        )
-        scenario.windows = locked.windows | noted
-        scenario.original_image = name
-        scenario.save(update_fields=["original_image", "windows"])
+    scenario.original_image = name = draw_picture(scenario, Modification(), camera)
+    scenario.save(update_fields=["original_image"])
     return name
 
 
@@ -185,9 +174,7 @@ def redraw(scenario: Scenario) -> int:
         if not outdated:
             original_picture(scenario, camera)
             return redrawn
-        drawn = [
-            (row, draw_picture(scenario, _find_modification(row), camera)) for row in outdated
-        ]
+        drawn = [(row, draw_picture(scenario, find_modification(row), camera)) for row in outdated]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
             original_picture(scenario, camera)
@@ -207,7 +194,7 @@ def draw_with_ids(row: Augmentation) -> bytes:
         InvalidModification: The modification does not fit the scene.
     """
     scenario = row.scenario
-    return draw_for_review(load_scene(scenario), _find_modification(row), load_camera(scenario))[0]
+    return draw_for_review(load_scene(scenario), find_modification(row), load_camera(scenario))[0]
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -233,7 +220,7 @@ def _keep(picture: str, png: bytes, film: bytes) -> None:
     store_as(picture, png)
 
 
-def _find_modification(row: Augmentation) -> Modification:
+def find_modification(row: Augmentation) -> Modification:
     """Return the shown modification: an unreadable answer changes nothing."""
     if not row.is_answer:
         return Modification()
@@ -327,15 +314,6 @@ def shrink(name: str, widest_px: int) -> str:
     with default_storage.open(name) as file:
         store_as(small, shrink_png(file.read(), widest_px))
     return small
-
-
-def legend_of_scene(scenario: Scenario, view: Mapping[str, Any]) -> list[str]:
-    """Return the entries for what a window of a scenario shows before any change.
-
-    Raises:
-        InvalidDocument: The stored scene can't be read.
-    """
-    return sorted(scene_keys(load_scene(scenario), view))
 
 
 def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[str]]:

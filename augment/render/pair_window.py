@@ -1,0 +1,210 @@
+"""Window of a pair: a pure function of the scene, both changes and what the instruction names.
+
+It holds the ego, what either side changes within 60 m with its path, what the intent names and
+10 m around, and no more; in films whoever is changed, and the ego, at every moment.
+
+Frames: those of `camera`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from augment.checks import Ground
+from augment.checks.lanes_across import LanesAcross, find_mark, find_picked
+from augment.checks.wish_places import list_named
+from augment.geometry.polyline import FloatArray
+from augment.render.camera import FOLLOWED_M, MAX_WIDTH_M, Camera, changed_places
+from augment.render.canvas import Box, overlap
+from augment.render.road import scale_box, scale_corner
+from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.intent import Intent, MapPlace, Setting
+from augment.scene.motion import HORIZON_S, STEP_S, Movement
+from augment.scene.trails import find_trails
+
+AROUND_M = 10.0
+# Both pictures of a pair have so many pixels in a window of 1280 x 720.
+_PANEL_PX = (1210.0, 610.0)
+MOST_PX_PER_M = 40.0
+"""Of a picture, and of an inset: there 0.1 m, which nobody need see, are 4 pixels."""
+
+INSET_BELOW_PX = 12.0
+"""Changes that come no farther from each other are shown enlarged."""
+_INSET_SHARE, _INSET_AROUND_M, _INSET_GAIN, _INSET_EDGE_PX = 0.42, 0.75, 1.5, 12.0
+
+_JUNCTION = {MapPlace.JUNCTION_START, MapPlace.JUNCTION_END}
+_BY_JUNCTION = {
+    *(Setting.BEFORE_INTERSECTION, Setting.IN_INTERSECTION),
+    *(Setting.AT_INTERSECTION, Setting.AFTER_INTERSECTION),
+}
+
+
+def pair_camera(
+    ground: Ground,
+    sides: tuple[Modification, Modification],
+    *,
+    intent: Intent | None = None,
+    is_filmed: bool = False,
+    differing: tuple[tuple[TrafficAgent, TrafficAgent, float], ...] = (),
+    ticks_m: tuple[float, ...] = (),
+) -> Camera:
+    """Return the window of a pair, the same whichever side is which.
+
+    Its scale is what an ordinary screen shows of it, side by side or one above the other.
+
+    Args:
+        ground: Of the scene before the change; its recording counts for films.
+        sides: Both changes.
+        intent: Of the instruction, None without one.
+        is_filmed: Whether the pictures have films.
+        differing: Objects that stand for each other, and how many metres apart; those of changes
+            that nobody confuses are not needed.
+        ticks_m: Distances ahead of the ego that are marked on its lane.
+
+    Raises:
+        InvalidModification: A change does not fit the scene.
+    """
+    scene = ground.scene
+    need = _around([scene.ego.box.corners_m])
+    near = [place for side in sides for place in changed_places(scene, side)]
+    places = [place for place in near if _middle_m(place) <= FOLLOWED_M]
+    places += [place for place in _named(ground, intent) if _middle_m(place) <= FOLLOWED_M]
+    if is_filmed:
+        places += [place for side in sides for place in _passed(ground, side)]
+    for place in sorted(places, key=_middle_m):
+        more = _around([need + np.array([[AROUND_M], [-AROUND_M]]), place])
+        if (more[1] - more[0]).max() <= MAX_WIDTH_M:
+            need = more
+    (x_min, y_min), (x_max, y_max) = need.tolist()
+    camera = Camera(
+        x_min_m=x_min,
+        x_max_m=x_max,
+        y_min_m=y_min,
+        y_max_m=y_max,
+        px_per_m=find_scale(x_max - x_min, y_max - y_min),
+        is_filmed=is_filmed,
+        ticks_m=ticks_m,
+    )
+    return _with_inset(camera, scene, sides, differing)
+
+
+def find_scale(width_m: float, height_m: float) -> float:
+    """Return the pixels a metre at which a screen shows two such windows, the better way round."""
+    across, up = _PANEL_PX
+    beside = min(across / 2.0 / width_m, up / height_m)
+    stacked = min(across / width_m, up / 2.0 / height_m)
+    return min(max(beside, stacked), MOST_PX_PER_M)
+
+
+def covered_boxes(scene: Scene, camera: Camera) -> list[Box]:
+    """Return what lies over the picture's ground, in pixels: the scale's plate and an inset."""
+    scale = scale_box(camera, scale_corner(scene, camera))
+    return [scale, *([camera.inset.box_px] if camera.inset else [])]
+
+
+def film_states(movement: Movement) -> FloatArray:
+    """Return where somebody is while a film goes on, (T, 4)."""
+    states = movement.states[: round(HORIZON_S / STEP_S) + 1]
+    return np.asarray(states[~np.isnan(states).any(axis=1)])
+
+
+# Private
+
+
+def _around(places: list[FloatArray]) -> FloatArray:
+    """Return the window (2, 2) in whole metres that holds points (N, 2) with room around them."""
+    points = np.vstack(places)
+    low, high = points.min(axis=0) - AROUND_M, points.max(axis=0) + AROUND_M
+    return np.array([np.floor(low), np.ceil(high)])
+
+
+def _middle_m(place: FloatArray) -> float:
+    return float(np.hypot(*((place.min(axis=0) + place.max(axis=0)) / 2.0)))
+
+
+def _passed(ground: Ground, side: Modification) -> Iterator[FloatArray]:
+    """Yield the ways of the ego and of who is changed in a film, and trails as drawn."""
+    expected = ground.expect(ground.scene, side)
+    motion = ground.motion_after(side, of_all=False)
+    changed = {agent.id for agent in side.changed}
+    for movement in (motion.ego, *motion.others):
+        agent, at = movement.agent, film_states(movement)[:, :2]
+        if len(at) and (movement is motion.ego or agent.id in changed):
+            reach_m = np.hypot(agent.length_m, agent.width_m) / 2.0
+            yield np.vstack([at.min(axis=0) - reach_m, at.max(axis=0) + reach_m])
+    for trail in find_trails(ground.scene, side, expected, with_held=True):
+        drawn = trail.way_m[np.hypot(*trail.way_m.T) <= FOLLOWED_M]
+        if len(drawn):
+            yield drawn
+
+
+def _named(ground: Ground, intent: Intent | None) -> Iterator[FloatArray]:
+    """Yield road users and places of the map that an intent names, as far as they are there."""
+    lanes = LanesAcross.of(ground, intent.route) if intent else None
+    if intent is None or lanes is None:
+        return
+    asks = (*intent.requests, *intent.moves)
+    picks = [ask.spot.landmark for ask in asks if ask.spot.landmark is not None]
+    for pick in (*picks, *(move.who for move in intent.moves), *intent.removals):
+        yield from (agent.box.corners_m for agent in find_picked(lanes, pick))
+    motions = [motion for ask in asks if (motion := getattr(ask, "motion", None))]
+    marks = {ask.spot.mark for ask in asks}
+    marks |= {motion.start.mark for motion in motions if motion.start}
+    settings = {setting for ask in asks for setting in ask.spot.settings}
+    if marks & _JUNCTION or settings & _BY_JUNCTION:
+        marks |= _JUNCTION
+    found = [find_mark(lanes, mark) for mark in marks if mark is not None]
+    stations = [at_m for at_m in found if at_m is not None]
+    for setting in settings - _BY_JUNCTION - {Setting.OFF_CROSSWALK}:
+        stations += [end for span in list_named(setting, lanes) for end in span]
+    for at_m in stations:
+        if abs(at_m) <= FOLLOWED_M:
+            pose = lanes.route.line.pose_at(lanes.route.ego_s_m + at_m)
+            yield np.array([[pose.x_m, pose.y_m]])
+
+
+def _with_inset(
+    camera: Camera,
+    scene: Scene,
+    sides: tuple[Modification, Modification],
+    differing: tuple[tuple[TrafficAgent, TrafficAgent, float], ...],
+) -> Camera:
+    """Return the camera with an inset of what differs, where that is hard to see and it helps."""
+    apart = sorted((pair for pair in differing if pair[2] > 0.0), key=lambda pair: -pair[2])
+    if not apart or apart[0][2] * camera.px_per_m >= INSET_BELOW_PX:
+        return camera
+    # All that differs, or at least what differs most.
+    for pairs in (apart, apart[:1]):
+        boxes = [agent.box.corners_m for *both, _ in pairs for agent in both]
+        points = np.vstack(boxes)
+        low, high = points.min(axis=0) - _INSET_AROUND_M, points.max(axis=0) + _INSET_AROUND_M
+        across, up = (high - low).tolist()
+        most = (_INSET_SHARE * camera.width_px / across, _INSET_SHARE * camera.height_px / up)
+        scale = min(*most, MOST_PX_PER_M)
+        if scale >= _INSET_GAIN * camera.px_per_m:
+            break
+    else:
+        return camera
+    marks = [agent.box.corners_m for side in sides for agent in (*side.changed, scene.ego)]
+    marks += [agent.box.corners_m for agent in scene.agents]
+    spots = [camera.to_pixels(mark) for mark in marks]
+    hidden = [(*spot.min(axis=0).tolist(), *spot.max(axis=0).tolist()) for spot in spots]
+    # What is changed and the ego weigh more than all the traffic.
+    weights = [1] * len(scene.agents)
+    weights = [1 + len(weights)] * (len(marks) - len(weights)) + weights
+    width, height = across * scale, up * scale
+    lefts = (camera.width_px - width - _INSET_EDGE_PX, _INSET_EDGE_PX)
+    tops = (_INSET_EDGE_PX, camera.height_px - height - _INSET_EDGE_PX)
+    corners = [(left, top, left + width, top + height) for top in tops for left in lefts]
+
+    def count_hidden(box: Box) -> int:
+        return sum(
+            weight for weight, at in zip(weights, hidden, strict=True) if overlap(box, at, 4.0)
+        )
+
+    box = min(corners, key=count_hidden)
+    window = Camera(
+        x_min_m=low[0], x_max_m=high[0], y_min_m=low[1], y_max_m=high[1], px_per_m=scale
+    )
+    return replace(camera, inset=window.at(box[0], box[1]))

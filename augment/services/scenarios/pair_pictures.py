@@ -1,0 +1,94 @@
+"""Pictures of a pair: both sides and the scene before, in a window of the pair's own."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from augment.checks import Ground
+from augment.metrics.displacement import find_shifts
+from augment.models import Augmentation
+from augment.render.camera import Camera
+from augment.render.legend import change_keys, scene_keys
+from augment.render.pair_window import covered_boxes, pair_camera
+from augment.scene.entities import Modification
+from augment.scene.intent import Intent, Length
+from augment.services.scenarios.pictures import draw_picture, find_modification, picture_view
+from augment.services.scenarios.scenes import load_ground, load_intent, load_reference
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairPictures:
+    """What is shown of a pair.
+
+    Attributes:
+        names: Of the pictures, by the key of their augmentation.
+        original: The scene before any change.
+        view: Where metres lie, and `covered_px`: boxes over the ground.
+        scene_legend: The legend's entries of the scene before.
+        pair_legend: Those that either side adds.
+    """
+
+    names: dict[int, str]
+    original: str
+    view: dict[str, Any]
+    scene_legend: list[str]
+    pair_legend: list[str]
+
+
+def draw_pair(
+    first: Augmentation, other: Augmentation, *, has_ticks: bool = False
+) -> PairPictures:
+    """Draw two answers to one scenario, the same whichever comes first.
+
+    It takes some tenths of a second: call it from a worker or a command, not in a request.
+
+    Args:
+        first: One side; its scenario is loaded with its scene.
+        other: Of the same scenario.
+        has_ticks: Whether distances that the instruction names are marked on the ego's lane.
+
+    Raises:
+        InvalidDocument: What is stored can't be read.
+        InvalidModification: A change does not fit the scene.
+    """
+    scenario = first.scenario
+    ground, sides, camera = frame_pair(first, other, has_ticks=has_ticks)
+    view = picture_view(camera)
+    covered = [[round(edge) for edge in box] for box in covered_boxes(ground.scene, camera)]
+    rows = zip((first, other), sides, strict=True)
+    return PairPictures(
+        names={row.pk: draw_picture(scenario, side, camera) for row, side in rows},
+        original=draw_picture(scenario, Modification(), camera),
+        view=view | {"covered_px": covered},
+        scene_legend=sorted(scene_keys(ground.scene, view)),
+        pair_legend=sorted(set().union(*(change_keys(side, view) for side in sides))),
+    )
+
+
+def frame_pair(
+    first: Augmentation, other: Augmentation, *, has_ticks: bool = False
+) -> tuple[Ground, tuple[Modification, Modification], Camera]:
+    """Return the ground of a pair, both changes and their window; as `draw_pair`."""
+    scenario = first.scenario
+    ground, intent = load_ground(scenario), load_intent(scenario)
+    sides = find_modification(first), find_modification(other)
+    shown = [change for change in (load_reference(scenario), *sides) if change is not None]
+    shifts = find_shifts(*sides) or ()
+    camera = pair_camera(
+        ground,
+        sides,
+        intent=intent,
+        is_filmed=any(change.has_motion for change in shown),
+        differing=tuple((shift.one, shift.other, shift.metres) for shift in shifts),
+        ticks_m=_list_distances(intent) if has_ticks else (),
+    )
+    return ground, sides, camera
+
+
+def _list_distances(intent: Intent | None) -> tuple[float, ...]:
+    """Return the metres ahead of the ego that an instruction names, sorted."""
+    asks = (*intent.requests, *intent.moves) if intent else ()
+    spots = [ask.spot for ask in asks]
+    # Only what counts from the ego itself.
+    own = [spot for spot in spots if not (spot.anchor or spot.landmark or spot.mark or spot.via)]
+    spans = [spot.span_m for spot in own if isinstance(spot.distance, Length)]
+    return tuple(sorted({end for span in spans if span for end in span}))
