@@ -1,6 +1,7 @@
 """How often 95 % intervals contain the truth, over simulated studies: `docs/rating.md`.
 
     python -m bench.coverage_study [STUDIES] [--write]
+    python -m bench.coverage_study [STUDIES] --odd [--write]      # worlds that break assumptions
     python -m bench.coverage_study [STUDIES] --raters [--write]   # judgements of experts
 
 Each world is simulated with the paper's nine ratings, for coverage, and with nine equals, of whom
@@ -20,18 +21,20 @@ from arena.rating.comparisons import TIE, WIN, BoolArray, Comparisons, FloatArra
 from arena.rating.influence import bradley_terry, without_each_expert
 from arena.rating.models import DidNotConverge, Meetings, to_elo
 from arena.rating.panel import judge_rater
+from arena.rating.random_effects import find_quantiles
 from arena.rating.ranking import FEWEST_TO_JUDGE, judge_pairs
 from arena.rating.reliability import Evidence, evidence_of_repeats, raters, repeat_consistency
 from arena.rating.rules import Unit
 from arena.rating.sandwich import estimate_spread, pulls_of_model
 from arena.rating.snapshot_document import PanelRater
+from bench.odd_worlds import ODD_WORLDS, OddWorld
 from bench.worlds import World, paper_ratings
 
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
 """Points by which scenarios, and experts, differ about a contestant."""
 ROUNDS = 500
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "rating.md"
-DEFAULT, SINGLE = METHODS = "closed form, default", "single votes"
+DEFAULT, CLOSED, SINGLE = METHODS = "bootstrap, default", "closed form", "single votes"
 
 
 def worlds() -> Iterator[tuple[str, World]]:
@@ -64,10 +67,12 @@ class Found:
 
     Attributes:
         held: By method, (N, C) whether the interval holds the truth.
+        widths: (N,) of the default intervals over those in closed form, the median contestant's.
         told_apart: (N,) whether any true order of a pair is contradicted, or equals told apart.
     """
 
     held: dict[str, list[BoolArray]] = field(default_factory=lambda: {m: [] for m in METHODS})
+    widths: list[float] = field(default_factory=list)
     told_apart: list[bool] = field(default_factory=list)
 
     def coverage(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
@@ -78,7 +83,7 @@ class Found:
         return float(np.mean(self.told_apart))
 
 
-def study(world: World, *, studies: int, judge: bool = False) -> Found:
+def study(world: World | OddWorld, *, studies: int, judge: bool = False) -> Found:
     """What studies with seeds 0, 1, 2 and so on say of a world; `judge` also judges all pairs.
 
     Studies whose votes determine no ratings are left out.
@@ -99,15 +104,26 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
     strengths = models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     pulls = pulls_of_model(votes, met, counts.games, strengths)
     rating, spread = to_elo(strengths), estimate_spread(pulls, Unit.TWO_WAY)
-    half_widths = {
-        DEFAULT: spread.half_widths(),
-        SINGLE: 1.959964 * np.sqrt(pulls.by_row().diagonal()),
-    }
-    for method, half_width in half_widths.items():
-        found.held[method].append(np.abs(rating - truth) <= half_width)
     if seed is not None:
         above = judge_pairs(rating, spread, rounds=ROUNDS, seed=seed).above
         found.told_apart.append(bool((above & (truth[:, None] < truth + 1e-6)).any()))
+        return
+    quantiles = find_quantiles(
+        pulls,
+        spread,
+        Unit.TWO_WAY,
+        np.ones(len(truth), dtype=np.bool_),
+        rounds=ROUNDS,
+        seed=len(found.widths),
+    )
+    half_widths = {
+        DEFAULT: quantiles * np.sqrt(spread.covariance.diagonal()),
+        CLOSED: spread.half_widths(),
+        SINGLE: 1.959964 * np.sqrt(pulls.by_row().diagonal()),
+    }
+    found.widths.append(float(np.median(half_widths[DEFAULT] / half_widths[CLOSED])))
+    for method, half_width in half_widths.items():
+        found.held[method].append(np.abs(rating - truth) <= half_width)
 
 
 def lines(studies: int) -> Iterator[str]:
@@ -131,6 +147,20 @@ def lines(studies: int) -> Iterator[str]:
             f"{max(false):.1%}" if false else "",
         )
         yield "| " + " | ".join(cells) + " |"
+
+
+def odd_lines(studies: int) -> Iterator[str]:
+    """Yield the table of worlds that break assumptions; a controversial contestant by itself."""
+    yield from _head("world", *METHODS, "width / closed form")
+    for name, world in ODD_WORLDS.items():
+        found = study(world, studies=studies)
+        cells = [name, *(f"{found.coverage(method):.1%}" for method in METHODS)]
+        yield "| " + " | ".join((*cells, f"{np.median(found.widths):.2f}")) + " |"
+        for contestant in world.controversial:
+            alone = slice(contestant, contestant + 1)
+            cells = ["– this contestant alone"]
+            cells += [f"{found.coverage(method, alone):.1%}" for method in METHODS]
+            yield "| " + " | ".join((*cells, "")) + " |"
 
 
 # --- Judgements of experts -----------------------------------------------------------------------
@@ -246,14 +276,25 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("studies", type=int, nargs="?", default=400)
     parser.add_argument("--write", action="store_true", help="into docs/rating.md")
-    parser.add_argument("--raters", action="store_true", help="judgements of experts instead")
+    tables = {"worlds": lines, "odd": odd_lines, "raters": rater_lines}
+    parser.add_argument(
+        "--odd", action="store_const", dest="table", const="odd", help="odd worlds instead"
+    )
+    parser.add_argument(
+        "--raters",
+        action="store_const",
+        dest="table",
+        const="raters",
+        help="judgements of experts",
+    )
     asked = parser.parse_args()
-    name = "raters" if asked.raters else "worlds"
+    name = asked.table or "worlds"
     printed = [f"{asked.studies} simulated studies a row.", ""]
-    for line in (rater_lines if asked.raters else lines)(asked.studies):
+    for line in tables[name](asked.studies):
         print(line, flush=True)
         printed.append(line)
     if asked.write:
+        # Read at the end: others may have written meanwhile.
         before, rest = PAGE.read_text().split(f"<!-- {name} -->\n")
         after = rest.partition(f"<!-- end of {name} -->")[2]
         text = "\n".join([f"<!-- {name} -->", *printed, f"<!-- end of {name} -->"])

@@ -15,16 +15,20 @@ from arena.exports.cells import csv_text
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.exports.leaderboard import VOTES_FILE, WHOSE_FIRST, print_lines
 from arena.rating.comparisons import LEVEL
-from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rate
+from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.lines import notes_by_reason
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
+    BOOTSTRAP_ROUNDS,
     FEWEST_DRAWS,
+    MANY_CONTESTANTS,
+    MANY_VOTES,
     METHOD_TEXTS,
     MOST_DRAWS,
+    ROUNDS,
+    ROUNDS_OF_MANY,
     Unit,
-    default_intervals,
     unit_for,
 )
 from arena.rating.votes_file import OPTIONAL, as_comparisons, read_table
@@ -35,7 +39,6 @@ HELP = (
     "maybe judge and item."
 )
 _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
-ROUNDS_OF_MANY, MANY_VOTES, MANY_MODELS = 1000, 500_000, 100
 
 COLUMNS = {column.name: str(column.field) for column in WHOSE_FIRST if VOTES_FILE in column.of}
 """Those of CSV and JSON, by the fields of a line."""
@@ -76,16 +79,18 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--resample": {
             "choices": [unit.value for unit in Unit],
             "help": "clusters of dependent votes: by expert (judge), by scenario (item), or "
-            "two-way; two-way where judge and item are there, else what there is",
+            "two-way; two-way where judge and item are there, else what there is; vote is the "
+            "paper's resampling of single votes",
         },
         "--intervals": {
             "choices": [kind.value for kind in Intervals],
-            "help": "closed form, or resamples; right for the method unless given",
+            "help": "bootstrap with effects of clusters, closed form, or resamples of single "
+            "votes; right for the method unless given",
         },
         "--rounds": {
             "type": int,
-            "help": f"of the bootstrap; {ROUNDS}, above {MANY_VOTES} votes or {MANY_MODELS} "
-            f"models {ROUNDS_OF_MANY}",
+            "help": f"{BOOTSTRAP_ROUNDS} of the bootstrap, {ROUNDS} of resamples; "
+            f"{ROUNDS_OF_MANY} above {MANY_VOTES} votes or {MANY_CONTESTANTS} models",
         },
         "--seed": {"type": int, "default": 0},
         "--format": {"choices": FORMATS, "default": "table"},
@@ -119,15 +124,12 @@ def run(
         unit = _choose_unit(there, Method(method), resample)
         clusters = [_COLUMN_OF_KIND[kind] for kind in unit.kinds]
         votes, repeats = as_comparisons(table, clusters)
-        way = Intervals(intervals) if intervals else default_intervals(Method(method), unit)
-        is_slow = way is Intervals.RESAMPLES and len(votes.names) > MANY_MODELS
-        usual = ROUNDS_OF_MANY if is_slow or votes.votes > MANY_VOTES else ROUNDS
         board = rate(
             votes,
             method=Method(method),
             unit=unit,
-            intervals=way,
-            rounds=rounds or usual,
+            intervals=Intervals(intervals) if intervals else None,
+            rounds=rounds,
             seed=seed,
         )
     except OSError as error:
@@ -195,12 +197,14 @@ class RatedCsv:
     def method(self) -> str:
         """Method behind the numbers, in one line."""
         board = self.board
-        origin = (
-            f"in closed form ({_CLUSTERED[board.unit]})"
-            if board.intervals is Intervals.CLOSED_FORM
-            else f"by {board.rounds} resamples ({board.unit.value}), seed {board.seed}"
-        )
-        return f"{METHOD_TEXTS[board.method]}; 95 % intervals {origin}"
+        drawn = f"{board.rounds:,} rounds, seed {board.seed}"
+        intervals = {
+            Intervals.BOOTSTRAP: f"bootstrap 95 % intervals, {drawn}, {_CLUSTERED[board.unit]}",
+            Intervals.CLOSED_FORM: f"95 % intervals in closed form ({_CLUSTERED[board.unit]})",
+            Intervals.RESAMPLES: f"95 % intervals by {board.rounds} resamples "
+            f"({board.unit.value}), seed {board.seed}",
+        }
+        return f"{METHOD_TEXTS[board.method]}; {intervals[board.intervals]}"
 
     @property
     def missing(self) -> list[str]:

@@ -1,7 +1,8 @@
-"""Resampled votes as counts, and percentile intervals of what is rated from them.
+"""Resampled votes as counts: whom they determine, and percentile intervals of single votes.
 
 What is drawn with replacement is the unit: votes, whole scenarios, whole experts, or both at
-once (a vote counts as often as its expert times its scenario is drawn).
+once (a vote counts as often as its expert times its scenario is drawn). Rounds of clusters only
+show who is determined; intervals come from `random_effects` or `sandwich` then.
 
 Between contestants who scored against each other through chains both ways the difference is
 finite (Ford 1957). Where only one of two did, it grows without limit in the known direction;

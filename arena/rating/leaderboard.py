@@ -4,7 +4,7 @@ In: `Comparisons` of named contestants, as arrays. Out: a `Leaderboard`: for eac
 with rating, interval and rank, and what must be said with the numbers.
 
     votes = Comparisons(names=("a", "b"), first=first, second=second, score=score, ...)  # arrays
-    board = rate(votes)  # the default: Bradley-Terry, two-way, intervals in closed form
+    board = rate(votes)  # the default: Bradley-Terry, two-way, bootstrap intervals
     board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode
     board.lines[i].rating, .lower, .upper, .rank  # None where the votes do not determine them
     board.status, board.explanation, board.warnings  # always shown with the numbers
@@ -41,8 +41,6 @@ from arena.rating.rules import (
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
 
-# Resamples by default; the paper has 1000.
-ROUNDS = 10_000
 PAPER_ROUNDS = 1000
 
 
@@ -62,7 +60,7 @@ class Leaderboard:
         degenerate_rounds: Bootstrap rounds whose votes did not determine everybody's rating.
         separation: All pairs judged at once, matrices (C, C); NaN for those without votes and for
             pairs of different parts, who are above each other where direct votes show it. None
-            where there are no intervals in closed form.
+            where single votes were resampled.
     """
 
     lines: tuple[Line, ...]
@@ -118,7 +116,7 @@ def rate(
     votes: Comparisons,
     *,
     method: Method = Method.BRADLEY_TERRY,
-    rounds: int = ROUNDS,
+    rounds: int | None = None,
     unit: Unit | None = None,
     intervals: Intervals | None = None,
     seed: int = 0,
@@ -134,24 +132,27 @@ def rate(
     Args:
         votes: What was voted; contestants without votes get a line without a rating.
         method: Bradley-Terry, Davidson's tie model, or online Elo.
-        rounds: Of the bootstrap; for intervals in closed form, of what is drawn to see who is
-            determined and how far apart equals come to lie.
+        rounds: Of the bootstrap, and of what is drawn to see who is determined and how far apart
+            equals come to lie; by default as many as the intervals need.
         unit: Clusters of votes: both ways by default, single votes for online Elo, which knows
             no other.
-        intervals: In closed form by default, but resampled where the unit is single votes.
+        intervals: By random effects of clusters by default, but resampled where the unit is
+            single votes.
         seed: Of its draws; the same votes and seed give the same table.
-        founders: Names of those around whose mean intervals in closed form are; by default all
-            that nearly every resample determines. Ratings stay around everybody's mean.
+        founders: Names of those around whose mean intervals are, but for resampled ones; by
+            default all that nearly every resample determines. Ratings stay around everybody's
+            mean.
 
     Raises:
         TooManyContestants: More than 2000.
-        ValueError: Fewer than one round, or online Elo with a unit other than votes.
+        ValueError: Fewer than one round, or intervals that the unit or online Elo does not have.
     """
     if len(votes.names) > MOST_CONTESTANTS:
         raise TooManyContestants(
             f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
         )
-    rules = choose_rules(method, unit, intervals, rounds=rounds, seed=seed)
+    numbers = {"contestants": len(votes.names), "votes": votes.votes}
+    rules = choose_rules(method, unit, intervals, rounds=rounds, seed=seed, **numbers)
     return _rate(votes, replace(rules, founders=frozenset(founders)))
 
 
@@ -178,7 +179,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         fill_lines(lines, present[part], number, group)
     if chains.reaches.any():
         _rank_across(lines, present, counting, chains, rules)
-        if rules.intervals is Intervals.CLOSED_FORM:
+        if rules.intervals is not Intervals.RESAMPLES:
             # (C, C) over all lines, from those who have votes.
             across[np.ix_(present, present)] = judge_across(counting, chains, rules.unit)
     order = _standing_order(chains, [lines[index] for index in present])

@@ -17,6 +17,7 @@ from arena.rating.comparisons import (
     count_pairs,
 )
 from arena.rating.models import Meetings, fit, resample_elo, to_elo
+from arena.rating.random_effects import find_quantiles
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
@@ -26,7 +27,7 @@ from arena.rating.ranking import (
     rank_sets,
 )
 from arena.rating.rules import Intervals, Method, Rules
-from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model
+from arena.rating.sandwich import Pulls, Spread, estimate_spread, pulls_of_model
 
 _SAME = 1e-6
 """Points. Intervals that are narrower say nothing."""
@@ -152,9 +153,9 @@ def _fit_votes(
     return _Point(
         rating=to_elo(answer[: met.contestants]),
         answer=answer,
-        pulls=pulls_of_model(votes, met, counts.games, answer)
-        if rules.intervals is Intervals.CLOSED_FORM
-        else None,
+        pulls=None
+        if rules.intervals is Intervals.RESAMPLES
+        else pulls_of_model(votes, met, counts.games, answer),
         tie_strength=float(np.exp(answer[-1])) if has_ties else None,
     )
 
@@ -164,13 +165,12 @@ def _rate_rounds(
 ) -> bootstrap.RatedRounds:
     """Rate resampled votes.
 
-    For intervals in closed form the rounds only say who is determined; their ratings are those of
-    the data.
+    But for single votes' intervals the rounds only say who is determined; their ratings are those
+    of the data.
     """
-    is_closed = rules.intervals is Intervals.CLOSED_FORM
 
     def refit(rounds: bootstrap.Rounds, together: BoolArray | None) -> FloatArray:
-        if is_closed:
+        if point.pulls is not None:
             return np.repeat(point.rating[:, None], rounds.games.shape[1], axis=1)
         if point.tie_strength is None:
             games, scores = rounds.games, rounds.scores
@@ -186,7 +186,9 @@ def _rate_rounds(
         )[:-1]
         return to_elo(values)
 
-    number = bootstrap.rounds_to_draw(votes, counts, rules.rounds) if is_closed else rules.rounds
+    number = rules.rounds
+    if point.pulls is not None:
+        number = bootstrap.rounds_to_draw(votes, counts, number)
     blocks = bootstrap.resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
     return bootstrap.rate_rounds(votes, counts, blocks, refit)
 
@@ -226,7 +228,7 @@ def _find_intervals(
         # Around one founder alone, that one's interval would have no width.
         is_anchored = founders.sum() > 1
         around = estimate_spread(point.pulls, rules.unit, founders) if is_anchored else spread
-        half = around.half_widths()
+        half = _half_widths(point.pulls, around, founders if is_anchored else reference, rules)
         # A bound is missing where the rounds leave it open.
         lower = np.where(np.isnan(lower), np.nan, rating - half)
         upper = np.where(np.isnan(upper), np.nan, rating + half)
@@ -246,3 +248,13 @@ def _find_intervals(
         apart = above_in_rounds(rating[members], samples[:, is_fine])
         above[np.ix_(members, members)] = apart
     return _Intervals(lower=lower, upper=upper, above=above)
+
+
+def _half_widths(pulls: Pulls, spread: Spread, reference: BoolArray, rules: Rules) -> FloatArray:
+    """(C,) of the intervals around the mean of a reference (C,), in points."""
+    if rules.intervals is Intervals.CLOSED_FORM or not spread.components:
+        return spread.half_widths()
+    quantiles = find_quantiles(
+        pulls, spread, rules.unit, reference, rounds=rules.rounds, seed=rules.seed
+    )
+    return np.asarray(quantiles * np.sqrt(spread.covariance.diagonal()))

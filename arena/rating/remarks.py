@@ -10,8 +10,6 @@ from arena.rating.rules import Intervals, Rules, Unit
 
 FEWEST = {"expert": 5, "scenario": 10}
 """A table that rests on fewer says so: docs/rating.md."""
-FEWEST_DRAWN = 20
-"""The same where they are drawn anew."""
 
 ELO_NOTE = (
     "Online Elo follows the latest votes: its interval does not shrink with more votes, and the "
@@ -86,8 +84,7 @@ def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) 
     is_resampled = rules.intervals is Intervals.RESAMPLES
     for kind in Unit.TWO_WAY.kinds:
         number = count_codes(getattr(votes, kind))
-        is_drawn = kind in rules.unit.kinds and is_resampled
-        limit = FEWEST_DRAWN if is_drawn else FEWEST[kind]
+        limit = FEWEST[kind]
         if number == 1 and kind in rules.unit.kinds:
             texts.append(
                 f"All votes belong to one {kind}: how much {kind}s differ can't be seen, and the "

@@ -302,6 +302,87 @@ def remaining_share(uneven: FloatArray, cubes: FloatArray) -> FloatArray:
     return np.maximum(1.0 - 2.0 * cubes / uneven + uneven, LEAST_LEFT * (1.0 - uneven))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClusterShares:
+    """Distribution of contestants' information over clusters of one kind; arrays (C, 1).
+
+    Attributes:
+        uneven: S2.
+        left_of_votes, left_of_effects: Shares of both variances that the fit leaves in the pulls.
+        effects: Variances that effects of variance 1 give the ratings around the reference's mean.
+        weight: Of contestants in what they have in common; 0 outside of the reference.
+        reference: Whose mean is fixed.
+    """
+
+    uneven: FloatArray
+    left_of_votes: FloatArray
+    left_of_effects: FloatArray
+    effects: FloatArray
+    weight: FloatArray
+    reference: BoolArray
+
+    @classmethod
+    def of_pulls(
+        cls,
+        pulls: Pulls,
+        clusters: int,
+        of_row: IntArray,
+        single: FloatArray,
+        reference: BoolArray,
+    ) -> Self:
+        """Return those of G clusters, R rows being in `of_row`; `single` (C,) by single votes."""
+        uneven, cubes = pulls.concentration(of_row, clusters)
+        # Single votes, as cells contain the effect: weights by these would prefer where it is
+        # small.
+        weight = np.where(reference, 1.0 / np.maximum(single, 1e-9) ** 2, 0.0)
+        columns = {
+            "uneven": uneven,
+            "left_of_votes": 1.0 - uneven,
+            "left_of_effects": remaining_share(uneven, cubes),
+            "effects": _centre(uneven, reference).diagonal(),
+            "weight": weight,
+            "reference": reference,
+        }
+        return cls(**{name: column[:, None] for name, column in columns.items()})
+
+    @property
+    def room(self) -> FloatArray:
+        """(C, 1) what effects of variance 1 add to the squares."""
+        return self.effects * self.left_of_effects
+
+    def surplus(self, raw: FloatArray, base: FloatArray) -> FloatArray:
+        """(C, B) squares (C, B) beyond what cells (C, 1) or votes leave in them."""
+        return raw - base * self.left_of_votes
+
+    def estimate_effect(self, raw: FloatArray, base: FloatArray) -> FloatArray:
+        """(B,) the variance of effects that all contestants have in common."""
+        # t^2 = surplus / room: sum r^2 - b (1 - S2), over S2 (1 - 2 S3 / S2 + S2).
+        surplus = (self.weight * self.surplus(raw, base)).sum(axis=0)
+        # Chance makes this as often too small as too large: cut off at zero it would be too large.
+        return np.asarray(surplus / np.maximum((self.weight * self.room).sum(axis=0), 1e-300))
+
+    def moderate(
+        self, raw: FloatArray, base: FloatArray, common: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Draw own squares (C, B) towards common ones (C, B) (Smyth 2004).
+
+        Returns:
+            (C, B) the weight of the own squares, and what raw ones are multiplied by for it; (C,
+            B) degrees of freedom of own squares; (1, B) those of the prior.
+        """
+        # (C, B) the share of single votes in the common variance: what the fit left of both.
+        of_votes = np.minimum(base / np.maximum(common, 1e-300), 1.0)
+        left = of_votes * self.left_of_votes + (1.0 - of_votes) * self.left_of_effects
+        # G even clusters have S2 = 1 / G and S3 = 1 / G^2, which makes this G - 1.
+        degrees = left / self.uneven
+        with np.errstate(invalid="ignore", divide="ignore"):
+            own = np.where(left > 0.0, raw / left, 0.0)
+        prior = _prior_degrees(own, common, degrees, self.reference)
+        # Moderated: (d own + d0 common) / (d + d0), d0 the prior's degrees: the second is
+        # share * own, without a division by `left`, which can be 0.
+        return degrees / (prior + degrees), 1.0 / (prior * self.uneven + left), degrees, prior
+
+
 def _component(
     pulls: Pulls,
     base: FloatArray,
@@ -321,38 +402,23 @@ def _component(
         reference: (C,) whose mean is fixed.
     """
     raw = pulls.by_cluster(of_row, clusters)
-    uneven, cubes = pulls.concentration(of_row, clusters)
-    left_of_votes, left_of_effects = 1.0 - uneven, remaining_share(uneven, cubes)
+    shares = ClusterShares.of_pulls(pulls, clusters, of_row, single, reference)
+    own, of_base = raw.diagonal()[:, None], base.diagonal()[:, None]
+    effect = float(shares.estimate_effect(own, of_base)[0])
     # (C, C) of independent effects of variance S2 each, around the reference's mean.
-    effects = _centre(uneven, reference)
-    # t^2 = surplus / room: sum r^2 - b (1 - S2), over S2 (1 - 2 S3 / S2 + S2).
-    surplus = raw.diagonal() - base.diagonal() * left_of_votes
-    room = effects.diagonal() * left_of_effects
-    # Single votes, as cells contain the effect: weights by these would prefer where it is small.
-    weight = np.where(reference, 1.0 / np.maximum(single, 1e-9) ** 2, 0.0)
-    # Chance makes this as often too small as too large: cut off at zero it would be too large.
-    effect = float((weight * surplus).sum()) / max(float((weight * room).sum()), 1e-300)
-    common = base + effect * effects
+    common = base + effect * _centre(shares.uneven[:, 0], reference)
     if effect < 0.0:
         common = without_negative_parts(common)
         least = np.maximum(common.diagonal(), LEAST * base.diagonal())
         common = _with_variances(common, least)
-    # (C,) the share of single votes in the common variance: it says what the fit left of both.
-    of_votes = np.minimum(base.diagonal() / np.maximum(common.diagonal(), 1e-300), 1.0)
-    left = of_votes * left_of_votes + (1.0 - of_votes) * left_of_effects
-    # G even clusters have S2 = 1 / G and S3 = 1 / G^2, which makes this G - 1.
-    degrees = left / uneven
-    with np.errstate(invalid="ignore", divide="ignore"):
-        own = np.where(left > 0.0, raw.diagonal() / left, 0.0)
-    prior = _prior_degrees(own[reference], common.diagonal()[reference], degrees[reference])
-    # Moderated: (d own + d0 common) / (d + d0), d0 the prior's degrees (Smyth 2004).
-    share = degrees / (prior + degrees)
-    # mine^2 raw is share * own, without a division by `left`, which can be 0.
-    mine, others = np.sqrt(1.0 / (prior * uneven + left)), np.sqrt(1.0 - share)
+    share, mine, degrees, prior = (
+        part[:, 0] for part in shares.moderate(own, of_base, common.diagonal()[:, None])
+    )
+    factor, others = np.sqrt(mine), np.sqrt(1.0 - share)
     # No moderated square rests on more than all squares together, less one contestant's.
     everybody = float(degrees[reference].sum()) * (1.0 - 1.0 / reference.sum())
     return Component(
-        covariance=mine[:, None] * raw * mine + others[:, None] * common * others,
+        covariance=factor[:, None] * raw * factor + others[:, None] * common * others,
         common=common,
         own_share=share,
         own_degrees=degrees,
@@ -360,21 +426,25 @@ def _component(
     )
 
 
-def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:
-    """Return the prior's weight in clusters: few where contestants differ.
+def _prior_degrees(
+    own: FloatArray, common: FloatArray, degrees: FloatArray, reference: BoolArray
+) -> FloatArray:
+    """(1, B) the prior's weight in clusters: few where contestants differ.
 
-    The spread of own squares (C,) around the common ones (C,), less what chance alone gives with
-    so many degrees of freedom (C,), as moments of a scaled F distribution.
+    The spread of own squares (C, B) around the common ones (C, B), less what chance alone gives
+    with so many degrees of freedom (C, B), as moments of a scaled F distribution; the reference
+    (C, 1) alone.
     """
-    is_usable = (degrees > 0.5) & (common > 0.0)
-    if is_usable.sum() < 3:
-        return MOST_PRIOR
-    ratio, weight = own[is_usable] / common[is_usable], degrees[is_usable]
-    # F with d and d0 degrees, scaled to the mean 1, has the variance
-    # 2/d + (1 + 2/d) 2/(d0 - 4); this and the following lines solve it for d0.
-    surplus = float((weight * ((ratio - 1.0) ** 2 - 2.0 / weight)).sum() / weight.sum())
-    surplus /= 1.0 + 2.0 / float(weight.mean())
-    return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
+    is_usable = reference & (degrees > 0.5) & (common > 0.0)
+    weight = np.where(is_usable, degrees, 0.0)
+    number, total = is_usable.sum(axis=0), np.maximum(weight.sum(axis=0), 1e-300)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # F with d and d0 degrees, scaled to the mean 1, has the variance
+        # 2/d + (1 + 2/d) 2/(d0 - 4); this and the following lines solve it for d0.
+        excess = np.where(is_usable, weight * ((own / common - 1.0) ** 2 - 2.0 / weight), 0.0)
+        surplus = excess.sum(axis=0) / total / (1.0 + 2.0 * number / total)
+        prior = np.minimum(MOST_PRIOR, 4.0 + 2.0 / surplus)
+    return np.where((number < 3) | (surplus <= 0.0), MOST_PRIOR, prior)[None]
 
 
 def _centre(values: FloatArray, reference: BoolArray) -> FloatArray:

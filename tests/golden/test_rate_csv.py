@@ -6,7 +6,7 @@ from arena.management.rate_csv import run
 from tests.golden.conftest import Check
 from tests.management.votes import WITH_CLUSTERS, clustered
 
-ASKED = (("bt", None), ("bt", "resamples"), ("davidson", None), ("elo", None))
+ASKED = (("bt", None), ("bt", "closed"), ("davidson", None), ("elo", None))
 """Methods with their intervals; None for what fits the method."""
 
 

@@ -38,13 +38,17 @@ def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any
     assert any("does not shrink with more votes" in note for note in found["notes"])
     with pytest.raises(CsvNotRated, match="Elo resamples single votes only, not by expert"):
         run(file=file, method="elo", resample="expert")
+    with pytest.raises(CsvNotRated, match="resamples are of single votes, not of experts"):
+        run(file=file, resample="expert", intervals="resamples")
+    with pytest.raises(CsvNotRated, match="single votes have no effects to draw"):
+        run(file=file, resample="vote", intervals="bootstrap")
 
 
 def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count(
     votes: Any,
 ) -> None:
     lines = clustered()
-    how: dict[str, Any] = {"rounds": 200, "intervals": "resamples"}
+    how: dict[str, Any] = {"rounds": 200}
     first = run(file=votes(*lines, head=WITH_CLUSTERS), seed=3, **how)
     assert first == run(file=votes(*reversed(lines), head=WITH_CLUSTERS), seed=3, **how)
     assert first != run(file=votes(*lines, head=WITH_CLUSTERS), seed=4, **how)
@@ -118,7 +122,7 @@ def test_what_votes_do_not_determine_is_null_and_explained(votes: Any) -> None:
 def test_django_passes_every_option_on(votes: Any) -> None:
     printed = io.StringIO()
     file = votes(*clustered(), head=WITH_CLUSTERS)
-    options = {"rounds": 100, "format": "json", "intervals": "resamples", "seed": 2}
+    options = {"rounds": 100, "format": "json", "intervals": "closed", "seed": 2}
     call_command("rate_csv", file, stdout=printed, **options)
     assert printed.getvalue() == run(file=file, **options)  # type: ignore[arg-type]
 

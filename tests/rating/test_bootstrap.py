@@ -112,12 +112,13 @@ SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]
 
 
 @pytest.mark.parametrize("unit", Unit)
-def test_bounds_are_open_for_those_for_whom_resamples_leave_them_open(unit: Unit) -> None:
-    """The same who by intervals of resamples, where every round is rated."""
-    for seed in range(12):
+def test_bounds_are_open_for_the_same_by_all_kinds_of_intervals(unit: Unit) -> None:
+    others = Intervals.RESAMPLES if unit is Unit.VOTE else Intervals.BOOTSTRAP
+    for seed in range(6):
         votes = simulated(SPREAD, 90, seed, ties=0.1)
         boards = [
-            rate(votes, unit=unit, intervals=way, rounds=600, seed=seed) for way in Intervals
+            rate(votes, unit=unit, intervals=way, rounds=600, seed=seed)
+            for way in (Intervals.CLOSED_FORM, others)
         ]
         ends = [
             [(line.lower is None, line.upper is None) for line in board.lines] for board in boards

@@ -54,8 +54,10 @@ def line_of(board: Leaderboard, name: str) -> Line:
 def test_one_contestant_with_six_votes_takes_nothing_from_nine_others(unit: Unit) -> None:
     rest = nine_of(13, 6, 7)
     few = versus("x", "a", 1, 0, 0) + versus("x", "e", 1, 0, 1) + versus("x", "i", 2, 0, 1)
-    alone = rate(spread(rest), unit=unit, rounds=2000, seed=1)
-    board = rate(spread(rest + few), unit=unit, rounds=2000, seed=1)
+    # Seeds move ends of intervals by effects more than the newcomer does.
+    way = Intervals.RESAMPLES if unit is Unit.VOTE else Intervals.CLOSED_FORM
+    alone = rate(spread(rest), unit=unit, intervals=way, rounds=2000, seed=1)
+    board = rate(spread(rest + few), unit=unit, intervals=way, rounds=2000, seed=1)
     assert board.degenerate_rounds > 0.025 * 2000
     assert board.status is Status.OPEN_INTERVALS
     assert {line.rank for line in alone.lines} != {1}
@@ -225,38 +227,6 @@ def test_a_bound_is_finite_only_if_it_is_whatever_is_unknown(
         assert lower[0] == known[25 - below - unknown]
     if has_upper:
         assert upper[0] == known[::-1][25 - above - unknown]
-
-
-def test_two_way_intervals_are_those_of_the_rounds() -> None:
-    """Drawn by hand: 6 experts, 8 scenarios."""
-    rng = np.random.default_rng(3)
-    cells = [(e, s) for e in range(6) for s in range(8)]
-    wins = {cell: int(rng.binomial(4, 0.5 + 0.06 * (cell[0] % 3))) for cell in cells}
-    votes = [
-        Comparison(
-            first="a", second="b", score=float(k < wins[e, s]), expert=f"{e}", scenario=f"{s}"
-        )
-        for e, s in cells
-        for k in range(4)
-    ]
-    drawn_both_ways = rate(
-        as_arrays(("a", "b"), votes),
-        unit=Unit.TWO_WAY,
-        intervals=Intervals.RESAMPLES,
-        rounds=8000,
-        seed=5,
-    )
-    line = drawn_both_ways.lines[0]
-    table = np.array([[wins[e, s] for s in range(8)] for e in range(6)], dtype=float)
-    drawn = []
-    for _ in range(8000):
-        some = table[rng.integers(0, 6, 6)][:, rng.integers(0, 8, 8)]
-        drawn.append(some.sum() / (4.0 * some.size))
-    share = np.percentile(drawn, [2.5, 97.5])
-    low, high = 1000.0 + POINTS * np.log(share / (1.0 - share)) / 2.0
-    assert line.lower is not None
-    assert line.upper is not None
-    assert line.upper - line.lower == pytest.approx(high - low, rel=0.05)
 
 
 def test_a_new_column_of_a_part_reaches_the_line_by_its_name() -> None:

@@ -9,7 +9,7 @@ import scipy.stats
 import statsmodels.api as sm
 
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, t_above, t_quantile
-from arena.rating.leaderboard import Intervals, rate
+from arena.rating.leaderboard import rate
 from arena.rating.models import ELO_PER_LOGIT, Meetings, to_elo
 from arena.rating.rules import Unit
 from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model, remaining_share
@@ -65,10 +65,10 @@ def test_one_way_clusters_are_statsmodels(unit: Unit) -> None:
         assert contrast @ ours @ contrast == pytest.approx(contrast @ theirs @ contrast, rel=1e-4)
 
 
-@pytest.mark.parametrize("unit", [Unit.VOTE, Unit.SCENARIO])
+@pytest.mark.parametrize("unit", [Unit.VOTE, Unit.EXPERT, Unit.SCENARIO])
 def test_the_bootstrap_agrees_where_clusters_are_many(unit: Unit) -> None:
-    votes = simulated(TRUTH, 4000, 3, scenarios=200)
-    lines = rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=4000).lines
+    votes = simulated(TRUTH, 4000, 3, experts=60, scenarios=200)
+    lines = rate(votes, unit=unit, rounds=4000).lines
     for line, half in zip(lines, half_widths(votes, unit), strict=True):
         assert line.rating is not None
         assert line.lower == pytest.approx(line.rating - half, abs=1.5)

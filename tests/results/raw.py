@@ -95,7 +95,7 @@ def a_rated_study() -> Shown:
     draw_votes(study, size=SIZE, seed=3)
     study = close_study(study=study)
     Contestant.objects.filter(slug="interplan").update(kind=Contestant.Kind.REFERENCE)
-    snapshot = rate(study=study, rounds=1000, seed=4)
+    snapshot = rate(study=study, rounds=1000, seed=4, intervals="closed")
     client = signed_in(people()["researcher"])
     tabs = ("table", "pairs", "types", "raters")
     return Shown(

@@ -14,7 +14,7 @@ from arena.models import Question, Snapshot, Standing
 from arena.models.ratings import snapshot_values
 from arena.rating.lines import Line, hide_ranks, notes_by_reason, says_no_order, votes_text
 from arena.rating.remarks import NOT_RANKED
-from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
+from arena.rating.rules import METHOD_TEXTS, Intervals, text_of_intervals
 from arena.rating.snapshot_document import BoardRemarks
 from arena.results.queries.votes import LeftOut
 from arena.studies.services.opening import preregistration_sha256
@@ -26,29 +26,19 @@ APART = -1
 """The part of those who are rated with nobody."""
 
 
-def is_closed_form(rating: Snapshot) -> bool:
-    """Return whether its intervals come from a formula and not from resampled rounds."""
-    return bool(rating.intervals == Intervals.CLOSED_FORM.value)
-
-
 def method_text(rating: Snapshot) -> str:
     """Return the method behind its numbers, in one line."""
     # Earlier ratings could be adjusted for what was shown.
     adjusted = f", adjusted for {', '.join(rating.covariates)}" if rating.covariates else ""
-    unit = UNIT_TEXTS[rating.resampling_unit]
-    intervals = (
-        f"in closed form, clustered by {unit}"
-        if is_closed_form(rating)
-        else f"by {rating.rounds} resamples of {unit}"
-    )
+    intervals = text_of_intervals(rating.intervals, rating.resampling_unit, rating.rounds)
     method = METHOD_TEXTS[rating.method]
     is_usual = rating.study.questions == [Question.INSTRUCTION]
     question = "" if is_usual else f", question {rating.question}"
     # Nothing is drawn for a closed form; earlier ratings name the seed all the same.
     is_old = rating.state == Snapshot.State.READY and rating.settled_ties is None
-    is_drawn = is_old or not is_closed_form(rating)
+    is_drawn = is_old or rating.intervals != Intervals.CLOSED_FORM.value
     seed = f", seed {rating.seed}" if is_drawn else ""
-    return f"{method}{adjusted}, 95 % intervals {intervals}{seed}{question}"
+    return f"{method}{adjusted}, {intervals}{seed}{question}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,11 +31,12 @@ from arena.exports.formats import (
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.exports.leaderboard import COLUMNS, RATING, WHOSE_FIRST, Column, print_lines
 from arena.models import Snapshot
+from arena.rating.rules import Intervals
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.agreement import FORMATS as AGREEMENT_FORMATS
 from arena.results.exports.agreement import agreement_rating
 from arena.results.exports.charts import Chart, charts, interval_chart
-from arena.results.exports.tables import LeaderboardTable, Row, is_closed_form, leaderboard_table
+from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import HypothesisAnswer
@@ -68,7 +69,8 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
     """Return the part of a JSON file beside the lines of a rating."""
     rating, settled = table.snapshot, table.snapshot.results.board.settled_ties
     # Older ratings had no word for resamples.
-    notes: dict[str, Any] = {"intervals": rating.intervals} if is_closed_form(rating) else {}
+    is_resampled = rating.intervals == Intervals.RESAMPLES.value
+    notes: dict[str, Any] = {} if is_resampled else {"intervals": rating.intervals}
     if rating.covariates:
         notes["covariates"] = rating.covariates
     return {

@@ -18,7 +18,7 @@ from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy,
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.lines import Line, hide_ranks, says_no_order
 from arena.rating.remarks import NOT_RANKED
-from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
+from arena.rating.rules import METHOD_TEXTS, text_of_intervals
 from arena.results.queries.votes import (
     AUTOMATIC,
     Competitor,
@@ -239,8 +239,8 @@ def make_document(
 
 
 def _method_text(rated: Leaderboard) -> str:
-    by = UNIT_TEXTS[rated.unit]
-    return f"{METHOD_TEXTS[rated.method]}, 95 % intervals in closed form, clustered by {by}"
+    intervals = text_of_intervals(rated.intervals, rated.unit, rated.rounds)
+    return f"{METHOD_TEXTS[rated.method]}, {intervals}"
 
 
 _SHOWN = ("slug", "type", "instruction")

@@ -6,16 +6,24 @@ from dataclasses import dataclass
 from arena.models import Question
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Method
-from arena.rating.rules import FEWEST_DRAWS, METHOD_TEXTS, MOST_DRAWS, UNIT_TEXTS
+from arena.rating.rules import (
+    BOOTSTRAP_ROUNDS,
+    FEWEST_DRAWS,
+    METHOD_TEXTS,
+    MOST_DRAWS,
+    ROUNDS,
+    UNIT_TEXTS,
+)
 from arena.results.queries.votes import Filters
-from arena.results.services.ratings import DEFAULT_ROUNDS, Choices
+from arena.results.services.ratings import Choices
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.services import InputKind, input_field
 from augment.services.scenarios import types_named
 
 INTERVALS = {
+    Intervals.BOOTSTRAP.value: "by bootstrap",
     Intervals.CLOSED_FORM.value: "in closed form",
-    Intervals.RESAMPLES.value: "by resamples",
+    Intervals.RESAMPLES.value: "by resamples of single votes",
 }
 
 
@@ -36,12 +44,17 @@ class RatingRequest:
     intervals: str | None = input_field(
         InputKind.CHOICE,
         "Intervals",
-        "Right for the method unless given.",
+        "As preregistered, or right for the method, unless given.",
         choices=INTERVALS,
         default=None,
     )
-    rounds: int = input_field(
-        InputKind.WHOLE, "Rounds", least=FEWEST_DRAWS, most=MOST_DRAWS, default=DEFAULT_ROUNDS
+    rounds: int | None = input_field(
+        InputKind.WHOLE,
+        "Rounds",
+        f"{BOOTSTRAP_ROUNDS:,} for the bootstrap and {ROUNDS:,} for all else, unless given.",
+        least=FEWEST_DRAWS,
+        most=MOST_DRAWS,
+        default=None,
     )
     seed: int = input_field(InputKind.WHOLE, "Seed", least=0, most=HIGHEST_SEED, default=0)
     question: str | None = input_field(

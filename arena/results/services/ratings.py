@@ -43,7 +43,8 @@ from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, check_names
 from augment.services import Lease, Moment, WorkKind, log_change
 
-DEFAULT_ROUNDS = 10_000
+CLOSED_FORM_FROZEN = "two-way over experts and scenarios, closed form"
+"""In preregistrations before 2026-11-29: such studies are rated as they say."""
 WHILE_WAITING = 20_000
 """Up to so many votes a person waits for the page; more are a worker's job."""
 
@@ -54,7 +55,7 @@ class Choices(TypedDict, total=False):
     """Choices of a rating; `plan_snapshot` defines each one and its default."""
 
     method: str
-    rounds: int
+    rounds: int | None
     seed: int
     unit: str | None
     intervals: str | None
@@ -96,12 +97,12 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     Args:
         study: Closed, unless `early`.
         method: "bt" (Bradley-Terry), "davidson" (its tie model) or "elo" (online).
-        rounds: Of the bootstrap.
+        rounds: Of the bootstrap; None for as many as the intervals need.
         seed: Of its draws, 0 or more.
-        unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
+        unit: By what votes are clustered: "vote", "scenario", "expert" or "two-way"; None for
             two-way where the votes name experts and scenarios, else votes.
-        intervals: "closed" or "resamples"; None for the closed form, but resamples of single
-            votes and for online Elo.
+        intervals: "bootstrap", "closed" or "resamples"; None for what was preregistered, else the
+            bootstrap, but resamples of single votes and for online Elo.
         filters: Which votes count; None for all main ones. Who is author of what is added to them
             here, so that later marks do not change the rating.
         early: Rate a study that is still open; the snapshot and the log say so.
@@ -266,28 +267,25 @@ def software_versions() -> dict[str, str | int]:
 
 
 def _plan(study: Study, choices: Choices) -> Snapshot:
-    rounds, seed = choices.get("rounds", DEFAULT_ROUNDS), choices.get("seed", 0)
+    rounds, seed = choices.get("rounds"), choices.get("seed", 0)
     unit, intervals = choices.get("unit"), choices.get("intervals")
     if study.state == Study.State.CANCELLED:
         raise Conflict(f"The study '{study.name}' was cancelled: it is not rated.")
     is_early = study.state == Study.State.OPEN
     if is_early and not choices.get("early"):
         raise StudyStillOpen(study.name)
-    if not 1 <= rounds <= MOST_DRAWS:
+    if rounds is not None and not 1 <= rounds <= MOST_DRAWS:
         raise Conflict(f"Bootstrap rounds go from 1 to {MOST_DRAWS}, not {rounds}.")
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
     filters = choices.get("filters") or vote_queries.Filters()
     chosen = _read_word(Method, choices.get("method", "bt"), "method")
     wanted = _read_word(Intervals, intervals, "kind of intervals") if intervals else None
+    clusters = _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit")
+    if CLOSED_FORM_FROZEN in study.preregistration and clusters is Unit.TWO_WAY:
+        wanted = wanted or Intervals.CLOSED_FORM
     try:
-        rules = choose_rules(
-            chosen,
-            _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit"),
-            wanted,
-            rounds=rounds,
-            seed=seed,
-        )
+        rules = choose_rules(chosen, clusters, wanted, rounds=rounds, seed=seed)
     except ValueError as error:
         raise Conflict(f"This can't be rated: {error}.") from error
     return Snapshot(
@@ -295,7 +293,7 @@ def _plan(study: Study, choices: Choices) -> Snapshot:
         state=Snapshot.State.QUEUED,
         progress=0,
         method=rules.method,
-        rounds=rounds,
+        rounds=rules.rounds,
         resampling_unit=rules.unit,
         intervals=rules.intervals,
         seed=seed,

@@ -308,7 +308,7 @@ def _preregistration(study: Study) -> dict[str, Any]:
         "hypotheses": rules["hypotheses"],
         "analysis": {
             "method": "Bradley-Terry on the Elo scale, ties half a win, mean 1000",
-            "intervals": "95 %, two-way over experts and scenarios, closed form",
+            "intervals": "95 %, bootstrap with random effects of experts and of scenarios",
             "pairs": "all judged at once, 5 % for the whole table",
             "questions": "each rated by its own votes, never averaged",
             "settled_pairs": "ties, as many a pair as others have votes on average",
