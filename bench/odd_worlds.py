@@ -14,7 +14,16 @@ import numpy as np
 from numpy.random import Generator
 from scipy.special import expit
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, PairCounts
+from arena.rating.comparisons import (
+    LOSS,
+    TIE,
+    WIN,
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+)
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit, to_elo
 from bench.worlds import paper_ratings
 
@@ -143,14 +152,13 @@ class OddWorld:
                     low[chosen], high[chosen], rng.random(len(rows)) < 0.5
                 )
             score[rows] = vote(rows)
-        columns = (first, second, score, expert, scenario)
-        names = ("first", "second", "score", "expert", "scenario")
         return Comparisons(
             names=tuple(f"c{number}" for number in range(size)),
-            **{
-                name: np.tile(column, self.copies)
-                for name, column in zip(names, columns, strict=True)
-            },
+            first=np.tile(first, self.copies),
+            second=np.tile(second, self.copies),
+            score=np.tile(score, self.copies),
+            expert=np.tile(expert, self.copies),
+            scenario=np.tile(scenario, self.copies),
         )
 
     def _frequencies(self) -> FloatArray:
@@ -166,7 +174,7 @@ class OddWorld:
             return np.full(self.experts, self.votes_per_expert)
         drawn = rng.lognormal(0.0, self.uneven, self.experts)
         votes = drawn / drawn.sum() * self.votes_per_expert * self.experts
-        return np.maximum(10, np.round(votes)).astype(np.int64)
+        return np.asarray(np.maximum(10, np.round(votes)), dtype=np.int64)
 
     def _draw_plan(self, rng: Generator, expert: IntArray, numbers: IntArray) -> IntArray:
         """(R,) the scenario of each vote."""
@@ -175,7 +183,7 @@ class OddWorld:
             return np.asarray(np.array(allowed)[expert, rng.integers(0, self.seen, len(expert))])
         if self.uneven_scenarios:
             size = rng.lognormal(0.0, self.uneven_scenarios, self.scenarios)
-            return rng.choice(self.scenarios, len(expert), p=size / size.sum())
+            return np.asarray(rng.choice(self.scenarios, len(expert), p=size / size.sum()))
         return np.concatenate([rng.permutation(np.arange(n) % self.scenarios) for n in numbers])
 
     def _draw_scenarios(self, rng: Generator, number: int) -> FloatArray:
@@ -207,7 +215,7 @@ def _patterns(contestants: int) -> FloatArray:
     return np.asarray(drawn - drawn.mean(axis=1, keepdims=True))
 
 
-def _turn(low: IntArray, high: IntArray, is_turned: FloatArray) -> tuple[IntArray, IntArray]:
+def _turn(low: IntArray, high: IntArray, is_turned: BoolArray) -> tuple[IntArray, IntArray]:
     return np.where(is_turned, high, low), np.where(is_turned, low, high)
 
 

@@ -86,7 +86,8 @@ def _deal_clusters(votes: Comparisons, unit: Unit) -> Comparisons:
             order = np.argsort(-np.bincount(of_row, weights=votes.count), kind="stable")
             group = np.empty(len(codes), dtype=np.int64)
             group[order] = np.arange(len(codes)) % most
-            votes = replace(votes, **{kind: group[of_row]})
+            changed: dict[str, Any] = {kind: group[of_row]}
+            votes = replace(votes, **changed)
     return votes
 
 

@@ -6,14 +6,7 @@ from dataclasses import dataclass
 from arena.models import Question
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Method
-from arena.rating.rules import (
-    BOOTSTRAP_ROUNDS,
-    FEWEST_DRAWS,
-    METHOD_TEXTS,
-    MOST_DRAWS,
-    ROUNDS,
-    UNIT_TEXTS,
-)
+from arena.rating.rules import FEWEST_DRAWS, METHOD_TEXTS, MOST_DRAWS, UNIT_TEXTS
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import Choices
 from arena.studies.services.plan import HIGHEST_SEED
@@ -51,7 +44,7 @@ class RatingRequest:
     rounds: int | None = input_field(
         InputKind.WHOLE,
         "Rounds",
-        f"{BOOTSTRAP_ROUNDS:,} for the bootstrap and {ROUNDS:,} for all else, unless given.",
+        "As many as the intervals need unless given.",
         least=FEWEST_DRAWS,
         most=MOST_DRAWS,
         default=None,
