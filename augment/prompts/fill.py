@@ -178,10 +178,11 @@ def review_messages(
     *,
     radius_m: float,
     earlier: Sequence[str] = (),
+    refusal: str = "",
 ) -> Messages:
     """Ask the reviewer for ratings, or the engineer for questions to the viewer.
 
-    Both see scene, wish and changed vectors, no reasoning.
+    Both see scene, wish and changed vectors, no reasoning but that of a refusal.
 
     Args:
         role: Which of the two.
@@ -190,6 +191,7 @@ def review_messages(
         modification: What is reviewed.
         radius_m: How far around the ego the scene is written down.
         earlier: The feedback that the editor was given in earlier rounds.
+        refusal: Why the editor changes nothing, where it said so.
     """
     system = fill_text(
         f"{role}.md",
@@ -201,12 +203,14 @@ def review_messages(
         problems=read_text("common_problems.md"),
         drawn=read_text("drawn.md"),
     )
-    quoted = quote("\n".join(earlier))
+    quoted, changes = quote("\n".join(earlier)), changes_text(scene, modification)
+    if refusal:
+        changes += "\n\n" + fill_text("refusal_reason.md", quoted=quote(refusal)).strip()
     task = fill_text(
         "review_task.md",
         scene=scene_text(scene, radius_m=radius_m),
         quoted=quote(instruction),
-        changes=changes_text(scene, modification),
+        changes=changes,
         earlier=fill_text("earlier_feedback.md", quoted=quoted) if earlier else "",
     )
     return _opening(system, task)

@@ -7,7 +7,7 @@ review never takes a result away: where it is unusable, or a later round can't b
 modifier made before stands, and the notes say so.
 
 An answer that nobody can read and a refusal are outcomes of the model and count as such; whoever
-changes nothing refuses, in a block or in prose, and reviews judge that as any other answer. A
+changes nothing refuses, in a block or in prose; reviews judge that, and see the reason. A
 broken wire is nobody's outcome and is raised.
 """
 
@@ -314,6 +314,7 @@ class _Work:
                 entry for draft in rounds if draft.verdict for entry in draft.verdict.feedback
             ),
             intent=self.task.intent,
+            refusal=read.notes if read.modification.is_empty else "",
         )
         head: dict[str, object] = {"round": len(rounds) + 1, "review": review.name}
         note = partial(self.respondents.transcript.note, NoteKind.REVIEW)

@@ -70,6 +70,7 @@ class ReviewedAnswer:
         earlier: The modification of the round before, None in the first.
         told: What the modifier was told in the rounds before, in order.
         intent: What the instruction asks for: for the checks, never for a model.
+        refusal: Why nothing is changed, where the modifier said so.
     """
 
     ground: Ground
@@ -80,6 +81,7 @@ class ReviewedAnswer:
     earlier: Modification | None = None
     told: tuple[str, ...] = ()
     intent: Intent | None = None
+    refusal: str = ""
 
     @property
     def scene(self) -> Scene:
@@ -271,6 +273,7 @@ def _review_messages(role: ModelRole, answer: ReviewedAnswer) -> fill.Messages:
         answer.modification,
         radius_m=answer.limits.radius_m,
         earlier=answer.told,
+        refusal=answer.refusal,
     )
 
 

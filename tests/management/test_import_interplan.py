@@ -176,6 +176,7 @@ def test_other_traffic_takes_other_boxes(folder: Path) -> None:
     run(folder)
     row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
     assert "New agents of type VEHICLE are in their order" in scene_text(load_scene(row))
+    assert "follows it at the speed limit" in scene_text(load_scene(row))
     change_surroundings(row, keep_traffic=False, density="high", goal="")
     assert load_scene(row).options.interplan == InterplanRules()
     assert "New agents of type VEHICLE" not in scene_text(load_scene(row))

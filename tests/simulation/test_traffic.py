@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from augment.checks import Ground
+from augment.checks.wish import measure_wish
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     InterplanRules,
@@ -15,9 +17,11 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
+from augment.scene.intent import Body, Intent, LaneChoice, Length, Spot, VehicleRequest
 from augment.scene.motion import find_motion
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.recording import Recording
+from augment.simulation.expected import expect_recording
 from augment.simulation.road import Road
 from augment.simulation.states import Objects, start_state
 from augment.simulation.traffic import DriveSetting, Traffic
@@ -117,6 +121,24 @@ def test_so_it_is_where_others_drive_by_rules_and_where_a_recording_ends_early(
     assert_everybody_is_at_one_place(
         by_interplans_rules(setting) if goes_by_interplan else setting
     )
+
+
+@pytest.mark.parametrize(
+    ("goes_by_interplan", "least_m", "most_m"), [(True, 2.0, 9.0), (False, 0, 0)]
+)
+def test_who_is_to_drive_on_is_measured_by_the_rule_of_the_drive(
+    goes_by_interplan: bool, least_m: float, most_m: float
+) -> None:
+    holds = replace(vehicle("New1", 20.0, 0.0), speed_mps=5.0, motion=PlannedMotion())
+    setting = with_agents(holds)
+    setting = by_interplans_rules(setting) if goes_by_interplan else setting
+    spot = Spot(distance=Length(low_m=20.0, high_m=20.0), lane=LaneChoice.OWN)
+    asked = VehicleRequest(spot=spot, body=Body.CAR, speed_mps=5.0, count=1)
+    ground = Ground.of(setting.scene, expect_recording)
+    measured = measure_wish(ground, setting.modification, Intent(requests=(asked,)))
+    assert measured is not None
+    # From 5 towards 10 m/s at 1 m/s^2: t^2 / 2 at first, 18 m after 6 s, 6 m in the mean.
+    assert least_m <= measured.matches[0].distance_m <= most_m
 
 
 def test_interplans_drivers_stop_at_a_red_light_and_ours_hold_their_speed() -> None:

@@ -50,6 +50,18 @@ def test_ratings_that_are_none_are_asked_for_once_more(ratings: str) -> None:
     assert (play.roles, play.outcome.is_accepted) == ("mrr", True)
 
 
+@pytest.mark.parametrize(
+    ("variant", "review"), [("tqa", [HIGH]), ("vqa", [questions(), SEEN, verdict()])]
+)
+def test_reviewers_are_told_why_a_wish_is_refused(variant: str, review: list[str]) -> None:
+    play = Play(variant, ["I can't: no lane comes the other way.", *review])
+    assert play.outcome.status is OutcomeStatus.REFUSED
+    told = play.client.requests[1].messages[-1].text
+    assert "> I can't: no lane comes the other way." in told
+    accepted = Play(variant, [car(21.4), *review])
+    assert "refuses" not in accepted.client.requests[1].messages[-1].text
+
+
 def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
     play = Play("tqa", [car(21.4), "Fine.", "Really fine."])
     assert (play.outcome.status, play.outcome.is_accepted) == (OutcomeStatus.DONE, None)
