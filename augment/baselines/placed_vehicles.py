@@ -13,6 +13,7 @@ import numpy as np
 
 from augment.baselines.placed_motions import find_arm, give_motion, is_on_other_arm
 from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.checks.wish import BEARINGS_RAD
 from augment.checks.wish_places import EDGE_GAP_M, find_across
 from augment.errors import CannotPlace
 from augment.geometry.frames import Box, Pose, overlap, wrap
@@ -55,12 +56,6 @@ _LOOSER = (1.0, 0.5, 0.0)
 """By how much of these turns and sides; less where the road is too narrow for them."""
 _SHIFTS_M = (0.0, 0.25, -0.25, 0.5, -0.5)
 """How far left of the lane centre the first one stands where the others are told against it."""
-_BEARINGS_RAD = {
-    Bearing.AHEAD: 0.0,
-    Bearing.BEHIND: math.pi,
-    Bearing.LEFT: math.pi / 2.0,
-    Bearing.RIGHT: -math.pi / 2.0,
-}
 _ASIDE_RAD = tuple(math.radians(sign * 8.0 * step) for step in range(6) for sign in (1.0, -1.0))
 """How far from the named direction a neighbour may stand."""
 _COST_OF_TURN = 0.5
@@ -239,7 +234,7 @@ def _choices(
         turns = [turn_rad] if other.is_signed else [turn_rad, -turn_rad]
         headings = [wrap(before.heading_rad + turn) for turn in turns]
     for heading_rad, aside_rad in itertools.product(headings, _ASIDE_RAD):
-        toward_rad = lane_rad + _BEARINGS_RAD[other.bearing or Bearing.AHEAD] + aside_rad
+        toward_rad = lane_rad + BEARINGS_RAD[other.bearing or Bearing.AHEAD] + aside_rad
 
         def pose_at(
             away_m: float, toward_rad: float = toward_rad, heading_rad: float = heading_rad

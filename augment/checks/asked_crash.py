@@ -6,13 +6,12 @@ from itertools import pairwise, permutations
 
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.parties import CRASH_M, USUAL, Bounds, Case, Party, apart_m, hold
+from augment.checks.wish_patterns import MOST_ORDERED
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Bearing, CrashedCar, CrashRequest, Facing, LaneChoice
 
-# Vehicles of which every order is tried: 120 of them.
-MOST_ORDERED = 5
 _MISPLACED = 10.0
 """An order with somebody on the wrong side of the one before is only taken for want of another."""
 _ROUGHLY_DEG = 2.0 * USUAL.heading_deg

@@ -18,7 +18,7 @@ from augment.scene.intent import Spot
 from augment.scene.intent_parts import MotionWish, Side, StartWish
 from augment.scene.motion import STEP_S
 from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo, PlannedMotion
-from augment.scene.planned_mover import PlannedMover, walk_as_motion
+from augment.scene.planned_mover import carry_out, walk_as_motion
 from augment.scene.presets import find_bend_end
 
 # Since its start.
@@ -99,12 +99,9 @@ def _carry_out(case: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatA
     """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
     begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
     alone = replace(agent, motion=replace(motion, start=begins))
-    mover, rows = PlannedMover(alone, case.route.graph), []
-    for time_s in np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist():
-        mover.advance(time_s)
-        rows.append(mover.state())
+    times_s = np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist()
     # (T, 4), without the steps past the map.
-    states = np.array(rows)
+    states = carry_out(alone, case.route.graph, times_s)
     return states[~np.isnan(states[:, 0])]
 
 

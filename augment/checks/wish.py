@@ -33,7 +33,7 @@ ABREAST_M = 3.0
 """From one to the next of those who walk side by side, at most."""
 _ASIDE_RAD = math.radians(45.0)
 """In front of, left of: nearer to that direction than to any other."""
-_BEARINGS_RAD: dict[wish.Bearing | None, float] = {
+BEARINGS_RAD: dict[wish.Bearing | None, float] = {
     wish.Bearing.AHEAD: 0.0,
     wish.Bearing.BEHIND: math.pi,
     wish.Bearing.LEFT: math.pi / 2.0,
@@ -352,7 +352,7 @@ class _Fitting:
             Link(
                 base=index,
                 gap_m=(other.gap.low_m, other.gap.high_m) if other.gap else (0.0, touching_m),
-                toward_rad=lane_rad + _BEARINGS_RAD.get(other.bearing, 0.0),
+                toward_rad=lane_rad + BEARINGS_RAD.get(other.bearing, 0.0),
                 aside_rad=_ASIDE_RAD if other.bearing else math.pi,
             )
             for index, other in enumerate(said)

@@ -22,7 +22,7 @@ from augment.scene import planned_motion, presets
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.intent import MotionWish, Request, Spot, VehicleRequest
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
-from augment.scene.planned_mover import PlannedMover, walk_as_motion, way_and_speed
+from augment.scene.planned_mover import carry_out, walk_as_motion, way_and_speed
 
 _FURTHER_S = 15.0
 """So long after its start a motion is followed to see where it leads."""
@@ -86,12 +86,9 @@ class MotionCase:
             movements = self.whole.ground.motion_after(change, of_all=False).others
             (states,) = (one.states for one in movements if one.agent.id == agent.id)
             return states[: round(until_s / STEP_S) + 1]
-        mover, rows = PlannedMover(agent, self.whole.route.graph), []
         # Half a step more, so that rounding loses no last step.
-        for time_s in np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist():
-            mover.advance(time_s)
-            rows.append(mover.state())
-        return np.array(rows)
+        times_s = np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist()
+        return carry_out(agent, self.whole.route.graph, times_s)
 
     def find_offsets(self, agent: TrafficAgent) -> FloatArray:
         """Return from an agent to the answer (T, 2), in m; NaN where one is past the map."""

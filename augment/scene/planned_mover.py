@@ -5,7 +5,7 @@ Frame: the scene's.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -172,6 +172,15 @@ class PlannedMover:
             self._line = smooth_line([here[:2], *path.points_m])
         elif here is not None and isinstance(path, LanePath):
             self._line = lane_line(self._graph, path, here[:2])
+
+
+def carry_out(agent: TrafficAgent, graph: LaneGraph, times_s: Iterable[float]) -> FloatArray:
+    """Return the states (T, 4) of an agent whose motion waits for nobody; NaN past the map."""
+    mover, rows = PlannedMover(agent, graph), []
+    for time_s in times_s:
+        mover.advance(time_s)
+        rows.append(mover.state())
+    return np.array(rows)
 
 
 def walk_as_motion(agent: TrafficAgent) -> TrafficAgent:

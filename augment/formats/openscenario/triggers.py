@@ -18,7 +18,7 @@ from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import find_motion
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion
-from augment.scene.planned_mover import PlannedMover, walk_as_motion
+from augment.scene.planned_mover import carry_out, walk_as_motion
 
 _MARGIN_M = 1e-4
 """So that a comparison at the very step does not hang on the last digit."""
@@ -65,11 +65,8 @@ def list_unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
 def states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> FloatArray:
     """Return states (T, 4) from the start of its motion on; NaN past the map."""
     motion = replace(motion_in(agent), start=AtTime(after_s=started_s))
-    mover, rows = PlannedMover(replace(agent, motion=motion), LaneGraph(cell.after)), []
-    for since_s in cell.motion.times_s.tolist():
-        mover.advance(started_s + since_s)
-        rows.append(mover.state())
-    return np.array(rows)
+    times_s = (started_s + cell.motion.times_s).tolist()
+    return carry_out(replace(agent, motion=motion), LaneGraph(cell.after), times_s)
 
 
 def distance_condition(
