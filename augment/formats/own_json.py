@@ -16,8 +16,8 @@ from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reader, Reading
 from augment.formats.writing import Cell, LossReport, Output, write_each
 from augment.scene import codec
-from augment.scene.motion import MotionSource, Movement
-from augment.scene.recording import Recording, Track
+from augment.scene.motion import MotionSource
+from augment.scene.recording import Recording, to_track
 
 
 class OwnJson(Reader):
@@ -68,20 +68,10 @@ def _recording(cell: Cell) -> Recording:
         times_s=motion.times_s,
         ego=ego,
         tracks=tuple(
-            _track(other) for other in motion.others if other.source is MotionSource.RECORDED
+            to_track(other.agent, np.where(other.is_present[:, None], other.states, np.nan))
+            for other in motion.others
+            if other.source is MotionSource.RECORDED
         ),
-    )
-
-
-def _track(movement: Movement) -> Track:
-    agent = movement.agent
-    states = np.where(movement.is_present[:, None], movement.states, np.nan)
-    return Track(
-        agent_id=agent.id,
-        type=agent.type,
-        length_m=agent.length_m,
-        width_m=agent.width_m,
-        states=states,
     )
 
 

@@ -47,12 +47,7 @@ Entry = list[Any]
 
 
 def make_film(
-    scene: Scene,
-    modification: Modification,
-    camera: Camera,
-    recording: Recording | None = None,
-    *,
-    keeps_traffic: bool = False,
+    scene: Scene, modification: Modification, camera: Camera, recording: Recording | None = None
 ) -> bytes:
     """Return the film of a scene after a change, from t0 on.
 
@@ -61,13 +56,12 @@ def make_film(
         modification: What changes.
         camera: The window.
         recording: What is expected after t0; the ego drives as it did, and reacts to nobody.
-        keeps_traffic: Whether who was recorded later comes into the picture.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
     after = apply(scene, modification)
-    motion = find_motion(after, recording=recording, with_later=keeps_traffic)
+    motion = find_motion(after, recording=recording, with_later=True)
     changed = {agent.id for agent in modification.changed}
     styled = [(motion.ego, palette.EGO_MARK)]
     styled += [

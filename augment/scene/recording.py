@@ -110,6 +110,17 @@ class Recording:
         return int(self.ego_is_seen.sum()) > 1
 
 
+def to_track(agent: TrafficAgent, states: NDArray[np.float64]) -> Track:
+    """Return the track of an agent with these states (T, 4)."""
+    return Track(
+        agent_id=agent.id,
+        type=agent.type,
+        length_m=agent.length_m,
+        width_m=agent.width_m,
+        states=states,
+    )
+
+
 def track_agent(track: Track, state: NDArray[np.float64]) -> TrafficAgent:
     """Return the agent of a track as it is in one of its states (4,)."""
     x_m, y_m, heading_rad, speed_mps = (float(value) for value in state)

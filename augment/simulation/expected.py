@@ -13,7 +13,7 @@ from augment.errors import CannotDrive
 from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.motion import HORIZON_S, LENGTH_S, STEP_S, find_motion
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording, to_track
 from augment.simulation.road import Road
 from augment.simulation.shapes import move_ahead
 from augment.simulation.states import WIDTH, EgoBody, FloatArray, Objects
@@ -57,21 +57,12 @@ def expect_recording(
     unseen[0] = motion.ego.states[0]
     states = _find_states(_roll_out(setting, road, motion.ego.states))
     ruled = [agent for agent in setting.after.agents if is_interplans and _moves(agent)]
-    bodies = {track.agent_id: track for track in (known.tracks if known else ())} | {
-        agent.id: Track(
-            agent_id=agent.id,
-            type=agent.type,
-            length_m=agent.length_m,
-            width_m=agent.width_m,
-            states=absent,
-        )
-        for agent in ruled
-    }
+    tracks = [*(known.tracks if known else ()), *(to_track(agent, absent) for agent in ruled)]
     return Recording(
         times_s=motion.times_s,
         ego=motion.ego.states if recording is not None and recording.shows_ego else unseen,
         tracks=tuple(
-            replace(track, states=states.get(name, absent)) for name, track in bodies.items()
+            replace(track, states=states.get(track.agent_id, absent)) for track in tracks
         ),
     )
 

@@ -62,7 +62,6 @@ class DriveSetting:
         modification: What changes; nothing by default.
         recording: Tracks and ego motion after t0, None where nothing was recorded. It also says
             which way the ego takes and how far an expert came.
-        replay: Whether the recorded others are part of the drive; interPlan clears them.
         reactive: Whether recorded vehicles that move follow their lanes and answer to the ego,
             instead of doing what they did. Who was never recorded answers in any case.
     """
@@ -70,7 +69,6 @@ class DriveSetting:
     scene: Scene
     modification: Modification = field(default_factory=Modification)
     recording: Recording | None = None
-    replay: bool = True
     reactive: bool = False
 
     @cached_property
@@ -431,7 +429,7 @@ class Traffic:
             agent for agent in own if agent.motion or (agent.walk_to_m and not is_interplans)
         ]
         plain = [agent for agent in own if agent not in (*walking, *planned)]
-        recorded = setting.recording.tracks if setting.recording and setting.replay else ()
+        recorded = setting.recording.tracks if setting.recording else ()
         tracked = {track.agent_id for track in recorded} - setting.modification.replaced
         answering = [agent for agent in plain if is_interplans or agent.id in tracked]
         self._movers: list[StraightOn | LaneDrivers | Walkers | PlannedMovers | Replay] = [
@@ -471,7 +469,7 @@ class Traffic:
 
 def _list_replayed(setting: DriveSetting, road: Road) -> list[Track]:
     """The tracks that are played back."""
-    if setting.recording is None or not setting.replay:
+    if setting.recording is None:
         return []
     at_start = {agent.id: agent for agent in setting.scene.agents}
     moved = {agent.id for agent in setting.modification.moved}

@@ -274,9 +274,7 @@ def test_scenarios_are_what_interplans_own_code_builds_and_score_as_in_nuplan(
             assert mine == [pytest.approx(place, abs=2e-3) for place in theirs], name
     for name, (score, progress) in DRIVEN.items():
         scene, reference, recording = worlds[name]
-        setting = DriveSetting(
-            scene=scene, modification=reference, recording=recording, replay=False
-        )
+        setting = DriveSetting(scene=scene, modification=reference, recording=recording.ego_alone)
         road = Road(scene, recording)
         drive = drive_setting(setting, planner_named("pdm-closed", offsets="original"), road=road)
         scored = score_drive(

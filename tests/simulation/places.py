@@ -27,7 +27,7 @@ def assert_everybody_is_at_one_place(setting: DriveSetting) -> None:
     recording = expect_recording(scene, change, setting.recording)
     motion = Ground.of(scene, lambda *_: recording).motion_after(change)
     camera = camera_for(scene, change)
-    film = json.loads(make_film(scene, change, camera, recording, keeps_traffic=True))
+    film = json.loads(make_film(scene, change, camera, recording))
     tracks = [
         (first, last, np.array(values).reshape(-1, 3)[:, :2].cumsum(axis=0) / 10.0)
         for _, first, last, values in film["movers"]

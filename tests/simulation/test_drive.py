@@ -184,7 +184,7 @@ def test_by_interplans_rules_a_drive_lasts_30_s_or_until_the_recorded_ego_s_rear
         ("slow", by_rules, 4.0),
         ("fast", by_rules, 12.0),
     ):
-        setting = DriveSetting(scene=before, recording=recording, replay=False)
+        setting = DriveSetting(scene=before, recording=recording.ego_alone)
         drive = run(setting, ConstantSpeed(speed_mps))
         lasts_s[name] = drive.duration_s
         duration_s = 15.0 if before is scene else 30.0

@@ -120,6 +120,6 @@ def test_a_moving_pair_of_a_busy_street_takes_less_than_300_kb(realdata: Path) -
     change = Modification(moved=tuple(replace(car, motion=motion) for car in cars))
     camera = camera_for(scene, change, expect=lambda *_: recording)
     side = len(draw(scene, change, camera, recording))
-    side += len(make_film(scene, change, camera, recording, keeps_traffic=True))
+    side += len(make_film(scene, change, camera, recording))
     before = len(draw(scene, Modification(), camera, recording))
     assert 2 * side + before + len(draw_empty(scene, camera)) < 300_000

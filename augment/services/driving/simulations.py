@@ -12,12 +12,12 @@ from django.db.models import Max, QuerySet
 
 from augment.errors import CannotDrive, Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
-from augment.scene.codec import modification_from_document, recording_from_document
+from augment.scene.codec import modification_from_document
 from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.driving.thresholds import conclude, conclude_all
-from augment.services.scenarios.scenes import find_type, load_reference, load_scene
+from augment.services.scenarios.scenes import find_type, load_recording, load_reference, load_scene
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
@@ -230,11 +230,9 @@ def _load_setting(row: Simulation) -> DriveSetting:
         modification = load_reference(scenario)
     elif changed is not None and changed.modification is not None:
         modification = modification_from_document(changed.modification)
-    recording = scenario.base_scene.recording
     return DriveSetting(
         scene=scene,
         modification=fit_boxes(scene, modification or Modification()),
-        recording=None if recording is None else recording_from_document(recording),
-        replay=scenario.keep_traffic,
+        recording=load_recording(scenario),
         reactive=row.is_reactive,
     )

@@ -25,6 +25,7 @@ from augment.services.scenarios.scenes import (
     add_variant,
     find_type,
     load_intent,
+    load_recording,
     load_scene,
     scenario_seed,
 )
@@ -143,7 +144,6 @@ def map_changes(
 
 def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
     """Return the values that fit as scenarios in the own JSON, files by name; as `map_changes`."""
-    recording = scenario.base_scene.recording
     cells = [
         Cell(
             name=f"{scenario.slug} with {request.number} = {value:g}",
@@ -152,7 +152,7 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
             type=find_type(scenario.type),
             modification=change,
             keeps_traffic=scenario.keep_traffic,
-            recording=None if recording is None else codec.recording_from_document(recording),
+            recording=load_recording(scenario),
         )
         for value, change in map_changes(scenario, request).items()
         if isinstance(change, Modification)

@@ -11,8 +11,8 @@ from augment.formats.nuplan_log import NuPlan
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
-from augment.scene.codec import modification_from_document, recording_from_document
-from augment.services.scenarios.scenes import find_type, load_scene
+from augment.scene.codec import modification_from_document
+from augment.services.scenarios.scenes import find_type, load_recording, load_scene
 
 FORMATS = tuple(WRITERS)
 
@@ -170,7 +170,7 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
-        recording=None if scene.recording is None else recording_from_document(scene.recording),
+        recording=load_recording(scenario),
         augmentation=str(row.code),
         contestant=row.contestant.slug,
         source=source,

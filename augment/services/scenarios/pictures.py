@@ -206,7 +206,7 @@ def _draw(scenario: Scenario, modification: Modification, camera: Camera) -> tup
     if not camera.is_filmed:
         return draw(scene, modification, camera), b""
     recording = load_expected(scenario, scene, modification)
-    film = make_film(scene, modification, camera, recording, keeps_traffic=scenario.keep_traffic)
+    film = make_film(scene, modification, camera, recording)
     ground = store(draw_empty(scene, camera), folder=f"{FOLDER}/{camera.key}")
     document = {"ground": ground} | json.loads(film)
     return draw(scene, modification, camera, recording), json.dumps(

@@ -398,23 +398,22 @@ def load_scene(scenario: Scenario) -> entities.Scene:
     return replace(scene, options=options)
 
 
+def load_recording(scenario: Scenario) -> Recording | None:
+    """Return the recording after t0, None for none; the ego's alone if traffic is cleared."""
+    document = scenario.base_scene.recording
+    recording = None if document is None else codec.recording_from_document(document)
+    return recording.ego_alone if recording and not scenario.keep_traffic else recording
+
+
 def load_expected(
     scenario: Scenario, scene: entities.Scene, modification: entities.Modification
 ) -> Recording | None:
-    """Return `expect_recording` of a scenario's scene, with the recorded traffic that stays."""
-    document = scenario.base_scene.recording
-    recording = None if document is None else codec.recording_from_document(document)
-    if recording is not None and not scenario.keep_traffic:
-        recording = recording.ego_alone
-    return expect_recording(scene, modification, recording)
+    """Return `expect_recording` of a scenario's scene."""
+    return expect_recording(scene, modification, load_recording(scenario))
 
 
 def load_ground(scenario: Scenario) -> Ground:
-    """Return the ground of a scenario, whose recording is read where something moves.
-
-    Raises:
-        InvalidDocument: The stored scene can't be read.
-    """
+    """Return the ground of a scenario, whose recording is read where something moves."""
     return Ground.of(load_scene(scenario), partial(load_expected, scenario))
 
 
