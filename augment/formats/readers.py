@@ -12,6 +12,7 @@ from augment.formats.argoverse2 import ArgoverseMotion, ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan_log import NuPlan
 from augment.formats.opendrive.reader import OpenDrive
+from augment.formats.openscenario.scenario import OpenScenario
 from augment.formats.own_json import OwnJson
 from augment.formats.reading import Reader
 from augment.formats.scenarionet.scenario import ScenarioNet
@@ -27,6 +28,7 @@ READERS: dict[str, Reader] = {
         NuPlan(),
         ScenarioNet(),
         ArgoverseMotion(),
+        OpenScenario(),
         OpenDrive(),
     )
 }

@@ -16,6 +16,8 @@ from augment.formats.readers import READERS, find_reader
 from augment.scene.codec import SCENE_FORMAT, scene_to_document
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.opendrive_maps import by_hand
+from tests.formats.openscenario_files import scenario
+from tests.formats.openscenario_files import write as write_scenario
 from tests.formats.test_commonroad import newer
 from tests.formats.test_scenarionet import description, store
 from tests.properties import examples
@@ -38,6 +40,7 @@ GOOD: dict[str, Callable[[Path], Path]] = {
     "waymo": lambda root: waymo_files.write(root / "made.tfrecord", waymo_files.scenario()),
     "scenarionet": lambda root: store(root, description()),
     "nuplan": _nuplan,
+    "openscenario": lambda root: write_scenario(root, scenario()),
     "opendrive": lambda root: _text(root, "made.xodr", by_hand()),
     "json": lambda root: _text(root, "made.json", f'{{"format": "{SCENE_FORMAT}", "lanes": []}}'),
 }

@@ -9,7 +9,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--item I] [--ego-at LANE,S]`."""
+    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--ego NAME] ...`."""
 
     help = "Import one moment of a recording, or a scene in the own JSON. Formats: " + "; ".join(
         f"{reader.name}, {reader.title}" for reader in READERS.values()
@@ -28,6 +28,11 @@ class Command(TerminalCommand):
         "--item": {
             "help": "which part of a file with several: the number of a record, a planning "
             "problem, a lidar_pc token (default: the first)"
+        },
+        "--ego": {
+            "metavar": "NAME",
+            "dest": "item",
+            "help": "which entity of an OpenSCENARIO file is the ego (default: Ego or hero)",
         },
         "--ego-at": {
             "metavar": "LANE,S",

@@ -1,0 +1,194 @@
+"""Moments at which conditions of OpenSCENARIO hold, and the triggers of ours that they become.
+
+A condition is looked at while everybody goes on as at t0, the ego as recorded: its first step
+becomes a trigger that fires then, and with another ego where the same distance or place is
+reached. Frame: the ego frame of t0. T steps.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from augment import foreign
+from augment.foreign import Doubts, FloatArray, fault_at
+from augment.formats.opendrive.geometry import read_float
+from augment.formats.openscenario.events import Event
+from augment.geometry.frames import Pose
+from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, Trigger
+
+_RULES: dict[str, Callable[[FloatArray, float], np.ndarray]] = {
+    **{"lessThan": np.less, "lessOrEqual": np.less_equal, "equalTo": np.isclose},
+    **{"greaterThan": np.greater, "greaterOrEqual": np.greater_equal, "notEqualTo": np.not_equal},
+}
+_MARGIN_M = 1e-3
+_AHEAD_M = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expectation:
+    """Where everybody will be while nobody's event begins.
+
+    Attributes:
+        states: (T, 4) by the names of the file, of the middles.
+        centres_m: From points of reference to middles, ahead and to the left.
+        sizes_m: Length and width.
+        ids: Of agents, by the names of the file.
+        find_point: The place that a Position says, in the scene's frame.
+    """
+
+    times_s: FloatArray
+    states: dict[str, FloatArray]
+    centres_m: Mapping[str, tuple[float, float]]
+    sizes_m: Mapping[str, tuple[float, float]]
+    ids: Mapping[str, str]
+    find_point: Callable[[Element, str], Pose]
+
+    def references(self, name: str, place: str) -> FloatArray:
+        """Return where somebody's point of reference is (T, 2)."""
+        states = foreign.look_up(self.states, name, place)
+        ahead_m, left_m = self.centres_m[name]
+        cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
+        back = np.column_stack([ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos])
+        return np.asarray(states[:, :2] - back)
+
+
+def find_trigger(
+    event: Event, actor: str, expected: Expectation, doubts: Doubts
+) -> tuple[Trigger, int]:
+    """Return the trigger of ours for an event, and the step at which it fires.
+
+    Raises:
+        InvalidDocument: A condition is none that is read, or never holds.
+    """
+    if (time_s := event.time_s) is not None:
+        step = round(time_s / float(expected.times_s[1]))
+        return AtTime(after_s=time_s), min(step, len(expected.times_s) - 1)
+    holds, watched = np.zeros(len(expected.times_s), dtype=bool), list[str]()
+    goals = [e for group in event.groups for c in group for e in c.iter("Position")]
+    for group in event.groups:
+        all_hold = np.ones(len(holds), dtype=bool)
+        for condition in group:
+            met, names = _watch(condition, expected, event.place)
+            delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
+            steps = min(round(delay_s / float(expected.times_s[1])), len(met))
+            all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
+            watched += names
+        holds |= all_hold
+    step = int(holds.argmax())
+    if not holds.any():
+        raise fault_at(event.place, "its conditions never hold while everybody goes on as at t0")
+    ego = next(name for name, agent_id in expected.ids.items() if agent_id == EGO_ID)
+    others = [name for name in watched if name != actor]
+    if step == 0 or not others:
+        return AtTime(after_s=round(float(expected.times_s[step]), 6)), step
+    own, other = expected.states[actor], expected.states[ego if ego in others else others[0]]
+    gaps_m = np.hypot(*(own[: step + 1, :2] - other[: step + 1, :2]).T)
+    if ego in others and not goals and gaps_m[step] < gaps_m[:step].min():
+        return NearEgo(within_m=float(gaps_m[step]) + _MARGIN_M), step
+    # A place of the condition if the other is there for the first time, else just ahead of it.
+    x_m, y_m, heading_rad, _ = other[step].tolist()
+    ahead = x_m + _AHEAD_M * math.cos(heading_rad), y_m + _AHEAD_M * math.sin(heading_rad)
+    poses = [expected.find_point(goal, event.place) for goal in goals[:1]]
+    for place in (*((pose.x_m, pose.y_m) for pose in poses), ahead):
+        away_m = np.hypot(*(other[: step + 1, :2] - place).T)
+        if away_m[step] < away_m[:step].min():
+            break
+    within_m = float(away_m[step]) + _MARGIN_M
+    doubts.assume(f"{event.place} begins by the place of another as its conditions first hold")
+    agent_id = expected.ids[ego if ego in others else others[0]]
+    return AtPlace(agent_id=agent_id, x_m=place[0], y_m=place[1], within_m=within_m), step
+
+
+# Private
+
+
+def _watch(
+    condition: Element, expected: Expectation, place: str
+) -> tuple[np.ndarray, Sequence[str]]:
+    """When a condition holds (T,), and whose motion it depends on."""
+    element = next(
+        (e for path in ("ByValueCondition/*", "ByEntityCondition/EntityCondition/*")
+         for e in condition.findall(path)), None)  # fmt: skip
+    kind = "nothing" if element is None else element.tag
+    measures: dict[str, Callable[[str, Element, Expectation, str], FloatArray]] = {
+        "RelativeDistanceCondition": _measure_gap,
+        "DistanceCondition": _measure_gap,
+        "ReachPositionCondition": _measure_gap,
+        "TimeHeadwayCondition": _measure_headway,
+        "TimeToCollisionCondition": _measure_collision,
+        "TraveledDistanceCondition": _measure_way,
+        "SpeedCondition": _measure_speed,
+        "SimulationTimeCondition": _measure_time,
+    }
+    measure = foreign.look_up(measures, kind, place)
+    assert element is not None
+    place = f"{place}.{kind}"
+    is_reach = kind == "ReachPositionCondition"
+    value = read_float(element, "tolerance" if is_reach else "value", place)
+    least = "greaterOrEqual" if kind == "TraveledDistanceCondition" else "lessOrEqual"
+    rule = foreign.look_up(_RULES, element.get("rule", least), place)
+    triggering = condition.find("ByEntityCondition/TriggeringEntities")
+    names = [] if triggering is None else [e.get("entityRef", "") for e in triggering]
+    if kind == "SimulationTimeCondition":
+        return rule(expected.times_s + 1e-9, value), []
+    with np.errstate(all="ignore"):
+        met = [rule(measure(name, element, expected, place), value) for name in names]
+    if not met:
+        raise fault_at(place, "nobody triggers it")
+    assert triggering is not None
+    is_all = triggering.get("triggeringEntitiesRule") == "all"
+    targets = [e.get("entityRef", "") for e in element.iter() if "entityRef" in e.attrib]
+    return (np.all if is_all else np.any)(met, axis=0), [*names, *targets]
+
+
+def _measure_gap(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
+    """How far somebody is from another, or from a place."""
+    own, position = expected.references(name, place), element.find("Position")
+    if position is None:
+        position = element.find("TimeToCollisionConditionTarget/Position")
+    other = next((e.get("entityRef", "") for e in element.iter() if "entityRef" in e.attrib), "")
+    if position is not None:
+        pose = expected.find_point(position, place)
+        way = np.array([pose.x_m, pose.y_m]) - own
+    else:
+        way = expected.references(other, place) - own
+    kind = element.get("relativeDistanceType", element.get("distanceType", ""))
+    heading_rad = expected.states[name][:, 2]
+    ahead = way[:, 0] * np.cos(heading_rad) + way[:, 1] * np.sin(heading_rad)
+    left = way[:, 1] * np.cos(heading_rad) - way[:, 0] * np.sin(heading_rad)
+    gap_m = np.hypot(ahead, left)
+    gap_m = {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}.get(kind, gap_m)
+    if element.get("freespace") == "true":
+        sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
+        gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
+    return np.asarray(gap_m)
+
+
+def _measure_headway(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
+    return np.asarray(_measure_gap(name, element, expected, place) / expected.states[name][:, 3])
+
+
+def _measure_collision(
+    name: str, element: Element, expected: Expectation, place: str
+) -> FloatArray:
+    """Seconds until the gap closes; without an end where it doesn't."""
+    gap_m = _measure_gap(name, element, expected, place)
+    closing_mps = -np.gradient(gap_m, expected.times_s)
+    return np.where(closing_mps > 1e-6, gap_m / closing_mps, np.inf)
+
+
+def _measure_way(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
+    places = foreign.look_up(expected.states, name, place)[:, :2]
+    steps_m = np.hypot(*np.diff(places, axis=0, prepend=places[:1]).T)
+    return np.asarray(np.cumsum(steps_m) + 1e-9)
+
+
+def _measure_speed(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
+    return np.asarray(foreign.look_up(expected.states, name, place)[:, 3])
+
+
+def _measure_time(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
+    return expected.times_s

@@ -1,0 +1,190 @@
+"""Positions of OpenSCENARIO on an OpenDRIVE map, as poses in the map's frame.
+
+Of the two points of a road user this is the point of reference, not the middle of its box. A
+position relative to a lane or road has the heading of travel there, one relative to somebody has
+theirs, where no orientation says otherwise. Source: ASAM OpenSCENARIO XML 1.3, positions.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Final
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from augment import foreign
+from augment.foreign import fault_at
+from augment.formats.opendrive.geometry import read_float
+from augment.formats.opendrive.network import END, START, Road, RoadNetwork
+from augment.geometry.frames import Pose, difference, wrap
+
+_REACH_M: Final = 30.0
+"""So far from a reference line a place can be on its road."""
+_MOST_ROADS = 200
+"""A way along roads that is longer is none."""
+Place = tuple[Road, float, float, int]
+"""Road, s and t there, and the id of the lane."""
+
+
+class Placer:
+    """Finds poses; those of entities by the actions that place them.
+
+    Args:
+        network: The map.
+        positions: The element that places each entity at t0, by its name.
+    """
+
+    def __init__(self, network: RoadNetwork, positions: Mapping[str, Element]) -> None:
+        self._network, self._positions = network, positions
+        self._poses, self._open = dict[str, Pose](), set[str]()
+
+    def entity_pose(self, name: str) -> Pose:
+        """Return where an entity is at t0.
+
+        Raises:
+            InvalidDocument: Nobody placed it, or positions refer to each other in a circle.
+        """
+        if name in self._open:
+            raise fault_at(f"entity {name[:40]}", "its position refers to itself in a circle")
+        if name not in self._poses:
+            position = foreign.look_up(self._positions, name, "position of an entity at t0")
+            self._open.add(name)
+            try:
+                self._poses[name] = self.find_pose(position, f"entity {name[:40]}")
+            finally:
+                self._open.discard(name)
+        return self._poses[name]
+
+    def find_pose(self, position: Element, place: str) -> Pose:
+        """Return the pose that a Position says.
+
+        Raises:
+            InvalidDocument: It is of another kind, or leads off the map.
+        """
+        element = next(iter(position), None)
+        kind = "nothing" if element is None else element.tag
+        finders: dict[str, Callable[[Element, str], Pose]] = {
+            "WorldPosition": self._find_world,
+            "LanePosition": self._find_lane,
+            "RoadPosition": self._find_road,
+            "RelativeLanePosition": self._find_relative_lane,
+            "RelativeRoadPosition": self._find_relative_road,
+            "RelativeObjectPosition": self._find_relative_object,
+            "RelativeWorldPosition": self._find_relative_world,
+        }
+        find = foreign.look_up(finders, kind, place)
+        assert element is not None
+        place = f"{place}.{kind}"
+        pose, orientation = find(element, place), element.find("Orientation")
+        if orientation is None:
+            return pose
+        turn_rad = read_float(orientation, "h", place) if "h" in orientation.attrib else 0.0
+        if orientation.get("type", "absolute") == "relative":
+            return pose.turn(turn_rad)
+        return replace(pose, heading_rad=wrap(turn_rad))
+
+    def locate(self, pose: Pose, place: str) -> Place:
+        """Return where on which road a pose is, of several the best aligned lane.
+
+        Raises:
+            InvalidDocument: It is on no lane.
+        """
+        best: list[tuple[float, int, Place]] = []
+        for number, road in enumerate(self._network.roads_near(pose.x_m, pose.y_m, _REACH_M)):
+            s_m, t_m = _project(road, pose)
+            section = road.sections[road.section_at(s_m)]
+            for lane_id, (right_m, left_m) in road.edges_at(section, np.array([s_m])).items():
+                if right_m[0] - 0.01 <= t_m <= left_m[0] + 0.01:
+                    heading_rad = road.pose_at(s_m, t_m, lane_id).heading_rad
+                    turn_rad = abs(difference(heading_rad, pose.heading_rad))
+                    best.append((round(turn_rad, 3), number, (road, s_m, t_m, lane_id)))
+        if not best:
+            raise fault_at(place, "who it is relative to is on no lane")
+        return min(best, key=lambda row: row[:2])[2]
+
+    def _find_world(self, element: Element, place: str) -> Pose:
+        heading_rad = read_float(element, "h", place) if "h" in element.attrib else 0.0
+        x_m, y_m = (read_float(element, name, place) for name in "xy")
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+
+    def _find_lane(self, element: Element, place: str) -> Pose:
+        road = self._network.road(element.get("roadId", ""), f"{place}.roadId")
+        lane_id = foreign.read_whole(element.get("laneId"), f"{place}.laneId")
+        return road.lane_pose(lane_id, read_float(element, "s", place), _number(element, "offset"))
+
+    def _find_road(self, element: Element, place: str) -> Pose:
+        road = self._network.road(element.get("roadId", ""), f"{place}.roadId")
+        s_m = read_float(element, "s", place, 0.0, road.line.length_m + 0.01)
+        return road.pose_at(s_m, read_float(element, "t", place))
+
+    def _find_relative_lane(self, element: Element, place: str) -> Pose:
+        road, s_m, _, lane_id = self._locate_other(element, place)
+        step = foreign.read_whole(element.get("dLane"), f"{place}.dLane")
+        other = lane_id + step
+        # No lane has the id 0, so it is no step.
+        if other == 0 or (other > 0) != (lane_id > 0):
+            other += 1 if step > 0 else -1
+        along_m = _number(element, "ds")
+        along_m += _number(element, "dsLane") * (1 if road.is_forward(lane_id) else -1)
+        road, s_m, other = self._advance(road, s_m, other, along_m, place)
+        return road.lane_pose(other, s_m, _number(element, "offset"))
+
+    def _find_relative_road(self, element: Element, place: str) -> Pose:
+        road, s_m, t_m, lane_id = self._locate_other(element, place)
+        t_m += _number(element, "dt")
+        road, s_m, lane_id = self._advance(road, s_m, lane_id, _number(element, "ds"), place)
+        return road.pose_at(s_m, t_m, lane_id)
+
+    def _find_relative_object(self, element: Element, place: str) -> Pose:
+        pose = self.entity_pose(element.get("entityRef", ""))
+        ahead_m, left_m = _number(element, "dx"), _number(element, "dy")
+        x_m, y_m = pose.to_parent(np.array([[ahead_m, left_m]]))[0].tolist()
+        return replace(pose, x_m=x_m, y_m=y_m)
+
+    def _find_relative_world(self, element: Element, place: str) -> Pose:
+        pose = self.entity_pose(element.get("entityRef", ""))
+        x_m, y_m = pose.x_m + _number(element, "dx"), pose.y_m + _number(element, "dy")
+        return replace(pose, x_m=x_m, y_m=y_m)
+
+    def _locate_other(self, element: Element, place: str) -> Place:
+        return self.locate(self.entity_pose(element.get("entityRef", "")), place)
+
+    def _advance(
+        self, road: Road, s_m: float, lane_id: int, along_m: float, place: str
+    ) -> tuple[Road, float, int]:
+        """Return road, station and lane so far along s, over no junction."""
+        s_m += along_m
+        for _ in range(_MOST_ROADS):
+            beyond_m = max(-s_m, s_m - road.line.length_m)
+            if beyond_m <= 0.01:
+                return road, s_m, lane_id
+            end = START if s_m < 0.0 else END
+            section = road.sections[0 if end == START else -1]
+            lane = foreign.look_up(section.lanes, lane_id, place)
+            if end not in road.links or not lane.links[end]:
+                raise fault_at(place, f"leads {beyond_m:.1f} m past the end of road {road.id}")
+            name, other_end = road.links[end]
+            road, (lane_id, *_) = self._network.road(name, place), lane.links[end]
+            s_m = beyond_m if other_end == START else road.line.length_m - beyond_m
+        raise fault_at(place, f"leads over more than {_MOST_ROADS} roads")
+
+
+# Private
+
+
+def _number(element: Element, name: str) -> float:
+    return read_float(element, name, element.tag) if name in element.attrib else 0.0
+
+
+def _project(road: Road, pose: Pose) -> tuple[float, float]:
+    """Return s and t of the nearest place of a road's reference line."""
+    low_m, high_m = 0.0, road.line.length_m
+    for _ in range(6):  # each time between the neighbours of the nearest of 200 stations
+        s_m = np.linspace(low_m, high_m, 200)
+        away_m = np.hypot(*(road.line.poses_at(s_m)[:, :2] - (pose.x_m, pose.y_m)).T)
+        row = int(np.argmin(away_m))
+        low_m, high_m = float(s_m[max(row - 1, 0)]), float(s_m[min(row + 1, 199)])
+    x_m, y_m, heading_rad = road.line.poses_at(s_m[row : row + 1])[0].tolist()
+    left_m = (pose.y_m - y_m) * math.cos(heading_rad) - (pose.x_m - x_m) * math.sin(heading_rad)
+    return float(s_m[row]), left_m

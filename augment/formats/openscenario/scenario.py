@@ -1,0 +1,392 @@
+"""The reader of OpenSCENARIO scenarios at t0, with what moves as motions of ours.
+
+`item` is the entity that becomes the ego, or "@ROAD,LANE,S" to put one on a lane. Whoever follows
+a trajectory by the clock alone was recorded, as it were; whatever else moves gets a motion.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from augment import foreign
+from augment.foreign import FloatArray, fault_at
+from augment.formats.opendrive.geometry import read_float
+from augment.formats.opendrive.maps import map_around
+from augment.formats.opendrive.reader import parse_place
+from augment.formats.openscenario.conditions import Expectation
+from augment.formats.openscenario.events import (
+    ACTIONS,
+    GONE,
+    Event,
+    describe_action,
+    list_events,
+    read_vertices,
+)
+from augment.formats.openscenario.motions import MotionReader, read_speed_target
+from augment.formats.openscenario.positions import Placer
+from augment.formats.openscenario.sources import (
+    EGO_NAMES,
+    MARKER,
+    Entity,
+    ScenarioSource,
+    is_catalog,
+)
+from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
+from augment.geometry.frames import Pose, wrap
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, Scene, TrafficLight
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.motion import STEP_S, Motion, find_motion, read_at
+
+LONGEST_S = 60.0
+"""Trajectories are read so far."""
+_STATES = {
+    **dict.fromkeys(("green", "go"), TrafficLight.GREEN),
+    **dict.fromkeys(("yellow", "amber", "attention"), TrafficLight.YELLOW),
+    **dict.fromkeys(("red", "stop"), TrafficLight.RED),
+    "off": TrafficLight.UNKNOWN,
+}
+NO_EGO = (
+    "nobody is called {}, and not just one vehicle is here; who could be, as the item (--ego): {}"
+)
+
+
+class OpenScenario(LogReader):
+    """The reader of OpenSCENARIO XML with its OpenDRIVE map."""
+
+    name = "openscenario"
+    title = "OpenSCENARIO scenario, 1.0 to 1.3, with its OpenDRIVE map (.xosc file, or a zip)"
+    suffix, marker = ".xosc", MARKER
+
+    def recognises(self, path: Path) -> bool:
+        """Return whether the file is a scenario, and no catalog."""
+        return super().recognises(path) and not is_catalog(path)
+
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """The one with that ego."""
+        yield _Scenario(path, item, self.reach_m).log()
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Yield t0 with each vehicle as the ego, the one that is meant first."""
+        scenario = _Scenario(path, None, self.reach_m)
+        for name in sorted(scenario.drivers, key=lambda name: name != scenario.ego_name):
+            yield Moment(item=name)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """Return the scene at t0."""
+        if frame:
+            raise fault_at("frame", f"{frame} is not there; a scenario has frame 0 alone")
+        scenario = _Scenario(path, item, self.reach_m)
+        return scenario.add_motions(scenario.log().reading_at(0, name, self.reach_m))
+
+
+class _Scenario:
+    """A scenario while it is read.
+
+    Attributes:
+        drivers: Names of those who can be the ego.
+        ego_name: Of the ego; None where it is put on a lane.
+    """
+
+    def __init__(self, path: Path, item: str | None, reach_m: float) -> None:
+        self._source, self._reach_m, self._stem = ScenarioSource(path), reach_m, path.stem[:80]
+        self._doubts, self._network = self._source.doubts, self._source.open_map()
+        self._entities = self._source.entities()
+        self._events = list_events(self._source)
+        self._positions, self._speeds = dict[str, Element](), dict[str, Element]()
+        for private in self._source.root.findall("Storyboard/Init/Actions/Private"):
+            for action in private.findall("PrivateAction"):
+                self._begin(private.get("entityRef", ""), action)
+        self._placer = Placer(self._network, self._positions)
+        self._middles = dict[str, FloatArray]()
+        for name in self._entities.keys() & self._positions.keys():
+            with self._doubts.about("entities"):
+                self._middles[name] = self._middle(name, self._placer.entity_pose(name))
+        cars = (AgentType.VEHICLE, AgentType.BUS)
+        self.drivers = [
+            n for n, e in self._entities.items() if n in self._middles and e.type in cars
+        ]
+        self.ego_name = self._find_ego(item)
+        self._tracks, self._gone_s = dict[str, tuple[FloatArray, FloatArray]](), dict[str, float]()
+        for name in self._entities:
+            with self._doubts.about("trajectories"):
+                self._read_track(name)
+
+    def log(self) -> Log:
+        """Return everybody's states, of those without a trajectory by the clock at t0 alone."""
+        last_s = min(max([0.0, *(times[-1] for times, _ in self._tracks.values())]), LONGEST_S)
+        times_s = np.arange(round(last_s / STEP_S) + 1) * STEP_S
+        states = {
+            name: self._states(name, times_s)
+            for name in self._entities
+            if name in self._middles or name in self._tracks
+        }
+        lost = len(self._entities) - len(states)
+        self._doubts.assume("Somebody who is put nowhere at t0 was left out", lost)
+        ego = states.pop(self.ego_name, None) if self.ego_name else None
+        size_m = self._entities[self.ego_name].size_m if self.ego_name else None
+        if self.ego_name is None:
+            ego = np.full((len(times_s), 4), np.nan)
+            ego[0] = [*self._put, 0.0]
+        assert ego is not None
+        pose = Pose(x_m=ego[0, 0], y_m=ego[0, 1], heading_rad=wrap(ego[0, 2]))
+        licence = self._source.root.find("FileHeader/License")
+        named = "" if licence is None else (licence.get("name") or "").strip()[:200]
+        return Log(
+            times_s=times_s,
+            ego=ego,
+            ego_size_m=size_m or (EGO_LENGTH_M, EGO_WIDTH_M),
+            tracks=[self._track(name, rows) for name, rows in states.items()],
+            map_at=lambda _: map_around(self._network, pose, self._reach_m, self._lights()),
+            world=f"OpenSCENARIO frame of {self._stem}",
+            title=f"OpenSCENARIO scenario {self._stem}",
+            licence=named or "no licence named",
+            is_free=True,
+            item=self.ego_name,
+        )
+
+    def add_motions(self, reading: Reading) -> Reading:
+        """Return the reading with the motions of those who have events."""
+        scene, recording, names = reading.scene, reading.recording, reading.names
+        assert recording is not None
+        kept = tuple(t for t in recording.tracks if names[t.agent_id] in self._tracks)
+        is_recorded = bool(kept or self.ego_name in self._tracks)
+        recording = replace(recording, tracks=kept) if is_recorded else None
+        ids = {name: agent_id for agent_id, name in names.items()}
+        ids[self.ego_name or ""] = scene.ego.id
+        reader = self._motion_reader(scene, find_motion(scene, recording=recording), ids)
+        if self.ego_name in self._events.keys() - self._tracks.keys():
+            self._doubts.assume("The ego's own events were left out: a planner drives it")
+        for name in self._order_actors():
+            agent = next((agent for agent in scene.agents if agent.id == ids.get(name)), None)
+            if agent is None or name in self._tracks:
+                continue
+            agent = reader.read(name, agent, self._choose_events(self._events[name]))
+            if agent.motion is not None:
+                agents = (agent if a.id == agent.id else a for a in scene.agents)
+                scene = replace(scene, agents=tuple(agents))
+                # Others may wait for somebody who moves so.
+                motion = find_motion(scene, recording=recording)
+                reader.expected.states.update(_states_by_name(motion, ids))
+        notes = *reading.notes, *self._doubts.notes
+        return replace(reading, scene=scene, recording=recording, notes=notes)
+
+    def _order_actors(self) -> list[str]:
+        """Return who has events, those who wait for none of the others first."""
+
+        def count(name: str) -> int:
+            conditions = [c for e in self._events[name] for group in e.groups for c in group]
+            watched = {e.get("entityRef") for c in conditions for e in c.iter()}
+            return len(watched & (self._events.keys() - {name, self.ego_name}))
+
+        return sorted(self._events, key=count)
+
+    def _motion_reader(self, scene: Scene, motion: Motion, ids: dict[str, str]) -> MotionReader:
+        origin, states = scene.origin.pose, _states_by_name(motion, ids)
+
+        def find_middles(name: str, positions: list[Element], place: str) -> FloatArray:
+            world = self._find_middles(name, positions, place)
+            local = origin.to_local(world[:, :2])
+            return np.column_stack([local, world[:, 2] - origin.heading_rad])
+
+        def find_point(position: Element, place: str) -> Pose:
+            pose = self._placer.find_pose(position, place)
+            x_m, y_m = origin.to_local(np.array([[pose.x_m, pose.y_m]]))[0].tolist()
+            return Pose(x_m=x_m, y_m=y_m, heading_rad=0.0)
+
+        def count_lanes(pose: Pose, lane_id: int) -> int:
+            x_m, y_m = origin.to_parent(np.array([[pose.x_m, pose.y_m]]))[0].tolist()
+            world = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(pose.heading_rad + origin.heading_rad))
+            road, _, _, own_id = self._placer.locate(world, "LaneChangeTarget")
+            steps = lane_id - own_id - ((lane_id > 0) - (own_id > 0))
+            return steps if road.is_forward(own_id) else -steps
+
+        entities = {name: self._entities[name] for name in states if name}
+        return MotionReader(
+            graph=LaneGraph(scene),
+            expected=Expectation(
+                times_s=motion.times_s,
+                states=states,
+                centres_m={"": (0.0, 0.0)} | {n: e.centre_m for n, e in entities.items()},
+                sizes_m={"": scene.ego.size_m} | {n: e.size_m for n, e in entities.items()},
+                ids=ids,
+                find_point=find_point,
+            ),
+            find_middles=find_middles,
+            count_lanes=count_lanes,
+            doubts=self._doubts,
+        )
+
+    def _choose_events(self, events: list[Event]) -> list[Event]:
+        """Return the events of a motion, without trajectories before one that waits."""
+        kinds = [{kind for kind, _ in event.actions} for event in events]
+        waits = any(
+            event.time_s is None and "FollowTrajectoryAction" in own
+            for event, own in zip(events, kinds, strict=True)
+        )
+        chosen = []
+        for event, own in zip(events, kinds, strict=True):
+            is_before = waits and event.time_s is not None and "FollowTrajectoryAction" in own
+            self._doubts.assume(
+                "Before a trajectory that waits, somebody holds speed and lane", is_before
+            )
+            if own & ACTIONS.keys() and not is_before:
+                chosen.append(event)
+        return chosen
+
+    # Entities at t0
+
+    def _begin(self, name: str, action: Element) -> None:
+        """Take an action at t0: a place, a speed, or what goes on from there."""
+        kind = describe_action(action)
+        position, found = (
+            action.find("TeleportAction/Position"),
+            action.find(ACTIONS.get(kind, "-")),
+        )
+        if position is not None:
+            self._positions[name] = position
+        elif kind == "SpeedAction" and found is not None and _is_step(found):
+            self._speeds[name] = found
+        elif found is not None:
+            made = Event(
+                place=f"Init of {name[:40]}", names=(), groups=(), actions=((kind, found),)
+            )
+            self._events[name].insert(0, made)
+        else:
+            self._doubts.assume(f"{kind} at t0 was left out")
+
+    def _speed_mps(self, name: str, depth: int = 0) -> float:
+        if name not in self._speeds or depth > len(self._speeds):
+            return 0.0
+        place, action = f"speed of {name[:40]}", self._speeds[name]
+        return read_speed_target(action, lambda other: self._speed_mps(other, depth + 1), place)
+
+    def _middle(self, name: str, pose: Pose) -> FloatArray:
+        """Return x, y, heading (3,) of the middle of a box whose point of reference is there."""
+        entity = self._entities[name]
+        x_m, y_m = pose.to_parent(np.array([entity.centre_m]))[0].tolist()
+        return np.array([x_m, y_m, pose.heading_rad])
+
+    def _find_middles(self, name: str, positions: list[Element], place: str) -> FloatArray:
+        """Return the middles (V, 3) at positions; without a heading, that of the way on."""
+        poses = [self._placer.find_pose(position, place) for position in positions]
+        for row, (here, following) in enumerate(pairwise(poses)):
+            world = positions[row].find("WorldPosition")
+            way = following.x_m - here.x_m, following.y_m - here.y_m
+            if world is not None and "h" not in world.attrib and math.hypot(*way) > 1e-6:
+                poses[row] = replace(here, heading_rad=math.atan2(way[1], way[0]))
+        last = positions[-1].find("WorldPosition")
+        if last is not None and "h" not in last.attrib and len(poses) > 1:
+            poses[-1] = replace(poses[-1], heading_rad=poses[-2].heading_rad)
+        return np.array([self._middle(name, pose) for pose in poses])
+
+    def _find_ego(self, item: str | None) -> str | None:
+        if item is not None and item.startswith("@"):
+            road_id, lane_id, s_m = parse_place(item)
+            pose = self._network.road(road_id).lane_pose(lane_id, s_m)
+            self._put = pose.x_m, pose.y_m, pose.heading_rad
+            return None
+        drivers = dict.fromkeys(self.drivers)
+        if item is not None:
+            foreign.look_up(drivers, item, "item")
+            return item
+        told = [name for name in drivers if self._entities[name].is_ego]
+        named = [name for name in EGO_NAMES if name in drivers]
+        candidates = [*told, *named] or ([] if len(drivers) != 1 else [*drivers])
+        if not candidates:
+            offer = ", ".join([*drivers][:12]) or "nobody"
+            reasons = [NO_EGO.format(" or ".join(EGO_NAMES), offer), *self._doubts.notes]
+            raise fault_at("ego", "; ".join(reasons))
+        return candidates[0]
+
+    def _lights(self) -> dict[str, TrafficLight]:
+        """Return the states of lights at t0, by their ids."""
+        root, rows = self._source.root, list[tuple[str, str]]()
+        for phases in root.iterfind("RoadNetwork//TrafficSignalController"):
+            first = phases.find("Phase")
+            for state in [] if first is None else first.findall("TrafficSignalState"):
+                rows.append((state.get("trafficSignalId", ""), state.get("state", "")))
+        for action in root.iterfind(
+            "Storyboard/Init/Actions/GlobalAction//TrafficSignalStateAction"
+        ):
+            rows.append((action.get("name", ""), action.get("state", "")))
+        lights = {}
+        for name, text in rows:
+            with self._doubts.about("states of lights"):
+                lights[name] = foreign.look_up(_STATES, text.lower(), f"light {name[:40]}")
+        return lights
+
+    # Trajectories by the clock
+
+    def _read_track(self, name: str) -> None:
+        """Keep the states of somebody whose events are trajectories by the clock alone."""
+        events = self._events.get(name, [])
+        moves = [e for e in events if any(kind != GONE for kind, _ in e.actions)]
+        timed = [e for e in moves if e.time_s is not None]
+        kinds = {kind for event in moves for kind, _ in event.actions}
+        if not moves or len(timed) < len(moves) or kinds != {"FollowTrajectoryAction"}:
+            return
+        rows = np.empty((0, 4))
+        for event in sorted(timed, key=lambda event: event.time_s or 0.0):
+            (_, action), *_ = event.actions
+            positions, times_s = read_vertices(action, event.place)
+            if times_s is None:
+                return
+            start_s, timing = event.time_s or 0.0, action.find("TimeReference/Timing")
+            assert timing is not None
+            if timing.get("domainAbsoluteRelative") == "relative":
+                times_s = times_s + start_s
+            middles = self._find_middles(name, positions, event.place)
+            rows = rows[rows[:, 0] < start_s - 1e-6]
+            made = np.column_stack([times_s, middles])[times_s >= start_s - 1e-6]
+            rows = np.vstack([rows, made])
+        rows = rows[np.append(np.diff(rows[:, 0]) > 1e-9, True)]
+        if len(rows) < 2:
+            return
+        if name in self._middles and rows[0, 0] > 1e-6:
+            waits = [[s, *self._middles[name]] for s in (0.0, rows[0, 0] - 1e-3)]
+            rows = np.vstack([waits[: 1 if self._speed_mps(name) else 2], rows])
+        gone = [e for e in events if any(kind == GONE for kind, _ in e.actions)]
+        ends = [e.time_s for e in gone if e.time_s is not None]
+        # Who is taken away without a time is so where its trajectory ends.
+        gone_s = min(ends) - 1e-3 if ends else rows[-1, 0] if gone else math.inf
+        steps_m = np.hypot(*np.diff(rows[:, 1:3], axis=0).T)
+        mps = np.gradient(np.concatenate([[0.0], np.cumsum(steps_m)]), rows[:, 0])
+        states = np.column_stack([rows[:, 1:3], np.unwrap(rows[:, 3]), mps])
+        self._tracks[name] = rows[:, 0], states
+        self._gone_s[name] = gone_s
+
+    def _states(self, name: str, times_s: FloatArray) -> FloatArray:
+        """Return an entity's states (T, 4); NaN where it is not, or nobody knows."""
+        states = np.full((len(times_s), 4), np.nan)
+        if name in self._tracks:
+            track_s, rows = self._tracks[name]
+            states = read_at(rows, track_s, times_s)
+            absent = (times_s < track_s[0] - 1e-6) | (times_s > self._gone_s[name] + 1e-6)
+            states[absent] = np.nan
+        if name in self._middles:
+            states[0] = [*self._middles[name], self._speed_mps(name)]
+        return states
+
+    def _track(self, name: str, states: FloatArray) -> LoggedTrack:
+        entity: Entity = self._entities[name]
+        length_m, width_m = entity.size_m
+        return LoggedTrack(
+            name=name, type=entity.type, length_m=length_m, width_m=width_m, states=states
+        )
+
+
+def _states_by_name(motion: Motion, ids: Mapping[str, str]) -> dict[str, FloatArray]:
+    moves = {one.agent.id: one.states for one in (motion.ego, *motion.others)}
+    return {name: moves[agent_id] for name, agent_id in ids.items() if agent_id in moves}
+
+
+def _is_step(action: Element) -> bool:
+    dynamics = action.find("SpeedActionDynamics")
+    if dynamics is None or dynamics.get("dynamicsShape") == "step":
+        return True
+    return read_float(dynamics, "value", "SpeedActionDynamics") == 0.0

@@ -1,0 +1,185 @@
+"""An OpenSCENARIO file with the files that it names: its map, and its catalogs.
+
+Nothing is followed out of the folder of the file, or of the zip that it came in.
+"""
+
+import glob
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+from pathlib import Path, PurePosixPath
+from xml.etree.ElementTree import Element
+
+from augment import foreign
+from augment.foreign import Doubts, fault_at
+from augment.formats.documents import read_xml
+from augment.formats.opendrive.network import RoadNetwork
+from augment.formats.openscenario.parameters import resolve
+from augment.scene.entities import AgentType
+from augment.scene.planned_motion import EGO_ID
+
+MARKER = b"<OpenSCENARIO"
+_CATALOG = b"<Catalog "
+_MOST_FILES = 500
+_DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
+_CLASSES = {
+    **dict.fromkeys(("car", "van", "truck", "trailer", "semitrailer"), AgentType.VEHICLE),
+    **dict.fromkeys(("train", "tram"), AgentType.VEHICLE),
+    **dict.fromkeys(("bicycle", "motorbike"), AgentType.BICYCLE),
+    **{"bus": AgentType.BUS, "barrier": AgentType.BARRIER, "guardRail": AgentType.BARRIER},
+    **dict.fromkeys(("pedestrian", "wheelchair"), AgentType.PEDESTRIAN),
+}
+"""By the category; whatever else is an object."""
+SCENERY = ("building", "roadMark", "none", "wind", "patch", "gantry", "etc", "vegetation", "tree")
+_KINDS = {
+    "Vehicle": "vehicleCategory",
+    "Pedestrian": "pedestrianCategory",
+    "MiscObject": "miscObjectCategory",
+}
+EGO_NAMES = ("Ego", "ego", "EGO", "hero", EGO_ID)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entity:
+    """Somebody or something of a scenario.
+
+    Attributes:
+        centre_m: From its point of reference to its middle, ahead and to the left.
+        size_m: Length and width, zeros where the file does not tell them.
+        is_ego: Whether the file says so itself.
+    """
+
+    name: str
+    category: str
+    type: AgentType
+    centre_m: tuple[float, float]
+    size_m: tuple[float, float]
+    is_ego: bool
+
+
+def is_catalog(path: Path) -> bool:
+    """Return whether a file looks like a catalog, which is no scenario."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return _CATALOG in file.read(10_000)
+
+
+class ScenarioSource:
+    """A scenario file, its parameters replaced.
+
+    Attributes:
+        doubts: About what of it was not understood.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self.doubts = path, Doubts()
+        # In the sandbox the path is relative to the folder that holds what was sent.
+        self._folder = (path.parent if path.is_absolute() else Path()).resolve()
+        root = read_xml(path, what=foreign.WHAT)
+        header = root.find("FileHeader")
+        version = "" if header is None else f"{header.get('revMajor')}.{header.get('revMinor')}"
+        if root.tag != "OpenSCENARIO" or version not in ("1.0", "1.1", "1.2", "1.3"):
+            text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not OpenSCENARIO 1.0 to 1.3"
+            raise fault_at(path.name, text)
+        if root.find("Storyboard") is None:
+            raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
+        self.root = resolve(root, {})
+
+    def open_map(self) -> RoadNetwork:
+        """Return the map that the scenario names.
+
+        Raises:
+            InvalidDocument: It names none, it is not there, or it can't be read.
+        """
+        logic = self.root.find("RoadNetwork/LogicFile")
+        name = "" if logic is None else logic.get("filepath", "")
+        if not name:
+            raise fault_at("RoadNetwork", "names no LogicFile: a scene needs a map")
+        suffix = "" if name.lower().endswith(".xodr") else ".xodr"
+        file = self._find(f"{name}{suffix}")
+        if file is None:
+            text = (
+                f"the map {name[:80]!r} is not beside the scenario: put it there, or both in a zip"
+            )
+            raise fault_at("RoadNetwork.LogicFile", text)
+        return RoadNetwork(file)
+
+    def entities(self) -> dict[str, Entity]:
+        """Return everybody by name; who can't be read, or is scenery, is a doubt."""
+        objects = self.root.findall("Entities/ScenarioObject")
+        entities = self.doubts.read_all("entities", self._read_entity, ((o,) for o in objects))
+        return {entity.name: entity for entity in entities}
+
+    def resolve_reference(self, reference: Element) -> Element:
+        """Return the entry of a catalog that is referred to, with its parameters' values.
+
+        Raises:
+            InvalidDocument: There is no such catalog or entry.
+        """
+        catalog, entry = reference.get("catalogName", ""), reference.get("entryName", "")
+        known = [c for c in self._catalogs if c.get("name") == catalog]
+        place = f"catalog {catalog[:40]}"
+        if not known:
+            raise fault_at(
+                place, "is not in the folder of the scenario, or the zip that it came in"
+            )
+        entries = {child.get("name"): child for found in known for child in found}
+        assigned = {
+            row.get("parameterRef", "").removeprefix("$"): row.get("value", "")
+            for row in reference.findall("ParameterAssignments/ParameterAssignment")
+        }
+        return resolve(foreign.look_up(entries, entry, place), {}, assigned)
+
+    def _find(self, name: str) -> Path | None:
+        wanted = PurePosixPath(name.replace("\\", "/"))
+        if not name.isprintable():
+            return None
+        beside = (self._within(f"{depth[:-1]}{glob.escape(wanted.name)}") for depth in _DEPTHS)
+        candidates = [self._path.parent / wanted, *(file for files in beside for file in files)]
+        inside = (file.resolve() for file in candidates)
+        return next((f for f in inside if f.is_relative_to(self._folder) and f.is_file()), None)
+
+    def _within(self, pattern: str) -> list[Path]:
+        return sorted(islice(self._folder.glob(pattern), _MOST_FILES))
+
+    @cached_property
+    def _catalogs(self) -> list[Element]:
+        """The catalogs in the folder, as their files have them."""
+        catalogs = []
+        for depth in _DEPTHS:
+            for file in self._within(f"{depth}.xosc"):
+                if file.resolve().is_relative_to(self._folder) and is_catalog(file):
+                    with self.doubts.about("catalogs"):
+                        catalogs += read_xml(file, what=foreign.WHAT).findall("Catalog")
+        return catalogs
+
+    def _read_entity(self, element: Element) -> Entity | None:
+        name = element.get("name", "")
+        place = f"entity {name[:40]}"
+        reference = element.find("CatalogReference")
+        holder = element
+        if reference is not None:
+            holder = Element("ScenarioObject")
+            holder.append(self.resolve_reference(reference))
+        body = next((child for child in holder if child.tag in _KINDS), None)
+        if body is None:
+            raise fault_at(place, f"needs one of {', '.join(_KINDS)} or a CatalogReference")
+        category = body.get(_KINDS[body.tag], "") or body.tag.lower()
+        if category in SCENERY:
+            self.doubts.assume(f"A {category} was left out: it is scenery")
+            return None
+        centre, size = body.find("BoundingBox/Center"), body.find("BoundingBox/Dimensions")
+        ahead_m, left_m, length_m, width_m = (
+            0.0 if box is None else foreign.read_number(box.get(n, "0"), f"{place}.{n}")
+            for box, n in ((centre, "x"), (centre, "y"), (size, "length"), (size, "width"))
+        )
+        properties = body.findall("Properties/Property")
+        return Entity(
+            name=name,
+            category=category,
+            type=_CLASSES.get(category, AgentType.GENERIC_OBJECT),
+            centre_m=(ahead_m, left_m),
+            size_m=(length_m, width_m),
+            is_ego=any(p.get("value") == "ego_vehicle" for p in properties),
+        )

@@ -1,0 +1,466 @@
+"""OpenSCENARIO files are read: places and motions as formulas have them, the rest is noted."""
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from augment.errors import InvalidDocument
+from augment.formats.openscenario.parameters import resolve_text
+from augment.formats.openscenario.scenario import OpenScenario
+from augment.formats.openscenario.writer import write as write_scenarios
+from augment.formats.reading import Reading
+from augment.formats.writing import Cell
+from augment.scene.entities import AgentType, Modification, TrafficLight
+from augment.scene.motion import Motion, find_motion
+from tests.formats.cells import cell, recorded_street
+from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
+from tests.formats.openscenario_files import (
+    BOX,
+    CAR,
+    STEP,
+    by_entity,
+    by_time,
+    catalog,
+    event,
+    scenario,
+    speed,
+    write,
+)
+from tests.formats.test_opendrive import JUNCTION, SIGNAL
+from tests.formats.test_openscenario_writer import scene_of_motions
+from tests.scenes import vehicle
+
+
+def read(file: Path, item: str | None = None) -> Reading:
+    return OpenScenario().read(file, item=item, frame=None, name="made")
+
+
+def moves(reading: Reading) -> Motion:
+    return find_motion(reading.scene, recording=reading.recording, with_later=True)
+
+
+def pose_of_other(reading: Reading) -> list[float]:
+    """Where the other's point of reference is in the map's frame; its middle is 1.4 m ahead."""
+    (other,) = reading.scene.agents
+    origin = reading.scene.origin.pose
+    ((x_m, y_m),) = origin.to_parent(np.array([[other.x_m, other.y_m]])).tolist()
+    heading_rad = other.heading_rad + origin.heading_rad
+    return [x_m - 1.4 * math.cos(heading_rad), y_m - 1.4 * math.sin(heading_rad), heading_rad]
+
+
+@pytest.mark.parametrize(
+    ("position", "expected"),
+    [
+        ('<WorldPosition x="50" y="1" h="0.5"/>', (50.0, 1.0, 0.5)),
+        ('<LanePosition roadId="1" laneId="-2" s="50" offset="0.5"/>', (50.0, -4.75, 0.0)),
+        ('<LanePosition roadId="1" laneId="1" s="50"/>', (50.0, 1.75, math.pi)),
+        ('<LanePosition roadId="1" laneId="-1" s="50"><Orientation type="relative" h="0.1"/>'
+         "</LanePosition>", (50.0, -1.75, 0.1)),
+        ('<LanePosition roadId="1" laneId="1" s="50"><Orientation type="absolute" h="0.1"/>'
+         "</LanePosition>", (50.0, 1.75, 0.1)),
+        ('<RoadPosition roadId="1" s="60" t="-3"/>', (60.0, -3.0, 0.0)),
+        ('<RelativeLanePosition entityRef="Ego" dLane="-1" ds="15"/>', (35.0, -5.25, 0.0)),
+        ('<RelativeLanePosition entityRef="Ego" dLane="1" dsLane="15" offset="0.2"/>',
+         (35.0, 1.95, math.pi)),
+        ('<RelativeRoadPosition entityRef="Ego" ds="10" dt="-2"/>', (30.0, -3.75, 0.0)),
+        ('<RelativeObjectPosition entityRef="Ego" dx="10" dy="3"/>', (30.0, 1.25, 0.0)),
+        ('<RelativeWorldPosition entityRef="Ego" dx="-5" dy="1"/>', (15.0, -0.75, 0.0)),
+    ],
+)  # fmt: skip
+def test_a_position_is_where_a_formula_has_it(
+    position: str, expected: tuple[float, ...], tmp_path: Path
+) -> None:
+    reading = read(write(tmp_path, scenario(other_at=position)))
+    assert pose_of_other(reading) == pytest.approx(expected, abs=2e-3)
+    assert reading.scene.agents[0].size_m == (5.0, 2.0)
+    assert reading.scene.ego.speed_mps == 10.0
+
+
+def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
+    joined = '<link><{} elementType="road" elementId="{}" contactPoint="{}"/></link>'
+    width = f'<link><predecessor id="-1"/><successor id="-1"/></link>{WIDTH}'
+    second = ROAD.format(
+        **{"id": "2", "junction": "-1", "x": "100", "shape": "<line/>", "more": "", "type": ""},
+        **{"offset": "", "end": "", "lanes": LANES.format(width=width, outer="")},
+        link=joined.format("predecessor", "1", "end"),
+    )
+    first = joined.format("successor", "2", "start")
+    roads = by_hand(width=width, link=first, rest=second)
+    text = scenario(other_at='<RelativeLanePosition entityRef="Ego" dLane="0" ds="95"/>')
+    file = write(tmp_path, text, **{"roads.xodr": roads})
+    assert pose_of_other(read(file)) == pytest.approx([115.0, -1.75, 0.0], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("plain", "plain"),
+        ("$v", "7.5"),
+        ("${$v * 2 + 1}", "16"),
+        ("${-$v % 2}", "-1.5"),
+        ("${round(pow($v, 2)) + max(1, 2)}", "58"),
+        ("${$on and $v > 7}", "true"),
+        ("${not $on}", "false"),
+        ("${sqrt(16) / 8}", "0.5"),
+    ],
+)
+def test_an_expression_has_the_value_of_the_standard(text: str, value: str) -> None:
+    assert resolve_text(text, {"v": "7.5", "on": "true"}, "here") == value
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("$w", "unknown parameter 'w'; known here: v"),
+        ("${$v", "needs ${...}"),
+        ("${1 / 0}", "has no value"),
+        ("${9 ** 9 ** 9 ** 9}", "has no value"),
+        ("${__import__('os')}", "has no value"),
+        ("${$v.real}", "more than numbers"),
+        ("${" + "(" * 300 + "1" + ")" * 300 + "}", "at most 500 characters"),
+        ("${'a' * 10}", "more than numbers"),
+    ],
+)
+def test_an_expression_without_a_value_is_refused(text: str, says: str) -> None:
+    with pytest.raises(InvalidDocument, match=re.escape(says)):
+        resolve_text(text, {"v": "7.5"}, "here")
+
+
+def test_parameters_hold_in_what_declares_them(tmp_path: Path) -> None:
+    declared = "".join(
+        f'<ParameterDeclaration name="{name}" parameterType="double" value="{value}"/>'
+        for name, value in (("s", "30"), ("v", "${$s / 10}"))
+    )
+    head = f"<ParameterDeclarations>{declared}</ParameterDeclarations>"
+    at = '<LanePosition roadId="1" laneId="${-1}" s="${$s + 20}"/>'
+    reading = read(write(tmp_path, scenario(head=head, other_at=at, other_does=(speed("$v"),))))
+    assert pose_of_other(reading) == pytest.approx([50.0, -1.75, 0.0], abs=2e-3)
+    assert reading.scene.agents[0].speed_mps == 3.0
+
+
+def test_a_catalogs_entry_has_the_box_that_was_assigned(tmp_path: Path) -> None:
+    entry = (
+        '<Vehicle name="lorry" vehicleCategory="bus"><ParameterDeclarations><ParameterDeclaration '
+        'name="long" parameterType="double" value="9"/></ParameterDeclarations>'
+        + BOX.replace('"5"', '"$long"')
+        + "</Vehicle>"
+    )
+    assigned = '<ParameterAssignment parameterRef="long" value="12"/>'
+    refers = '<CatalogReference catalogName="Cars" entryName="{}">{}</CatalogReference>'
+    other = refers.format("lorry", f"<ParameterAssignments>{assigned}</ParameterAssignments>")
+    file = write(tmp_path, scenario(other=other), **{"sub/cars.xosc": catalog(entry)})
+    (agent,) = read(file).scene.agents
+    assert (agent.type, agent.size_m) == (AgentType.BUS, (12.0, 2.0))
+    for wrong, says in (
+        (refers.format("van", ""), "catalog Cars: unknown 'van'; known: lorry"),
+        (other.replace("Cars", "Vans"), "catalog Vans: is not in the folder of the scenario"),
+    ):
+        reading = read(write(tmp_path, scenario(other=wrong)))
+        assert any(says in note for note in reading.notes)
+        assert not reading.scene.agents
+
+
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        (CAR, AgentType.VEHICLE),
+        (CAR.replace('"car">', '"motorbike">'), AgentType.BICYCLE),
+        (f'<Pedestrian pedestrianCategory="pedestrian">{BOX}</Pedestrian>', AgentType.PEDESTRIAN),
+        (f'<MiscObject miscObjectCategory="barrier">{BOX}</MiscObject>', AgentType.BARRIER),
+        (
+            f'<MiscObject miscObjectCategory="obstacle">{BOX}</MiscObject>',
+            AgentType.GENERIC_OBJECT,
+        ),
+    ],
+)
+def test_a_category_is_a_class_of_ours(body: str, kind: AgentType, tmp_path: Path) -> None:
+    (agent,) = read(write(tmp_path, scenario(other=body))).scene.agents
+    assert agent.type is kind
+
+
+RELATIVE = (
+    f"<LongitudinalAction><SpeedAction>{STEP}<SpeedActionTarget><RelativeTargetSpeed "
+    'entityRef="Ego" value="{}" speedTargetValueType="{}"/></SpeedActionTarget></SpeedAction>'
+    "</LongitudinalAction>"
+)
+
+
+@pytest.mark.parametrize(("value", "kind", "mps"), [(-2, "delta", 8.0), (0.5, "factor", 5.0)])
+def test_a_speed_may_be_relative(value: float, kind: str, mps: float, tmp_path: Path) -> None:
+    does = RELATIVE.format(value, kind)
+    (agent,) = read(write(tmp_path, scenario(other_does=(does,)))).scene.agents
+    assert agent.speed_mps == mps
+
+
+BRAKES = speed(0, STEP.replace("step", "linear").replace('"0"', '"2"'))
+GAP = (
+    '<RelativeDistanceCondition entityRef="Ego" value="{}" rule="lessThan" freespace="{}" '
+    'relativeDistanceType="longitudinal"/>'
+)
+
+
+@pytest.mark.parametrize(
+    ("condition", "started_s"),
+    [
+        (by_time(2.5), 2.5),
+        # The ego drives from 20 at 10 m/s; the other from 80 at 4 m/s: 60 m, closing at 6 m/s.
+        (by_entity(GAP.format(30.3, "false")), 5.0),
+        (by_entity(GAP.format(25.3, "true")), 5.0),
+        (by_entity('<TimeHeadwayCondition entityRef="Other" value="3.03" rule="lessThan" '
+                   'freespace="false"/>', "Ego"), 5.0),
+        (by_entity('<TimeToCollisionCondition value="5.05" rule="lessThan" freespace="false">'
+                   '<TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
+                   "</TimeToCollisionConditionTarget></TimeToCollisionCondition>", "Ego"), 5.0),
+        (by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego"), 2.0),
+        (by_entity('<TraveledDistanceCondition value="19.9"/>'), 5.0),
+        (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
+                   'y="-1.75"/></Position></ReachPositionCondition>', "Ego"), 3.0),
+        (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
+                   'y="-1.75"/></Position></ReachPositionCondition>', "Ego") + by_time(3.35), 3.4),
+    ],
+)  # fmt: skip
+def test_a_condition_starts_a_motion_when_a_formula_says(
+    condition: str, started_s: float, tmp_path: Path
+) -> None:
+    reading = read(write(tmp_path, scenario(event(BRAKES, condition), other_does=(speed(4),))))
+    (other,) = moves(reading).others
+    assert other.started_s == pytest.approx(started_s, abs=0.01)
+    # Over 2 s from 4 m/s to a stop.
+    x_m = other.states[:, 0] - other.states[0, 0]
+    assert x_m[-1] == pytest.approx(4.0 * started_s + 4.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("shape", "dimension", "value", "gone_m"),
+    [
+        ("linear", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
+        ("linear", "rate", 4, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
+        ("linear", "distance", 16, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
+        ("sinusoidal", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
+        ("step", "time", 0, 4.0 * 1.0 + 12.0 * 4.0),
+    ],
+)
+def test_a_speed_is_reached_by_its_dynamics(
+    shape: str, dimension: str, value: float, gone_m: float, tmp_path: Path
+) -> None:
+    dynamics = STEP.replace("step", shape).replace('"time"', f'"{dimension}"')
+    action = speed(12, dynamics.replace('"0"', f'"{value}"'))
+    file = write(tmp_path, scenario(event(action, by_time(1)), other_does=(speed(4),)))
+    (other,) = moves(read(file)).others
+    assert other.states[50, 0] - other.states[0, 0] == pytest.approx(gone_m, abs=0.05)
+
+
+CHANGE = (
+    '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="sinusoidal" '
+    'dynamicsDimension="{}" value="{}"/><LaneChangeTarget>{}</LaneChangeTarget>'
+    "</LaneChangeAction></LateralAction>"
+)
+RIGHT = '<RelativeTargetLane entityRef="Other" value="-1"/>'
+AFTER = (
+    '<Condition delay="0"><ByValueCondition><StoryboardElementStateCondition storyboardElementRef='
+    '"acts" storyboardElementType="event" state="completeState"/></ByValueCondition></Condition>'
+)
+
+
+@pytest.mark.parametrize(
+    "target", [RIGHT, '<AbsoluteTargetLane value="-2"/>'], ids=["relative", "absolute"]
+)
+@pytest.mark.parametrize(("dimension", "value"), [("time", 3), ("distance", 24)])
+def test_a_lane_change_takes_its_time_or_way(
+    target: str, dimension: str, value: int, tmp_path: Path
+) -> None:
+    change = event(CHANGE.format(dimension, value, target), by_time(1))
+    file = write(tmp_path, scenario(change, other_does=(speed(8),)))
+    (other,) = moves(read(file)).others
+    # From the lane of the ego at once; half of it after 1.5 s, and all of it after 3 s.
+    assert other.states[[10, 25, 41], 1] == pytest.approx([0.0, -1.75, -3.5], abs=0.06)
+
+
+def test_events_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
+    first = event(speed(12, STEP.replace("step", "linear").replace('"0"', '"2"')), by_time(1))
+    second = event(CHANGE.format("time", 2, RIGHT), AFTER, name="changes")
+    third = event(BRAKES, by_time(6), name="brakes")
+    file = write(tmp_path, scenario(first, second, third, other_does=(speed(4),)))
+    reading = read(file)
+    (other,) = moves(reading).others
+    x_m, y_m = (other.states[:, :2] - other.states[0, :2]).T
+    assert x_m[30] == pytest.approx(4.0 + 16.0, abs=0.01)
+    assert y_m[[30, 51]] == pytest.approx([0.0, -3.5], abs=0.05)
+    assert x_m[-1] == pytest.approx(4.0 + 16.0 + 36.0 + 12.0, abs=0.5)
+    assert not [note for note in reading.notes if "Not understood" in note]
+
+
+FOLLOW = (
+    '<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape><Polyline>'
+    "{}</Polyline></Shape></Trajectory><TimeReference>{}</TimeReference>"
+    '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>'
+)
+TIMING = '<Timing domainAbsoluteRelative="{}" scale="1" offset="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("times", "condition"),
+    [
+        (TIMING.format("relative"), by_time(2)),
+        (TIMING.format("absolute"), by_time(2)),
+        ("<None/>", by_time(2)),
+        (TIMING.format("relative"),
+         by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego")),
+    ],
+)  # fmt: skip
+def test_a_trajectory_is_followed_by_its_times_or_speed(
+    times: str, condition: str, tmp_path: Path
+) -> None:
+    since_s = 2 if "absolute" in times else 0
+    vertices = "".join(
+        f'<Vertex time="{since_s + n}"><Position><WorldPosition x="{88 + 4 * n}" y="-1.75" h="0"/>'
+        "</Position></Vertex>"
+        for n in range(6)
+    )
+    action = event(FOLLOW.format(vertices, times), condition)
+    (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
+    gone_m = other.states[:, 0] - other.states[0, 0]
+    # 8 m by then, and 4 m a second: to the last point after 7 s.
+    assert gone_m[[10, 20, 30, 60, 70]] == pytest.approx([4.0, 8.0, 12.0, 24.0, 28.0], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("made", "note"),
+    [
+        (scenario(event("<ControllerAction/>")), "ControllerAction was left out, first in event"),
+        (scenario(event("<RoutingAction><AssignRouteAction/></RoutingAction>")),
+         "AssignRouteAction was left out"),
+        (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>'))),
+         "event acts: unknown 'StandStillCondition'"),
+        (scenario(event(BRAKES, by_entity('<SpeedCondition value="99" rule="greaterThan"/>'))),
+         "its conditions never hold"),
+        (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "1")))),
+         "there is no lane 1 lanes to the left"),
+        (scenario(event(CHANGE.format("time", 2, RIGHT.replace("Other", "Ego")))),
+         "a lane relative to somebody else's is not read"),
+        (scenario(event(FOLLOW.format("", "<None/>"))), "needs a Polyline of two vertices"),
+        (scenario(event(BRAKES, AFTER.replace("acts", "x"))), "event acts: unknown 'x'"),
+        (scenario(event(speed(-3))), "backwards, is not read"),
+        (scenario(other_at='<RoutePosition/>'), "entity Other: unknown 'RoutePosition'"),
+        (scenario(other_at='<LanePosition roadId="1" laneId="-1" s="900"/>'),
+         "road 1.s: expected a finite number from -0.01 to 400.01"),
+        (scenario(other_at='<RelativeObjectPosition entityRef="Other" dx="1" dy="0"/>'),
+         "refers to itself in a circle"),
+        (scenario(other='<MiscObject miscObjectCategory="tree"/>'), "A tree was left out"),
+        (scenario(other_does=("<ControllerAction/>",)), "ControllerAction at t0 was left out"),
+    ],
+)  # fmt: skip
+def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path: Path) -> None:
+    notes = read(write(tmp_path, made)).notes
+    assert any(note in text for text in notes), notes
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (scenario(logic="Town03"), "the map 'Town03' is not beside the scenario"),
+        (scenario(logic="../out.xodr"), "the map '../out.xodr' is not beside"),
+        (scenario(logic="/etc/passwd"), "is not beside"),
+        (scenario(logic=""), "names no LogicFile"),
+        (scenario(ego="A"), "nobody is called Ego or ego or EGO or hero"),
+        (scenario().replace('Minor="1"', 'Minor="9"'), "of version '1.9'"),
+        (scenario(logic="$map"), "LogicFile.filepath: unknown parameter 'map'"),
+        (catalog(""), "has no Storyboard"),
+        ("<!DOCTYPE a [<!ENTITY b 'c'>]><OpenSCENARIO>&b;</OpenSCENARIO>", "a document type"),
+    ],
+)
+def test_a_scenario_that_can_not_be_read_is_refused(made: str, says: str, tmp_path: Path) -> None:
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    (tmp_path / "out.xodr").write_text("<OpenDRIVE/>")
+    with pytest.raises(InvalidDocument, match=re.escape(says)):
+        read(write(folder, made))
+
+
+def test_the_ego_is_who_is_asked_for(tmp_path: Path) -> None:
+    file = write(tmp_path, scenario())
+    assert [moment.item for moment in OpenScenario().moments(file, every_s=1.0)] == [
+        "Ego",
+        "Other",
+    ]
+    asked = read(file, "Other")
+    assert asked.scene.origin.x_m == pytest.approx(81.4)
+    put = read(file, "@1,-2,30")
+    assert put.scene.origin.x_m == pytest.approx(30.0)
+    assert len(put.scene.agents) == 2
+    with pytest.raises(InvalidDocument, match="item: unknown 'Nobody'; known: Ego, Other"):
+        read(file, "Nobody")
+
+
+def test_a_light_shows_what_its_controller_or_action_says(tmp_path: Path) -> None:
+    action = (
+        "<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction "
+        'name="7" state="red"/></TrafficSignalAction></InfrastructureAction></GlobalAction>'
+    )
+    roads = {"roads.xodr": by_hand(end=SIGNAL, rest=JUNCTION)}
+    reading = read(write(tmp_path, scenario(more=action), **roads))
+    lights = {way.traffic_light for way in reading.scene.connectors}
+    assert lights == {TrafficLight.RED, TrafficLight.NONE}
+
+
+# There and back
+
+
+def write_and_read(given: Cell, folder: Path) -> Reading:
+    made = write_scenarios([given]).files
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    return read(next(folder / name for name in made if name.endswith(".xosc")))
+
+
+def recorded_cell() -> Cell:
+    before, recording = recorded_street()
+    return cell(before, recording=recording, keeps_traffic=True, added=())
+
+
+@pytest.mark.parametrize("make", [cell, scene_of_motions, recorded_cell])
+def test_our_own_files_come_back_whole(make: object, tmp_path: Path) -> None:
+    given: Cell = make()  # type: ignore[operator]
+    reading = write_and_read(given, tmp_path)
+    back = moves(reading)
+    ours = {reading.names.get(m.agent.id, "Agent1"): m for m in (back.ego, *back.others)}
+    for movement in (given.motion.ego, *given.motion.others):
+        agent = movement.agent
+        if math.hypot(agent.x_m, agent.y_m) > 150.0:
+            continue
+        read_back = ours[agent.id]
+        assert read_back.agent.size_m == pytest.approx(agent.size_m, abs=1e-3)
+        steps = len(movement.states)
+        gaps_m = np.hypot(*(movement.states[:, :2] - read_back.states[:steps, :2]).T)
+        here = ~np.isnan(movement.states[:, 0])
+        assert (here == ~np.isnan(read_back.states[:steps, 0])).all(), agent.id
+        # Past a corner that lies between two written points it cuts at most 2 cm.
+        assert np.nanmax(gaps_m) < 0.02, agent.id
+        assert np.nanpercentile(gaps_m, 95) < 0.01, agent.id
+        if read_back.started_s is not None:
+            assert read_back.started_s == pytest.approx(movement.started_s, abs=0.01)
+    assert len(reading.scene.lanes) == len(given.scene.lanes)
+    for lane, before in zip(reading.scene.lanes, given.scene.lanes, strict=True):
+        assert lane.width_m == pytest.approx(before.width_m, abs=0.01)
+
+
+def test_an_edit_is_written_back_without_touching_others(tmp_path: Path) -> None:
+    change = event(CHANGE.format("time", 3, RIGHT), by_time(1))
+    source = read(write(tmp_path, scenario(change, other_does=(speed(8),))))
+    before = moves(source)
+    added = (vehicle("Agent9", 30.0, -3.5, 0.0),)
+    given = cell(source.scene, added=added, keeps_traffic=True, recording=source.recording)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    after = write_and_read(given, folder)
+    assert {agent.size_m for agent in after.scene.agents} == {(5.0, 2.0), added[0].size_m}
+    (name,) = (n for n, theirs in after.names.items() if theirs == before.others[0].agent.id)
+    (kept,) = (one for one in moves(after).others if one.agent.id == name)
+    steps = min(len(kept.states), len(before.others[0].states))
+    gaps_m = np.hypot(*(kept.states[:steps, :2] - before.others[0].states[:steps, :2]).T)
+    assert np.nanmax(gaps_m) < 0.01
+    assert replace(given, modification=Modification()).after == source.scene
