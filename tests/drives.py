@@ -33,11 +33,14 @@ def short_drive() -> tuple[bytes, dict[str, Any]]:
     return zlib.compress(trace), document
 
 
-def driven(job: GenerationJob, *, before: float = 1.0, after: float = 0.25) -> list[Simulation]:
+def driven(
+    job: GenerationJob, *, before: float = 1.0, after: float = 0.25, planner: str = "pdm-closed"
+) -> list[Simulation]:
     """Every outcome of a job as driven, with these scores; the augmentations' rows last."""
-    simulations.plan_job(job=job, options=Options())
+    options = Options(planner=planner)
+    simulations.plan_job(job=job, options=options)
     trace, document = short_drive()
-    rows = list(Simulation.objects.order_by("augmentation_id", "pk"))
+    rows = list(options.of(Simulation.objects.order_by("augmentation_id", "pk")))
     for row in rows:
         score = before if row.subject == Simulation.Subject.UNMODIFIED else after
         row.state, row.trace, row.document = Simulation.State.DONE, trace, document

@@ -205,6 +205,12 @@ def sheet_json(sheet: Sheet) -> bytes:
     return json_bytes({**head, **sheet.facts, sheet.key: rows})
 
 
+def sheet_jsonl(sheet: Sheet) -> bytes:
+    """Return one object a line."""
+    objects = (dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows)
+    return "".join(f"{json.dumps(one, ensure_ascii=False)}\n" for one in objects).encode()
+
+
 def sheet_parquet(sheet: Sheet) -> bytes:
     """Return the rows as typed columns."""
     import pyarrow

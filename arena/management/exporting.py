@@ -13,6 +13,7 @@ from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
+from arena.results.exports.preferences import PREFERENCE_FORMATS, preference_sheet
 from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHARTS, RATING_FILES
@@ -20,9 +21,10 @@ from arena.results.queries.access import snapshot_to_export
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, check_names
-from augment.services.driving import options_driven, simulations
+from augment.models import BaseScene
+from augment.services.driving import options_driven, simulations, ways_to_compare
 from augment.services.driving.simulations import SCORES
-from augment.services.judging import scenario_export
+from augment.services.judging import list_warnings, scenario_export, scene_source
 from augment.services.judging.analyses import ANALYSES
 from augment.services.judging.displacement import By
 from augment.services.running import find_job
@@ -117,6 +119,16 @@ def _write_votes(options: Chosen, say: Say) -> ExportedFile:
     return _write_rating(options, say)
 
 
+def _write_preferences(options: Chosen, say: Say) -> ExportedFile:
+    """Write the votes of a closed study with what was shown, and warn of licences."""
+    study = study_named(options["study"])
+    scenes = BaseScene.objects.filter(scenarios__studies=study).distinct()
+    for warning in list_warnings(map(scene_source, scenes.defer("document", "recording"))):
+        say(f"Warning: {warning}")
+    exported = Export(PREFERENCE_FORMATS, preference_sheet)
+    return _write(exported, options["format"], lambda: study, pairs=options["pairs"])
+
+
 # --- Of a job ------------------------------------------------------------------------------------
 
 
@@ -131,8 +143,11 @@ def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:
-    """Write mean scores of the drives that were made just so."""
+    """Write mean scores of the drives that were made just so, or several planners' together."""
     job = find_job(options["job"])
+    if options["planners"]:
+        ways = ways_to_compare(job, options["planners"])
+        return _write_table(f"planners-{options['score']}", options, options=ways)
     how = simulations.Options(
         planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
     )
@@ -212,6 +227,13 @@ KINDS: dict[str, ExportKind] = {
     "votes": ExportKind(
         "study", RATING_FILES["votes"].help, _write_votes, _format(VOTE_FORMATS) | _OF_RATING
     ),
+    "preferences": ExportKind(
+        "study",
+        "the votes of a closed study with scenes and modifications, to train and test on",
+        _write_preferences,
+        _option("--pairs", "only preferences, as chosen and rejected", action="store_true")
+        | _format(PREFERENCE_FORMATS, default="jsonl"),
+    ),
     "chart": ExportKind(
         "study",
         "a chart of the newest rating beside the table's",
@@ -243,6 +265,11 @@ KINDS: dict[str, ExportKind] = {
         _option("--score", "whose rules", choices=list(SCORES), default="nuplan")
         | _option("--planner", _DRIVEN, default="pdm-closed")
         | _option("--offsets", _DRIVEN, default="paper")
+        | _option(
+            "--planners",
+            "compare several, each a PLANNER or a PLANNER:OFFSETS, replayed, on the same drives",
+            nargs="+",
+        )
         | _option("--reactive", _DRIVEN, action="store_true")
         | _format(JOB_FILES["driving-nuplan"].formats),
     ),

@@ -14,6 +14,7 @@ from typing import Annotated, Any, TypeVar, cast
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from arena.rating.agreement import AgreementLine
+from arena.rating.influence import Fragility
 from arena.rating.lines import Line
 from arena.rating.ranking import PairP
 from arena.rating.reliability import Agreement, Rater, Repeats
@@ -157,6 +158,7 @@ class Trust:
     Attributes:
         tie_share: From 0 to 1.
         strength: None where no vote has one.
+        fragility: Votes on which the first place hangs; None where none change it.
     """
 
     tie_share: float | None = None
@@ -165,6 +167,7 @@ class Trust:
     repeats: Repeats | None = None
     raters: tuple[PanelRater, ...] = ()
     strength: StrengthCheck | None = field(default=None, metadata=_SINCE_5)
+    fragility: Fragility | None = field(default=None, metadata=_WHERE_SET)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,11 +1,18 @@
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.comparisons import Comparisons, count_wins
-from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
+from arena.rating.comparisons import Comparisons, count_wins, select_votes
+from arena.rating.influence import (
+    bradley_terry,
+    rank_changes,
+    votes_behind_first,
+    without_each_expert,
+)
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.side import ALIKE, ONE_EXPERT, ONE_SIDED, UNDETERMINED, side_bias
 from bench.claims import AFTER, BEFORE, measure_sides, side_worlds
@@ -131,3 +138,33 @@ def test_wins_and_ties_count_both_ways() -> None:
     wins, ties = count_wins(votes)
     assert wins.tolist() == [[0, 3, 0], [3, 0, 0], [0, 0, 0]]
     assert ties.tolist() == [[0, 1, 0], [1, 0, 0], [0, 0, 0]]
+
+
+# --- Single votes ------------------------------------------------------------------------------
+
+
+def first_of(votes: Comparisons, rows: Sequence[int]) -> str | None:
+    strengths = bradley_terry(select_votes(votes, np.array(rows, dtype=np.int64)))
+    return None if strengths is None else votes.names[int(strengths.argmax())]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_smaller_set_of_votes_changes_the_first_place_and_that_one_does(seed: int) -> None:
+    votes = simulated([1030.0, 1000, 970], 16, seed, ties=0.2)
+    everybody = np.ones(len(votes), dtype=np.bool_)
+    found, first = votes_behind_first(votes, everybody), first_of(votes, range(len(votes)))
+    changing = [
+        size
+        for size in range(1, 5)
+        for dropped in combinations(range(len(votes)), size)
+        if first_of(votes, [*{*range(len(votes))} - {*dropped}]) not in (None, first)
+    ]
+    assert (found.votes if found and found.votes < 5 else None) == (min(changing, default=None))
+
+
+def test_ties_that_nobody_cast_are_never_dropped() -> None:
+    votes = simulated([1030.0, 1000, 970], 60, 1, ties=0.2)
+    assert votes_behind_first(votes, np.zeros(60, dtype=np.bool_)) is None
+    found = votes_behind_first(votes, np.ones(60, dtype=np.bool_))
+    assert found is not None
+    assert found.cast == 60

@@ -7,7 +7,7 @@ from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, escape, latex_values
 from arena.jobs.exports.displacement import SIMULATED_NOTE
-from augment.services.driving import CLOSE_M, DrivingLine, DrivingScores
+from augment.services.driving import CLOSE_M, DrivingLine, DrivingScores, PlannerLine, PlannerTable
 from augment.services.scenarios import ScenarioType, in_type_order, type_choices
 
 SCORE_LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
@@ -61,6 +61,10 @@ def _percent(share: float | None) -> float | None:
 
 def _to_percent(kind: str, line: DrivingLine) -> float | None:
     return _percent(line.by_type[kind])
+
+
+def _to_estimate(name: str, line: PlannerLine) -> float | None:
+    return _percent(getattr(line.estimate, name))
 
 
 COLUMNS: Columns = {
@@ -122,3 +126,93 @@ def driving_latex(table: DrivingScores) -> bytes:
 
 
 FORMATS = table_formats(driving_sheet) | formats(latex=driving_latex)
+
+
+# --- Planners beside each other ----------------------------------------------------------------
+
+FEW_SCENES = 12
+"""With fewer, intervals of high means hold less often than they say (docs/simulation.md)."""
+
+
+def planner_notes(table: PlannerTable) -> list[str]:
+    """Return the sentences that belong beneath every form of the table of planners."""
+    few = table.fewest_scenes < FEW_SCENES
+    return [
+        f"Mean of {SCORE_LABELS[table.score]}'s score, drives of version {table.version}; 95 % "
+        "intervals clustered by scene. Planners with a common letter can't be told apart at 5 % "
+        "for all differences of the table (paired t tests on the same drives, Holm).",
+        *([f"Some rest on {table.fewest_scenes} scenes only."] if few else []),
+        DIFFERENCE,
+    ]
+
+
+def planner_context(table: PlannerTable) -> dict[str, Any]:
+    """Return the table of planners as pages show it: a row a contestant, a column a planner."""
+    rows = []
+    for lines in table.groups:
+        means = {line.planner: line for line in lines if not line.against}
+        rows.append((lines[0], [means.get(name) for name in table.planners]))
+    pairs = [line for lines in table.groups for line in lines if line.against]
+    return {"table": table, "rows": rows, "pairs": pairs, "notes": planner_notes(table)}
+
+
+PLANNER_COLUMNS: Columns = {
+    "scenarios": (show_name, Dtype.TEXT),
+    "slug": ("contestant.slug", Dtype.TEXT),
+    "simulated": ("is_simulated", Dtype.YES_NO),
+    **Dtype.TEXT.columns("planner", "against"),
+    **{
+        f"{name}_percent": (partial(_to_estimate, name), Dtype.NUMBER)
+        for name in ("mean", "low", "high")
+    },
+    "p": ("estimate.p", Dtype.NUMBER),
+    **Dtype.NUMBER.columns("p_holm"),
+    **Dtype.TEXT.columns("sets"),
+    **Dtype.WHOLE.columns("drives", "scenes", of="estimate"),
+}
+"""A row with `against` is a difference of two planners on the same drives."""
+
+
+def planner_sheet(table: PlannerTable) -> Sheet:
+    """Return a row a planner, then a row a pair of them, for each contestant."""
+    lines = [line for group in table.groups for line in group]
+    facts = {"title": table.title, "score": table.score, "version": table.version}
+    facts |= {"planners": table.planners, "notes": planner_notes(table)}
+    columns = PLANNER_COLUMNS
+    return make_sheet(
+        lines, columns, digits=6, name="planners", key="lines", number=".4g", facts=facts
+    )
+
+
+def planner_latex(table: PlannerTable) -> bytes:
+    """Return a row a contestant and a column a planner: mean, interval, letters."""
+
+    def show(place: int, row: tuple[PlannerLine, list[PlannerLine | None]]) -> str | None:
+        line = row[1][place]
+        return None if line is None else estimate_text(line)
+
+    columns: ValueColumns = {
+        "Scenarios": lambda row: show_name(row[0]),
+        "n": lambda row: row[0].estimate.drives,
+        **{name: partial(show, place) for place, name in enumerate(table.planners)},
+    }
+    return latex_values(
+        planner_context(table)["rows"],
+        columns,
+        comments=planner_notes(table),
+        caption=r"Mean driving score [\%] with 95\% intervals clustered by scene; planners with a "
+        r"common letter can't be told apart (Holm, 5\%).",
+        label="tab:planners",
+    )
+
+
+def estimate_text(line: PlannerLine) -> str:
+    """Return mean, interval and letters, in percent."""
+    estimate = line.estimate
+    text = f"{100.0 * estimate.mean:.1f}"
+    if estimate.low is not None and estimate.high is not None:
+        text += f" [{100.0 * estimate.low:.1f}, {100.0 * estimate.high:.1f}]"
+    return f"{text} {line.sets}"
+
+
+PLANNER_FORMATS = table_formats(planner_sheet) | formats(latex=planner_latex)

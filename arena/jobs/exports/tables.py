@@ -9,7 +9,7 @@ from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, 
 from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
-from augment.services.driving import scores_of_job
+from augment.services.driving import compare_job, scores_of_job
 from augment.services.driving.simulations import SCORES
 from augment.services.judging import (
     augmentation_lines,
@@ -168,6 +168,10 @@ JOB_TABLES = {
     },
     **{
         f"driving-{score}": Export(driving.FORMATS, partial(scores_of_job, score=score))
+        for score in SCORES
+    },
+    **{
+        f"planners-{score}": Export(driving.PLANNER_FORMATS, partial(compare_job, score=score))
         for score in SCORES
     },
     **{

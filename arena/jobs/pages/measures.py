@@ -30,8 +30,9 @@ from arena.shell import sending
 from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.shell.acts import looks_again, refusals_told, send_later
 from arena.shell.listing import choice_asked, read_page
+from augment.errors import Conflict
 from augment.models import GenerationJob, Simulation
-from augment.services.driving import NUPLAN, drive_file, driving_scores, simulations
+from augment.services.driving import NUPLAN, compare_job, drive_file, driving_scores, simulations
 from augment.services.driving.simulations import SCORES, Options
 from augment.services.judging import count_unmeasured, read_answers
 from augment.services.judging.analyses import ANALYSES, SEED
@@ -119,8 +120,14 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
         version = f"version {way.version}" if way.version != Options().version else ""
         words = (planner, offsets, "reactive" if way.is_reactive else "", version)
         ways.append(" · ".join(filter(None, words)))
+    try:
+        planners = driving.planner_context(compare_job(job, score=score))
+    except Conflict:
+        planners = None
     return {
         **driving.driving_context(table),
+        "planners": planners,
+        "planner_forms": driving.PLANNER_FORMATS,
         "forms": driving.FORMATS,
         "ways": ways,
         "driven": chosen,
@@ -154,7 +161,7 @@ UNMEASURED_FILES = (
     "faults",
     "tool-calls",
     "transcripts",
-    *(f"driving-{score}" for score in SCORES),
+    *(f"{table}-{score}" for table in ("driving", "planners") for score in SCORES),
 )
 """Files of a job that need no measure of its rows."""
 

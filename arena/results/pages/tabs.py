@@ -73,6 +73,7 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "both_miss": both_miss,
         "both_miss_share": both_miss / cast,
         "weighed_order": [names[slug] for slug in order],
+        "fragile_first": names.get(trust.fragility.first) if trust.fragility else None,
     }
 
 

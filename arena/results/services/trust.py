@@ -7,7 +7,12 @@ import numpy as np
 
 from arena.models import Vote
 from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_votes, tally
-from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
+from arena.rating.influence import (
+    bradley_terry,
+    rank_changes,
+    votes_behind_first,
+    without_each_expert,
+)
 from arena.rating.leaderboard import Leaderboard
 from arena.rating.models import to_elo
 from arena.rating.reliability import (
@@ -40,7 +45,8 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
     if set(arrays.items) == {""}:  # nobody knows what was shown twice
         inner = replace(inner, scenario=np.arange(len(inner), dtype=np.int64))
     repeats = _repeats(arrays, votes)
-    by_hand = np.flatnonzero([vote.kind != AUTOMATIC for vote in votes.counted])
+    is_cast = np.array([vote.kind != AUTOMATIC for vote in votes.counted], dtype=np.bool_)
+    by_hand = np.flatnonzero(is_cast)
     by_people = select_votes(inner, by_hand)
     return Trust(
         tie_share=float((inner.score == 0.5).mean()) if len(inner) else None,
@@ -49,6 +55,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
         repeats=repeats if repeats.number else None,
         raters=_panel(arrays, inner, by_hand, votes, repeats),
         strength=_check_strength(inner, votes),
+        fragility=votes_behind_first(inner, is_cast),
     )
 
 

@@ -10,6 +10,12 @@ from augment.services.driving.driving_scores import (
     scores_of_job,
 )
 from augment.services.driving.nuplan_results import import_results
+from augment.services.driving.planner_table import (
+    PlannerLine,
+    PlannerTable,
+    compare_job,
+    ways_to_compare,
+)
 from augment.services.driving.simulations import (
     NUPLAN,
     blind_drive,

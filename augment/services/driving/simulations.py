@@ -42,6 +42,12 @@ class Options:
     is_reactive: bool = False
     version: int = VERSION
 
+    @property
+    def name(self) -> str:
+        """Planner, with its offsets and traffic where they matter."""
+        offsets = f", {self.offsets}" if self.planner == PDM_CLOSED else ""
+        return f"{self.planner}{offsets}{', reactive' * self.is_reactive}"
+
     def newest_in(self, rows: QuerySet[Simulation]) -> "Options":
         """Return these options in the newest version in which some of the rows were driven."""
         how = asdict(self)
