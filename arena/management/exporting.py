@@ -13,6 +13,7 @@ from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
+from arena.results.exports.methods import METHODS_FORMATS, study_methods
 from arena.results.exports.preferences import PREFERENCE_FORMATS, preference_sheet
 from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
@@ -233,6 +234,14 @@ KINDS: dict[str, ExportKind] = {
         _write_preferences,
         _option("--pairs", "only preferences, as chosen and rejected", action="store_true")
         | _format(PREFERENCE_FORMATS, default="jsonl"),
+    ),
+    "methods": ExportKind(
+        "study",
+        "how the study was held and rated: a paragraph, or the sheet of HEDS",
+        lambda options, say: _write(
+            Export(METHODS_FORMATS, study_methods), options["format"], lambda: _snapshot(options)
+        ),
+        _format(METHODS_FORMATS, default="latex") | _OF_RATING,
     ),
     "chart": ExportKind(
         "study",

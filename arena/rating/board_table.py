@@ -13,6 +13,9 @@ from arena.rating.snapshot_document import read_document
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
 
+PROVISIONAL_ABOVE = 50.0
+"""Elo points: a wider half of an interval makes a line provisional."""
+
 AnyName = TypeVar("AnyName")
 
 
@@ -26,6 +29,9 @@ class BoardLine(Line):
         authors: Of a submission, else none.
         is_open: Whether a submission's code and weights are public; None where nobody says.
         settled_ties: Ties on pairs that nobody was shown, which are rated as well.
+        submitted, withdrawn: How many folders who submitted it sent for the benchmark by then, and
+            took back; None for who is no submission, and in older tables.
+        is_provisional: Whether its interval is still wider than the board's rule.
     """
 
     slug: str
@@ -35,6 +41,9 @@ class BoardLine(Line):
     authors: tuple[str, ...] = ()
     is_open: bool | None = None
     settled_ties: int = 0
+    submitted: int | None = None
+    withdrawn: int | None = None
+    is_provisional: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +81,7 @@ class BoardTableDocument:
         notes: What must be said with the numbers.
         versions: Of what the numbers depend on, by name.
         settled_ties: On pairs that nobody was shown; None where `votes` counts them as well.
+        provisional_above: The board's rule, half an interval in points; None in older tables.
     """
 
     format: Literal["scenario-arena/board-table"] = "scenario-arena/board-table"
@@ -94,6 +104,7 @@ class BoardTableDocument:
     versions: dict[str, str]
     includes_simulated: bool
     settled_ties: int | None = None
+    provisional_above: float | None = None
 
     @property
     def votes_text(self) -> str:
@@ -139,6 +150,13 @@ def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[An
         replace(line, rating=move(line.rating), lower=move(line.lower), upper=move(line.upper))
         for line in lines
     ]
+
+
+def is_provisional(line: Line) -> bool:
+    """Return whether a line has no interval, or one wider than `PROVISIONAL_ABOVE` each way."""
+    if line.lower is None or line.upper is None:
+        return True
+    return line.upper - line.lower > 2.0 * PROVISIONAL_ABOVE
 
 
 def spread_over(ranked: Sequence[AnyName], most: int) -> list[AnyName]:

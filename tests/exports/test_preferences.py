@@ -22,8 +22,11 @@ def test_votes_are_rows_with_what_was_shown() -> None:
     given = [vote(first, "left"), vote(second, "equal"), vote(third, "right")]
     vote(fourth, "skip", reason="unclear")
     close_study(study=study)
+    study.refresh_from_db()
     out = io.StringIO()
-    call_command("export", "preferences", study.name, "--out", "-", stdout=out)
+    call_command(
+        "export", "preferences", study.name, "--out", "-", stdout=out, stderr=io.StringIO()
+    )
     lines = [json.loads(line) for line in out.getvalue().splitlines()]
     assert [line["outcome"] for line in lines] == ["left", "equal", "right"]
     line = lines[0]
@@ -34,7 +37,7 @@ def test_votes_are_rows_with_what_was_shown() -> None:
     assert "eva" not in out.getvalue()
     sheet = preference_sheet(study)
     table = pd.read_parquet(io.BytesIO(PREFERENCE_FORMATS["parquet"].write(sheet)))
-    assert table.where(table.notna(), None).to_dict("records") == lines
+    assert table.astype(object).where(table.notna(), None).to_dict("records") == lines
     pairs = preference_sheet(study, pairs=True)
     content = PREFERENCE_FORMATS["jsonl"].write(pairs)
     read = pd.read_json(io.BytesIO(content), lines=True, dtype=False)
@@ -50,6 +53,7 @@ def test_votes_of_one_expert_for_both_sides_are_marked() -> None:
     for matchup in (first, *others, shown_again(first)):  # the repeat shows the sides turned
         vote(matchup, "left")
     close_study(study=study)
+    study.refresh_from_db()
     sheet = preference_sheet(study, pairs=True)
     rows = [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows]
     assert [(row["contradicted"], row["repeat"]) for row in rows] == [

@@ -10,6 +10,7 @@ from arena.rating.board_table import (
     BoardTableDocument,
     PooledStudy,
     anchor_lines,
+    is_provisional,
     spread_over,
     table_from_document,
 )
@@ -91,3 +92,13 @@ def test_a_table_is_read_as_it_was_kept() -> None:
 def test_what_is_no_table_of_this_version_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(InvalidDocument, match=next(iter(change))):
         table_from_document(asdict(a_table()) | change)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "provisional"),
+    [(950.0, 1050.0, False), (950.0, 1051.0, True), (None, 1000.0, True)],
+)
+def test_a_line_is_provisional_until_its_interval_is_within_the_rule(
+    lower: float | None, upper: float | None, provisional: bool
+) -> None:
+    assert is_provisional(Line(name="a", rating=1000.0, lower=lower, upper=upper)) is provisional

@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Board, Study
-from augment.models import Contestant
+from augment.models import Benchmark, Contestant, Submission
 from tests.board_rows import newcomer, voted
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
@@ -23,7 +24,17 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
     first = voted(a_study(votes_per_expert=18))
     dot = newcomer("dot", Contestant.Kind.SUBMISSION)
     Contestant.objects.filter(pk=dot.pk).update(card={"authors": ["Ada", "Bo"], "is_open": False})
-    admin, stranger = signed_in(people()["admin"]), Client()
+    cast = people()
+    benchmark = Benchmark.objects.create(slug="x", title="X", version=1, made_on=date(2026, 1, 1))
+    for decision, sender in (("accepted", 0), ("withdrawn", 0), ("none", 0), ("withdrawn", 1)):
+        Submission.objects.create(
+            benchmark=benchmark,
+            decision=decision,
+            contestant=dot if decision == "accepted" else None,
+            report={},
+            uploaded_by=[cast["researcher"], cast["admin"]][sender],
+        )
+    admin, stranger = signed_in(cast["admin"]), Client()
     admin.post(reverse("boards"), {"name": "City", "study": str(first.code)})
     board = Board.objects.get()
     page = reverse("board", args=[board.code])
@@ -60,6 +71,12 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
     assert cards.keys() == {"ann", "bob", "cid", "dot"}
     assert (cards["ann"], cards["dot"]) == (([], None), (["Ada", "Bo"], False))
     assert "Ada, Bo (closed)" in public.content.decode()
+    tries = {
+        one["slug"]: (one["submitted"], one["withdrawn"]) for one in json.loads(data)["lines"]
+    }
+    assert (tries["ann"], tries["dot"]) == ((None, None), (3, 1))
+    assert "submitted 3, withdrawn 1" in public.content.decode()
+    assert public.content.decode().count(">provisional<") == 4
     assert stranger.get(f"{address}1.csv").content.startswith(b"rank,contestant,elo")
     assert stranger.get(f"{address}1.html").status_code == 404
 

@@ -32,7 +32,9 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
     simulated = " (simulated)" if table.includes_simulated else ""
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
     remarks: Columns = {"remarks": (lambda _: " ".join(table.notes), Dtype.TEXT)}
-    columns = {**file_columns(BOARD), **remarks}
+    attempts = Dtype.WHOLE.columns("submitted", "withdrawn")
+    provisional: Columns = {"provisional": ("is_provisional", Dtype.YES_NO)}
+    columns = {**file_columns(BOARD), **remarks, **attempts, **provisional}
     return {
         "json": json_bytes(asdict(table)).decode(),
         "csv": sheet_csv(make_sheet(table.lines, columns, name="board-table")).decode(),

@@ -14,7 +14,14 @@ from arena.errors import StudyStillOpen
 from arena.exports.files import sha256_hex
 from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
-from arena.rating.board_table import BoardLine, BoardTableDocument, PooledStudy, anchor_lines
+from arena.rating.board_table import (
+    PROVISIONAL_ABOVE,
+    BoardLine,
+    BoardTableDocument,
+    PooledStudy,
+    anchor_lines,
+    is_provisional,
+)
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.lines import Line, hide_ranks, says_no_order
 from arena.rating.remarks import NOT_RANKED
@@ -34,7 +41,7 @@ from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.queries import author_pairs
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict, UnknownName
-from augment.models import Benchmark, Scenario
+from augment.models import Benchmark, Contestant, Scenario, Submission
 from augment.services import log_change, one_line
 from augment.services.benchmarks import Split, list_remarks
 
@@ -232,6 +239,7 @@ def make_document(
         includes_simulated=any(who.is_simulated for who in competitors)
         or any(vote.is_simulated for vote in votes),
         settled_ties=len(votes) - cast,
+        provisional_above=PROVISIONAL_ABOVE,
     )
 
 
@@ -286,7 +294,22 @@ def _board_line(line: Line, who: Competitor, since: str, settled: Counter[str]) 
         authors=tuple(card.get("authors", ())),
         is_open=card.get("is_open"),
         settled_ties=settled[who.slug],
+        is_provisional=is_provisional(line),
+        **_count_attempts(who.contestant),
         **asdict(line)
         | {"name": who.name, "votes": line.votes - settled[who.slug]}
         | {"ties": line.ties - settled[who.slug]},
     )
+
+
+def _count_attempts(contestant: Contestant | None) -> dict[str, int]:
+    """Return how many folders the sender of a submission sent and took back."""
+    own = Submission.objects.filter(contestant=contestant).first() if contestant else None
+    if own is None:
+        return {}
+    sent = Submission.objects.filter(pk=own.pk)
+    if own.uploaded_by is not None:  # else nobody knows whose the others are
+        of_benchmark = Submission.objects.filter(benchmark__slug=own.benchmark.slug)
+        sent = of_benchmark.filter(uploaded_by=own.uploaded_by)
+    withdrawn = sent.filter(decision=Submission.Decision.WITHDRAWN).count()
+    return {"submitted": sent.count(), "withdrawn": withdrawn}

@@ -1,0 +1,40 @@
+"""The methods of a study: filled from what was frozen and rated, blank where that says nothing."""
+
+import io
+import json
+
+import pytest
+from django.core.management import call_command
+
+from arena.studies.services.opening import close_study, preregistration_sha256
+from tests.study_rows import a_study, matchups_of, shown_again, vote
+
+pytestmark = pytest.mark.django_db
+
+
+def exported(form: str) -> str:
+    out = io.StringIO()
+    call_command("export", "methods", "Round 1", "--format", form, "--out", "-", stdout=out)
+    return out.getvalue()
+
+
+def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
+    study = a_study(votes_per_expert=4)
+    for name in ("eva", "finn"):
+        shown = matchups_of(study, name)
+        for matchup in (*shown, shown_again(shown[0])):
+            vote(matchup)
+    study = close_study(study=study)
+    call_command("rate", "Round 1", stdout=io.StringIO())
+    sheet = json.loads(exported("json"))
+    answers = {line["number"]: line["answer"] for line in sheet["questions"]}
+    assert (answers["3.1.1"], answers["3.2.1"]) == ("6", "2")
+    assert preregistration_sha256(study) in answers["3.3.1"]
+    assert answers["4.3.7"] == "Which image carries out the instruction better?"
+    assert "Of 2 hidden repeats a share of 0.00" in answers["4.3.11"]
+    assert set(sheet["blank"]) >= {"1.1", "3.2.2", "3.2.3", "5.1"}
+    assert all((answers[number] is None) == (number in sheet["blank"]) for number in answers)
+    text = exported("latex")
+    assert "8 votes count; left out: 2 repeat." in text
+    assert r"Recruitment: \textbf{[BLANK]}" in text
+    assert "eva" not in text + json.dumps(sheet)
