@@ -13,7 +13,7 @@ from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
-from arena.results.exports.methods import METHODS_FORMATS, study_methods
+from arena.results.exports.methods import METHODS_FORMATS, read_methods
 from arena.results.exports.preferences import PREFERENCE_FORMATS, preference_sheet
 from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
@@ -239,7 +239,7 @@ KINDS: dict[str, ExportKind] = {
         "study",
         "how the study was held and rated: a paragraph, or the sheet of HEDS",
         lambda options, say: _write(
-            Export(METHODS_FORMATS, study_methods), options["format"], lambda: _snapshot(options)
+            Export(METHODS_FORMATS, read_methods), options["format"], lambda: _snapshot(options)
         ),
         _format(METHODS_FORMATS, default="latex") | _OF_RATING,
     ),

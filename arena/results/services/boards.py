@@ -286,6 +286,7 @@ def _pool(study: Study, votes: VoteSet) -> PooledStudy:
 
 def _board_line(line: Line, who: Competitor, since: str, settled: Counter[str]) -> BoardLine:
     card = (who.contestant and who.contestant.card) or {}
+    submitted, withdrawn = _count_attempts(who.contestant)
     return BoardLine(
         slug=who.slug,
         kind=who.kind,
@@ -295,21 +296,21 @@ def _board_line(line: Line, who: Competitor, since: str, settled: Counter[str]) 
         is_open=card.get("is_open"),
         settled_ties=settled[who.slug],
         is_provisional=is_provisional(line),
-        **_count_attempts(who.contestant),
+        submitted=submitted,
+        withdrawn=withdrawn,
         **asdict(line)
         | {"name": who.name, "votes": line.votes - settled[who.slug]}
         | {"ties": line.ties - settled[who.slug]},
     )
 
 
-def _count_attempts(contestant: Contestant | None) -> dict[str, int]:
+def _count_attempts(contestant: Contestant | None) -> tuple[int | None, int | None]:
     """Return how many folders the sender of a submission sent and took back."""
     own = Submission.objects.filter(contestant=contestant).first() if contestant else None
     if own is None:
-        return {}
+        return None, None
     sent = Submission.objects.filter(pk=own.pk)
     if own.uploaded_by is not None:  # else nobody knows whose the others are
         of_benchmark = Submission.objects.filter(benchmark__slug=own.benchmark.slug)
         sent = of_benchmark.filter(uploaded_by=own.uploaded_by)
-    withdrawn = sent.filter(decision=Submission.Decision.WITHDRAWN).count()
-    return {"submitted": sent.count(), "withdrawn": withdrawn}
+    return sent.count(), sent.filter(decision=Submission.Decision.WITHDRAWN).count()
