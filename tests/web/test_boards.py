@@ -32,6 +32,7 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
             decision=decision,
             contestant=dot if decision == "accepted" else None,
             report={},
+            size_bytes=1,
             uploaded_by=[cast["researcher"], cast["admin"]][sender],
         )
     admin, stranger = signed_in(cast["admin"]), Client()

@@ -53,7 +53,7 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "contestants": len(frozen["contestants"]),
         "scenarios": len(frozen["scenarios"]),
         "languages": sorted(set(study.scenarios.values_list("language", flat=True))),
-        "outputs": sorted({min(counts), max(counts)}),
+        "outputs": [str(count) for count in sorted({min(counts), max(counts)})],
         "plan": f"A balanced plan ({frozen['product']['planner']}, seed {frozen['seed']}) chose "
         f"pairs and sides before the first vote, {study.votes_per_expert} pairs for each of "
         f"{frozen['experts']} accounts; {len(frozen['rules'].get('identical', ()))} pairs that "
