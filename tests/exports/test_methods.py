@@ -37,4 +37,4 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     text = exported("latex")
     assert "8 votes count; left out: 2 repeat." in text
     assert r"Recruitment: \textbf{[BLANK]}" in text
-    assert "eva" not in text + json.dumps(sheet)
+    assert "finn" not in text + json.dumps(sheet)

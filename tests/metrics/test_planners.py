@@ -9,6 +9,7 @@ import statsmodels.api as sm
 from augment.metrics.planners import (
     ClusteredMean,
     PlannerDifference,
+    Scores,
     compare_planners,
     estimate_score,
     find_sets,
@@ -52,8 +53,8 @@ def test_without_spread_an_interval_is_that_of_so_many_successes() -> None:
 
 
 def test_too_few_scenes_that_differ_tell_nothing_apart() -> None:
-    first = {n: (n, float(n < 5)) for n in range(40)}
-    second = {n: (n, 0.0) for n in range(40)}
+    first: Scores = {n: (n, float(n < 5)) for n in range(40)}
+    second: Scores = {n: (n, 0.0) for n in range(40)}
     ((one,),) = compare_planners([{"a": first, "b": second}])
     assert (one.estimate.p, one.p_holm, one.is_apart) == (None, None, False)
 

@@ -141,7 +141,7 @@ def planner_notes(table: PlannerTable) -> list[str]:
         f"Mean of {SCORE_LABELS[table.score]}'s score, drives of version {table.version}; 95 % "
         "intervals clustered by scene. Planners with a common letter can't be told apart at 5 % "
         "for all differences of the table (paired t tests on the same drives, Holm).",
-        *([f"Some rest on {table.fewest_scenes} scenes only."] if few else []),
+        *([f"The fewest scenes behind a line: {table.fewest_scenes}."] if few else []),
         DIFFERENCE,
     ]
 
@@ -151,7 +151,9 @@ def planner_context(table: PlannerTable) -> dict[str, Any]:
     rows = []
     for lines in table.groups:
         means = {line.planner: line for line in lines if not line.against}
-        rows.append((lines[0], [means.get(name) for name in table.planners]))
+        drives = sorted({line.estimate.drives for line in means.values()})
+        number = " to ".join(dict.fromkeys((str(drives[0]), str(drives[-1]))))
+        rows.append((lines[0], number, [means.get(name) for name in table.planners]))
     pairs = [line for lines in table.groups for line in lines if line.against]
     return {"table": table, "rows": rows, "pairs": pairs, "notes": planner_notes(table)}
 
@@ -187,13 +189,13 @@ def planner_sheet(table: PlannerTable) -> Sheet:
 def planner_latex(table: PlannerTable) -> bytes:
     """Return a row a contestant and a column a planner: mean, interval, letters."""
 
-    def show(place: int, row: tuple[PlannerLine, list[PlannerLine | None]]) -> str | None:
-        line = row[1][place]
+    def show(place: int, row: tuple[PlannerLine, str, list[PlannerLine | None]]) -> str | None:
+        line = row[2][place]
         return None if line is None else estimate_text(line)
 
     columns: ValueColumns = {
         "Scenarios": lambda row: show_name(row[0]),
-        "n": lambda row: row[0].estimate.drives,
+        "n": lambda row: row[1],
         **{name: partial(show, place) for place, name in enumerate(table.planners)},
     }
     return latex_values(

@@ -203,9 +203,8 @@ def make_document(
     ]
     votes = [vote for votes_of in sets for vote in votes_of.counted]
     by_slug = {who.slug: who for votes_of in sets for who in votes_of.competitors}
-    competitors = [by_slug[slug] for slug in sorted(by_slug)]
     founders = tuple(who.slug for who in sets[0].competitors)
-    arrays = vote_arrays(competitors, votes)
+    arrays = vote_arrays([by_slug[slug] for slug in sorted(by_slug)], votes)
     rated = rate(arrays.comparisons, founders=founders)
     remarks = board_remarks(rated, arrays)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
@@ -236,7 +235,7 @@ def make_document(
         left_out=dict(sorted(sum((Counter(x.left_out) for x in sets), Counter[str]()).items())),
         notes=(*list_remarks(board.benchmark), *rated.reasons, *remarks.warnings, *not_ranked),
         versions={name: str(version) for name, version in software_versions().items()},
-        includes_simulated=any(who.is_simulated for who in competitors)
+        includes_simulated=any(who.is_simulated for who in by_slug.values())
         or any(vote.is_simulated for vote in votes),
         settled_ties=len(votes) - cast,
         provisional_above=PROVISIONAL_ABOVE,
