@@ -76,6 +76,8 @@ def work(self: Any, kind: str, pk: int) -> None:
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
     enqueue(KINDS[kind], KINDS[kind].find_unblocked(pk))
+    if kind == UPLOADS.name:
+        enqueue(MOMENTS, MOMENTS.find_unsent(older_than=RESEND_AFTER, only=Q(upload=pk)))
     if kind == AUGMENTATIONS.name:
         # Others of its last rows see it finished as well; one message is enough.
         ended = Augmentation.objects.filter(job=OuterRef("pk")).order_by("-finished_at", "-pk")

@@ -123,10 +123,7 @@ def _shots() -> list[Shot]:
     shots += [
         Shot(name=f"job-{tab}", who="admin", path=f"/jobs/{job.code}/{tab}/") for tab in PARTS
     ]
-    shots += [
-        Shot(name="job-marks", who="admin", path=f"/jobs/{job.code}/grid/?view=marks"),
-        Shot(name="job-again", who="admin", path=f"/jobs/new/?like={job.code}"),
-    ]
+    shots += [Shot(name="job-again", who="admin", path=f"/jobs/new/?like={job.code}")]
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     return shots

@@ -21,7 +21,7 @@ from arena.shell.forms import RequestForm, offer
 from arena.shell.listing import read_listing, read_page
 from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
-from augment.services import read_request, read_values, retire, to_inputs
+from augment.services import free_slug, make_slug, read_request, read_values, retire, to_inputs
 from augment.services.endpoints import (
     MODEL_FACTS,
     OPTION_INPUTS,
@@ -36,7 +36,6 @@ from augment.services.endpoints import (
     plan_probe,
     read_respondents,
 )
-from augment.services.endpoints.contestants import free_slug
 from augment.services.running import workforce
 from augment.services.running.matrix import SEPARATOR
 from augment.tasks import enqueue_probe
@@ -75,12 +74,6 @@ class ContestantForm(OptionsForm):
         help_text="Each is a contestant. "
         + next(field.help for field in REQUEST if field.name == "variant"),
     )
-    slug = forms.CharField(
-        required=False,
-        max_length=80,
-        label="Short name in files",
-        help_text="Lower-case letters, digits, hyphens. Empty: made of model and variant.",
-    )
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -92,19 +85,17 @@ class ContestantForm(OptionsForm):
     def clean(self) -> dict[str, Any]:
         """Refuse one name for several contestants."""
         values: dict[str, Any] = super().clean() or self.cleaned_data
-        for name in ("name", "slug"):
-            if values.get(name) and len(values.get("variant", ())) > 1:
-                self.add_error(name, "Two contestants can’t have one name: tick one variant.")
+        if values.get("name") and len(values.get("variant", ())) > 1:
+            self.add_error("name", "Two contestants can’t have one name: tick one variant.")
         return values
 
     def to_requests(self) -> Iterator[ContestantRequest]:
-        """Yield a request for each variant; the short name is made where none is entered."""
+        """Yield a request for each variant; its slug is made of model and variant."""
         values = self.cleaned_data
         options = read_values(OPTION_INPUTS, values)
         endpoint, model = values["model"].split(SEPARATOR, 1)
+        whole = values | {"endpoint": endpoint, "model": model, "slug": ""}
         for variant in values["variant"]:
-            slug = values["slug"] or free_slug(model, variant, options)
-            whole = values | {"endpoint": endpoint, "model": model, "slug": slug}
             yield read_request(ContestantRequest, whole | {"variant": variant}, options=options)
 
 
@@ -112,6 +103,16 @@ class EndpointForm(RequestForm):
     """A new endpoint."""
 
     inputs = to_inputs(EndpointRequest)
+
+    def clean_label(self) -> str:
+        """Return the name as a slug."""
+        name: str = self.cleaned_data["label"]
+        is_slug = name == make_slug(name)
+        return (
+            name
+            if is_slug
+            else free_slug(Endpoint.objects, name, otherwise="endpoint", column="label")
+        )
 
 
 class EndpointFactsForm(RequestForm):

@@ -1,9 +1,9 @@
-"""A part of a job's grid: so many scenarios, contestants and samples as one page can hold."""
+"""A job's grid, some rows at a time; drives, labellings and what a study shows of jobs."""
 
 from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
@@ -29,66 +29,45 @@ State = Augmentation.State
 _LEAN = (*("code", "state", "sample", "image", "scenario_id", "contestant_id"), "job_id")
 
 
-class View(NamedTuple):
-    """Limits on the cells that a page shows: how many, of which row, of which kind."""
-
-    name: str
-    cells: int
-    columns: int
-    samples: int
-    rows: int
-
-
-MARKS = View("marks", cells=300, columns=10, samples=10, rows=10)
-PICTURES = View("pictures", cells=12, columns=4, samples=2, rows=3)
-VIEWS = {view.name: view for view in (MARKS, PICTURES)}
+CELLS = 240
+"""About so many cells are sent at once; whoever scrolls on gets as many again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
     """Part of a grid; pages count from 1."""
 
-    view: View = PICTURES
     row: int = 1
-    column: int = 1
-    sample: int = 1
     state: str = ""
     search: str = ""
 
 
 def grid_part(job: GenerationJob, part: Part) -> dict[str, Any]:
-    """Return scenarios down, contestants across; five queries, however large the job is.
+    """Return scenarios down, contestants across; four queries, however large the job is.
 
-    Pages beyond the last one are the last one. Each row has a scenario and its samples by
+    A page beyond the last one is the last one. Each row has a scenario and its samples by
     contestant.
     """
-    view, cells = part.view, job.augmentations.order_by()
-    contestants = Contestant.objects.filter(pk__in=cells.values("contestant"))
-    lean = contestants.only("slug", "name", "kind", "code").order_by("name", "pk")
-    columns = Paginator(lean, view.columns).get_page(part.column)
-    samples = Paginator(range(1, job.samples + 1), view.samples).get_page(part.sample)
+    cells = job.augmentations.order_by()
+    rows = Contestant.objects.filter(pk__in=cells.values("contestant"))
+    contestants = list(rows.only("slug", "name", "kind", "code").order_by("name", "pk"))
     shown = cells.filter(state=part.state) if part.state else cells
     scenarios = Scenario.objects.filter(
         pk__in=shown.values("scenario"), slug__icontains=part.search
     )
-    wide = max(1, len(columns.object_list)) * len(samples.object_list)
+    wide = max(1, len(contestants)) * job.samples
     ordered = scenarios.only("slug", "type", "code").order_by("type", "slug")
-    lines = Paginator(ordered, min(view.rows, max(1, view.cells // wide))).get_page(part.row)
+    lines = Paginator(ordered, max(1, CELLS // wide)).get_page(part.row)
     by_place: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
-    wanted = cells.filter(
-        contestant__in=list(columns.object_list),
-        scenario__in=list(lines.object_list),
-        sample__in=samples.object_list,
-    )
+    wanted = cells.filter(scenario__in=list(lines.object_list))
     for cell in wanted.only(*_LEAN).order_by("sample"):
         by_place[cell.scenario_id, cell.contestant_id].append(cell)
     return {
         "part": part,
-        "contestants": columns,
-        "samples": samples,
+        "contestants": contestants,
         "scenarios": lines,
         "rows": [
-            {"scenario": row, "cells": [by_place[row.pk, who.pk] for who in columns.object_list]}
+            {"scenario": row, "cells": [by_place[row.pk, who.pk] for who in contestants]}
             for row in lines.object_list
         ],
     }

@@ -32,7 +32,7 @@ from augment.services.endpoints import (
     ensure_model,
     paper_variants,
 )
-from augment.services.endpoints.contestants import free_slug
+from augment.services.endpoints.contestants import contestant_slug
 from augment.services.running import JobRequest, count_rows
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import cancel, launch, retry_failed
@@ -104,7 +104,7 @@ def add_model(request: EndpointRequest, model: str) -> OwnModel:
     known = dict(models.Contestant.objects.filter(**asked).values_list("variant", "slug"))
     for variant in variants:
         if variant not in known:
-            slug = free_slug(model, variant, {})
+            slug = contestant_slug(model, variant, {})
             add_contestant(
                 ContestantRequest(
                     slug=slug, variant=variant, endpoint=row.endpoint.label, model=model

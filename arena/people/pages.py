@@ -1,5 +1,6 @@
 """Pages of accounts: sign-in, the list of people, links to set a password, one's own tokens."""
 
+import re
 import uuid
 from collections.abc import Callable
 from functools import wraps
@@ -12,6 +13,7 @@ from django.contrib.auth.decorators import login_not_required
 from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm, SetPasswordForm
 from django.contrib.auth.models import User
 from django.contrib.auth.views import LoginView
+from django.db import transaction
 from django.db.models import Prefetch
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -59,17 +61,31 @@ USUAL_DAYS = 30
 
 
 class AccountForm(forms.Form):
-    """A new account; its owner comes in by a link."""
+    """New accounts of one role; their owners come in by links."""
 
-    username = forms.CharField(max_length=150, label="Username")
-    pseudonym = forms.CharField(
-        max_length=60, required=False, label="Pseudonym (what others see)", empty_value=None
+    username = forms.CharField(
+        max_length=20_000,
+        label="Names or mail addresses",
+        help_text="One a line. Others see a pseudonym, made up or after a comma: ada, Expert A.",
+        widget=forms.Textarea(attrs={"class": "input", "rows": 3, "spellcheck": "false"}),
     )
     role = forms.ChoiceField(
         choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)],
         initial="expert",
         label="Role",
     )
+
+    def clean_username(self) -> list[tuple[str, str | None]]:
+        """Return usernames, each with its pseudonym if one is given.
+
+        What mail programs and spreadsheets put between and around them is understood.
+        """
+        lines = filter(str.strip, re.split(r"[\n;]", self.cleaned_data["username"]))
+        parts = [re.split(r"[,\t]", line, maxsplit=1) for line in lines]
+        return [
+            ("-".join(re.sub(r".*<(.+)>.*", r"\1", name).split()), "".join(rest).strip() or None)
+            for name, *rest in parts
+        ]
 
 
 class FirstForm(forms.Form):
@@ -198,14 +214,18 @@ def password_page(request: HttpRequest) -> HttpResponse:
 @form_for(ADMIN)
 @never_cache
 def people_page(request: HttpRequest) -> HttpResponse:
-    """Every account, and a form for a new one, which ends at its link."""
+    """Every account, and a form for new ones, all or none, which ends at their links."""
     form = AccountForm(request.POST or None)
     if form.is_valid():
-        with refusals_in(form):
-            user = services.create_person(
-                **form.cleaned_data, password=None, actor=get_user(request)
-            )
-            return show_new_links(request, [user])
+        role, actor = form.cleaned_data["role"], get_user(request)
+        with refusals_in(form, "username"), transaction.atomic():
+            users = [
+                services.create_person(
+                    username=name, pseudonym=pseudonym, role=role, password=None, actor=actor
+                )
+                for name, pseudonym in form.cleaned_data["username"]
+            ]
+            return show_new_links(request, users)
     context = {"lines": _list_accounts(), "form": form, "roles": ROLE_NAMES.items()}
     return render(request, "people/list.html", context)
 

@@ -29,7 +29,7 @@ from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services import read_request
+from augment.services import SLUG_LENGTH, read_request
 from augment.services.benchmarks import find_benchmark, keep_submission
 from augment.services.driving import (
     LARGEST_FAMILY,
@@ -42,7 +42,6 @@ from augment.services.driving import (
 from augment.services.scenarios import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
-    SLUG_LENGTH,
     NewScenario,
     add_scenario,
     note_sentences,

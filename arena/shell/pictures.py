@@ -4,6 +4,7 @@ from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest, JsonResponse
 from django.http.response import HttpResponseBase
 
+from augment.models import Augmentation
 from augment.services.scenarios import WIDTHS_PX, film_document, shrink
 
 _KEPT = "private, max-age=31536000, immutable"
@@ -47,10 +48,13 @@ def send_picture(request: HttpRequest, name: str) -> HttpResponseBase:
     )
 
 
-def resize_picture(request: HttpRequest, name: str) -> HttpResponseBase:
+def resize_picture(
+    request: HttpRequest, name: str, changed: Augmentation | None = None
+) -> HttpResponseBase:
     """What `send_picture` answers, or the PNG made smaller where the address says `?width=`.
 
-    For pages of staff, who may know which pictures were made together.
+    For pages of staff, who may know which pictures were made together. Of an augmentation that is
+    given, the smaller one is cut to what it changes.
 
     Raises:
         Http404: There is no such file, or no picture is made that wide.
@@ -60,4 +64,4 @@ def resize_picture(request: HttpRequest, name: str) -> HttpResponseBase:
         return send_picture(request, name)
     if width not in map(str, WIDTHS_PX):
         raise Http404
-    return picture_response(shrink(name, int(width)))
+    return picture_response(shrink(name, int(width), changed))

@@ -143,11 +143,15 @@ def list_offered() -> QuerySet[Contestant]:
     return Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
 
 
-def latest_contestants() -> list[str]:
-    """Return the offered contestants of the latest job that has pictures of any."""
+def latest_contestants(job: GenerationJob | None = None) -> list[str]:
+    """Return the offered contestants with pictures of a job, by default of the latest with any."""
     made = _with_pictures().filter(contestant__in=list_offered())
-    latest = made.order_by("-job__created_at").values("job")[:1]
-    return sorted(set(made.filter(job=latest).values_list("contestant__slug", flat=True)))
+    made = (
+        made.filter(job=job)
+        if job
+        else made.filter(job=made.order_by("-job__created_at").values("job")[:1])
+    )
+    return sorted(set(made.values_list("contestant__slug", flat=True)))
 
 
 def scenario_sources(jobs: Iterable[GenerationJob]) -> dict[str, str]:

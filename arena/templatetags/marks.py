@@ -135,6 +135,13 @@ def grouped(number: int | None) -> str:
     return "" if number is None else number_format(number, force_grouping=True)
 
 
+@register.filter
+def shorten(name: str, most: int = 30) -> str:
+    """A long name without its middle, since both ends tell names apart."""
+    end = (most - 1) // 2
+    return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
+
+
 K = TypeVar("K")
 V = TypeVar("V")
 
@@ -168,7 +175,7 @@ def pager(context: Context, page: Page[Any], name: str = "page", what: str = "")
 def query_with(context: Context, **changes: object) -> str:
     """The address's query with these changes, from the first page on; empty values go."""
     query = context["request"].GET.copy()
-    for name in ("page", "row", "column", "sample"):
+    for name in ("page", "row"):
         query.pop(name, None)
     for name, value in changes.items():
         query.pop(name, None)

@@ -240,14 +240,15 @@ def box_around(spot: Spot, half_width: float, half_height: float) -> Box:
     return x - half_width, y - half_height, x + half_width, y + half_height
 
 
-def shrink_png(png: bytes, widest: int) -> bytes:
+def shrink_png(png: bytes, widest: int, box: Box | None = None) -> bytes:
     """Return a picture as a PNG of few colours, by a whole factor so small that it is no wider.
 
     Args:
         png: The bytes of a picture that `bev` drew, or any other PNG.
         widest: In pixels, 1 or more; a picture that is no wider keeps its size.
+        box: The part of it to take, in shares of its width and height; None for all.
     """
-    few = _smaller(png, widest).quantize(
+    few = _smaller(png, widest, box).quantize(
         _SMALL_COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
     )
     return _pack(few, level=9)
@@ -256,12 +257,16 @@ def shrink_png(png: bytes, widest: int) -> bytes:
 # Private
 
 
-def _smaller(png: bytes, widest: int) -> Image.Image:
+def _smaller(png: bytes, widest: int, box: Box | None) -> Image.Image:
     with Image.open(io.BytesIO(png), formats=("PNG",)) as picture:
         if picture.width * picture.height > MOST_PIXELS:
             raise ValueError(f"a picture of {picture.width} x {picture.height} pixels")
-        factor = -(-picture.width // widest)
         colours = picture.convert("RGB")
+        if box is not None:
+            width, height = picture.size
+            left, upper, right, lower = box
+            colours = colours.crop((left * width, upper * height, right * width, lower * height))
+        factor = -(-colours.width // widest)
     return colours.reduce(factor) if factor > 1 else colours
 
 

@@ -11,6 +11,7 @@ from augment.services.inputs import (
     read_values,
     to_inputs,
 )
+from augment.services.slugs import SLUG_LENGTH, free_slug, make_slug
 from augment.services.terminal import TerminalCommand, at_least
 from augment.services.texts import (
     check_picture_name,

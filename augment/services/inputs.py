@@ -142,7 +142,7 @@ def read_decimal(text: str) -> Decimal:
 
 
 def add_options(parser: Any, inputs: Iterable[Input], *, is_any_required: bool = True) -> None:
-    """Give a command an option for each; the first text that is required stands without a name.
+    """Give a command an option for each; the first text that is required, or a slug, has no name.
 
     Args:
         parser: Of the command, or a group of it.
@@ -153,14 +153,19 @@ def add_options(parser: Any, inputs: Iterable[Input], *, is_any_required: bool =
     has_positional = False
     for declared in inputs:
         is_required = declared.is_required and is_any_required
-        is_positional = declared.kind is InputKind.TEXT and is_required and not has_positional
+        is_named = declared.name == "slug" and is_any_required
+        is_positional = (
+            declared.kind is InputKind.TEXT and (is_required or is_named) and not has_positional
+        )
         has_positional |= is_positional
         default = None if declared.is_required or not is_any_required else declared.default
         words = declared.explanation
         if default and not isinstance(default, bool):
             words += f" (default: {default})"
         arguments: dict[str, Any] = {"help": words.replace("%", "%%")}
-        if not is_positional:
+        if is_positional and not is_required:
+            arguments |= {"nargs": "?", "default": default}
+        elif not is_positional:
             arguments |= {"dest": declared.name, "required": is_required, "default": default}
         match declared.kind:
             case InputKind.SWITCH:

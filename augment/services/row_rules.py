@@ -22,6 +22,7 @@ from augment.scene.codec import (
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
 from augment.services.scenarios import scenes
 from augment.services.scenarios.scene_imports import note_sentences
+from augment.services.slugs import check_slug
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import MOST_SAMPLES, options_from_document
@@ -37,14 +38,14 @@ def _check_document(read: Callable[[Any], object], document: Any) -> None:
 
 
 def _check_scene(row: models.BaseScene) -> None:
-    scenes.check_slug(row.slug, what="scene")
+    check_slug(row.slug, what="scene")
     scene_from_document(row.document)
     note_sentences(row.notes)
     _check_document(recording_from_document, row.recording)
 
 
 def _check_scenario(row: models.Scenario) -> None:
-    scenes.check_slug(row.slug, what="scenario")
+    check_slug(row.slug, what="scenario")
     scenes.label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=scenes.INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
@@ -54,19 +55,19 @@ def _check_scenario(row: models.Scenario) -> None:
 
 
 def _check_benchmark(row: models.Benchmark) -> None:
-    scenes.check_slug(row.slug, what="benchmark")
+    check_slug(row.slug, what="benchmark")
     one_line("title", row.title, what="benchmark")
 
 
 def _check_endpoint(row: models.Endpoint) -> None:
-    scenes.check_slug(row.label, what="endpoint")
+    check_slug(row.label, what="endpoint")
     names = [field.name for field in fields(EndpointFacts)]
     facts = EndpointFacts(**{name: getattr(row, name) for name in names})
     check_facts(facts, is_stored=True)  # a call asks what its key is bound to
 
 
 def _check_contestant(row: models.Contestant) -> None:
-    scenes.check_slug(row.slug, what="contestant")
+    check_slug(row.slug, what="contestant")
     one_line("name", row.name, what="contestant")
     _check_document(CARD.from_parts, row.card)
     options_from_document(row.options)

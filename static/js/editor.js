@@ -1,5 +1,7 @@
 // Placing objects by hand: mouse, touch and keys on the picture, numbers beside it. The server
 // checks every change; it puts agents on the centreline and says on which lane they are.
+import { Lane } from "./editor-lane.js";
+import { makeSentence } from "./editor-sentence.js";
 import { Edit } from "./editor-state.js";
 import { Stage } from "./editor-view.js";
 
@@ -13,9 +15,11 @@ const keep = form.elements.keep_traffic;
 const edit = new Edit(scene, parsed(field.value));
 const svg = form.querySelector("svg.stage");
 const stage = new Stage(svg, scene, words.picture);
+const lane = new Lane(scene.route);
 const numbers = form.querySelector("[data-numbers]");
 const list = form.querySelector("[data-list]");
 const said = form.querySelector("[data-findings]");
+const showSentence = makeSentence(form);
 const degrees = 180 / Math.PI;
 let armed = false;
 let isDirty = false;
@@ -96,7 +100,8 @@ function numberOf(name) {
 function shown(agent, name) {
   const [walk_x_m, walk_y_m] = agent.walk_to_m ?? [];
   const wish = (agent.motion && edit.presets[agent.id]) ?? { preset: agent.motion ? "own" : "" };
-  const value = { ...agent, heading_deg: agent.heading_rad * degrees, walk_x_m, walk_y_m, ...wish }[name];
+  const place = { ...lane.project(agent.x_m, agent.y_m), heading_deg: agent.heading_rad * degrees };
+  const value = { ...agent, ...place, walk_x_m, walk_y_m, ...wish }[name];
   return typeof value === "number" ? String(Math.round(value * 1000) / 1000) : (value ?? "");
 }
 
@@ -166,7 +171,7 @@ function tell(found) {
   if (found.statements) showAsked(found);
 }
 
-// What the drawing asks for, and the sentence that it makes where nobody types one.
+// What the drawing asks for, and the sentence that it makes, until somebody types another.
 function showAsked({ sentence, statements }) {
   const asks = form.querySelector("[data-asks]");
   if (!asks) return;
@@ -174,9 +179,7 @@ function showAsked({ sentence, statements }) {
   asks.querySelector("[data-statements]").replaceChildren(
     ...statements.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
   );
-  const { instruction } = form.elements;
-  instruction.dataset.usual ??= instruction.placeholder;
-  instruction.placeholder = sentence || instruction.dataset.usual;
+  showSentence(sentence);
 }
 
 function fail() {
@@ -325,6 +328,10 @@ numbers.addEventListener("change", (event) => {
     const [x, y] = agent.walk_to_m ?? [agent.x_m, agent.y_m];
     const walk = name === "walk_x_m" ? [value, y] : [x, value];
     edit.walk(agent.id, value === undefined ? undefined : walk);
+  } else if (name === "ahead_m" || name === "left_m") {
+    const { x, y, turn } = lane.move(agent, name, value);
+    edit.shift(agent.id, round(x), round(y));
+    edit.set(agent.id, { heading_rad: agent.heading_rad + turn });
   } else if (name === "x_m" || name === "y_m") {
     edit.shift(agent.id, name === "x_m" ? value : agent.x_m, name === "y_m" ? value : agent.y_m);
   } else edit.set(agent.id, { [name]: value });
@@ -363,19 +370,13 @@ for (const name of ["keep_traffic", "derives", "type", "own_type"]) {
 
 field.addEventListener("change", () => {
   const typed = parsed(field.value);
-  if (typed === null) {
-    tell({ problem: words.nojson, lines: [] });
-    return;
-  }
+  if (typed === null) return tell({ problem: words.nojson, lines: [] });
   const change = Edit.read(typed);
-  if (!change) {
-    check("", typed).catch(fail);
-    return;
-  }
+  if (!change) return check("", typed).catch(fail);
   edit.begin();
   edit.change = change;
   edit.selected = null;
-  changed();
+  return changed();
 });
 
 form.addEventListener("submit", () => {

@@ -89,6 +89,7 @@ def test_a_chosen_motion_is_asked_of_the_server_and_kept_by_later_edits(desk: De
     desk.place_ahead()
     page = desk.page
     expect(page.locator("#n-within_m")).to_be_hidden()
+    page.get_by_text("More of Added1").click()
     page.select_option("#n-preset", "hard_braking")
     wish = {"agent_id": "Added1", "preset": "hard_braking", "within_m": None, "number": None}
     assert desk.asked(2)["preset"] == wish

@@ -18,10 +18,7 @@ from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
-FORM = {
-    **{"slug": "streets", "title": "Streets", "scenarios": "street-*"},
-    **{"practice": "40", "seed": "1"},
-}
+FORM = {**{"title": "Streets", "scenarios": "street-*"}, **{"practice": "40", "seed": "1"}}
 
 
 def test_it_is_counted_made_written_and_got(settings: Settings, tmp_path: Path) -> None:
@@ -30,7 +27,7 @@ def test_it_is_counted_made_written_and_got(settings: Settings, tmp_path: Path) 
         add_street(number)
     cast = people()
     admin, researcher = signed_in(cast["admin"]), signed_in(cast["researcher"])
-    counted = admin.post(reverse("benchmark-new"), FORM | {"slug": "", "estimate": "1"})
+    counted = admin.post(reverse("benchmark-new"), FORM | {"title": "", "estimate": "1"})
     counts = {line.label: (line.practice, line.test) for line in counted.context["counts"]}
     assert counts == {"Easy": (2, 3), "Medium": (0, 0), "Hard": (0, 0), "All": (2, 3)}
     assert not Benchmark.objects.exists()
@@ -73,9 +70,9 @@ def check_no_test_reference(row: Benchmark, content: bytes, page: str) -> None:
 
 def test_what_is_wrong_is_told_at_its_field() -> None:
     admin = signed_in(people()["admin"])
-    answer = admin.post(reverse("benchmark-new"), FORM | {"slug": "A b"})
+    answer = admin.post(reverse("benchmark-new"), FORM | {"title": ""})
     assert answer.status_code == 422
-    assert list(answer.context["form"].errors) == ["slug"]
+    assert list(answer.context["form"].errors) == ["title"]
     answer = admin.post(reverse("benchmark-new"), FORM | {"scenarios": "no", "estimate": "1"})
     assert answer.status_code == 200
     assert "Unknown scenario" in answer.content.decode()

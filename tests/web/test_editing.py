@@ -67,13 +67,14 @@ def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> Non
     page = reverse("augmentation", args=[row.code])
     assert url in researcher.get(page).content.decode()
     assert "&quot;add&quot;" in researcher.get(url).content.decode()
-    refused = researcher.post(url, {"modification": CAR, "contestant": "Not A Slug"})
+    refused = researcher.post(url, {"modification": CAR, "contestant": row.contestant.slug})
     assert refused.status_code == 422
     shown = researcher.post(
-        url, {"modification": CAR, "contestant": "by-hand", "notes": "too far left"}, follow=True
+        url, {"modification": CAR, "contestant": "Zoë 王", "notes": "too far left"}, follow=True
     ).content.decode()
     made = Augmentation.objects.get(corrects=row)
     assert (made.state, made.contestant.kind, made.notes) == ("done", "human", "too far left")
+    assert (made.contestant.slug, made.contestant.name) == ("zoe", "Zoë 王")
     assert "Corrected by hand by the-researcher" in shown
     assert page in shown
     picture = researcher.get(reverse("picture", args=["augmentation", made.code]))

@@ -72,8 +72,8 @@ def test_ten_thousand_cells_cost_as_much_as_a_page_of_them(
 ) -> None:
     job = large_job(scenarios=100, contestants=20, samples=5)
     assert job.augmentations.count() == 10_000
-    for query in ("", "?row=17&column=2", "?view=marks", "?state=unreadable&q=street-09"):
-        with django_assert_max_num_queries(17):  # type: ignore[attr-defined]
+    for query in ("", "?row=17", "?state=unreadable&q=street-09"):
+        with django_assert_max_num_queries(16):  # type: ignore[attr-defined]
             found = page(researcher, job, query)
         assert 0 < len(CELL.findall(found)) <= 300
         assert len(found) < 300_000
@@ -82,16 +82,12 @@ def test_ten_thousand_cells_cost_as_much_as_a_page_of_them(
 def test_every_cell_is_on_exactly_one_page(researcher: Client) -> None:
     job = large_job(scenarios=7, contestants=12, samples=12)
     seen: list[str] = []
-    for column in (1, 2):
-        for sample in (1, 2):
-            row = 1
-            while True:
-                place = f"?view=marks&row={row}&column={column}&sample={sample}"
-                found = page(researcher, job, place)
-                seen += re.findall(r'id="cell-([0-9a-f-]+)"', found)
-                row += 1
-                if f"row={row}&amp;" not in found:
-                    break
+    query: str | None = ""
+    while query is not None:
+        found = page(researcher, job, query)
+        seen += re.findall(r'id="cell-([0-9a-f-]+)"', found)
+        following = re.search(r'href="([^"]*)" rel="next"', found)
+        query = following and following[1]
     assert len(seen) == len(set(seen)) == 7 * 12 * 12
 
 
@@ -101,7 +97,7 @@ def test_every_cell_is_on_exactly_one_page(researcher: Client) -> None:
         ("?q=street-001", ["street-001"]),
         ("?state=failed", ["street-000"]),
         ("?state=failed&q=street-001", []),
-        ("?state=no-such-state&row=x&column=-1&sample=99999999999&view=oil", 3),
+        ("?state=no-such-state&row=x&view=oil", 3),
         ("?row=9999", 3),
     ],
 )
@@ -112,5 +108,5 @@ def test_the_grid_is_narrowed_by_word_and_state(
     first = job.augmentations.filter(scenario__slug="street-000").order_by("pk")[0]
     job.augmentations.filter(pk=first.pk).update(state=State.FAILED, reason="broke")
     grid = page(researcher, job, query).split('id="grid"')[1]
-    found = re.findall(r'<th scope="row"><a[^>]*>(street-\d+)</a>', grid)
+    found = re.findall(r'<th scope="row">\s*<a[^>]*>(street-\d+)</a>', grid)
     assert found == shown if isinstance(shown, list) else len(found) == shown

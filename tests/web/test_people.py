@@ -81,6 +81,22 @@ def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
     assert can_sign_in("grace", PASSWORD)
 
 
+def test_several_people_are_pasted_at_once_or_none_of_them() -> None:
+    admin = signed_in(people()["admin"])
+    pasted = "Grace Höpper\tNavy\r\nAda <ada@example.org>; bob, Builder\n\n李雷"
+    answer = admin.post(reverse("people"), {"username": pasted, "role": "expert"})
+    assert answer.content.decode().count('id="link-') == 4
+    made = User.objects.filter(groups__name="expert").order_by("pk")[1:]
+    assert list(made.values_list("username", "person__pseudonym"))[:3] == [
+        ("Grace-Höpper", "Navy"),
+        ("ada@example.org", made[1].person.pseudonym),
+        ("bob", "Builder"),
+    ]
+    refused = admin.post(reverse("people"), {"username": "carl\nbob\ndora", "role": "expert"})
+    assert "&#x27;bob&#x27;" in refused.content.decode()
+    assert not User.objects.filter(username="carl").exists()
+
+
 class FasterVisitor:
     """A rule for passwords that is asked while a link is used: meanwhile somebody else uses it."""
 

@@ -81,8 +81,7 @@ def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
 @pytest.mark.parametrize(
     ("fields", "problem"),
     [
-        ({"type": "", "own_type": "Cut In"}, "must be one of"),
-        ({"type": "jaywalking_pedestrian", "slug": "street"}, "called &#x27;street&#x27; already"),
+        ({"type": "", "own_type": "插队"}, "must be one of"),
         ({"modification": "[" * 100_000}, "is no JSON"),
         ({"modification": '{"add": 3}', "type": "cut_in"}, "add"),
         ({"modification": CHANGE.replace("9.0", "1e9"), "type": "cut_in"}, "x_m"),
@@ -96,6 +95,12 @@ def test_what_can_not_be_is_told_and_nothing_is_lost(
     assert made is None
     assert problem in shown
     assert fields.get("slug", "kept-as-it-was") in shown
+
+
+def test_names_become_slugs(reader: Client, scene: BaseScene) -> None:
+    _, made = send(reader, scene, slug="Street", type="", own_type="Cut In")
+    assert made is not None
+    assert (made.slug, made.type) == ("street-2", "cut_in")
 
 
 def upload(client: Client, text: str) -> str:

@@ -11,10 +11,11 @@ from pytest_django import Settings
 
 from arena.config.env import read_media
 from augment.render.bev import draw
-from augment.render.camera import camera_for
+from augment.render.camera import Camera, camera_for
 from augment.render.canvas import shrink_png
 from augment.scene.entities import Modification
-from augment.services.scenarios.pictures import shrink, store
+from augment.services.scenarios.pictures import store
+from augment.services.scenarios.thumbnails import find_box, shrink
 from tests import scenes
 from tests.buckets import Bucket, bucket
 from tests.jobs.rows import add_scenario
@@ -73,6 +74,22 @@ def test_pages_ask_for_the_width_that_they_show(picture: bytes) -> None:
         assert researcher.get(address + query).status_code == 404
     shown = researcher.get(reverse("scenarios")).content.decode()
     assert f"{address}?width=400&amp;v={scenario.original_image[-16:-4]} 400w" in shown
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "box"),
+    [
+        (30.0, 0.0, (0.595, 0.29, 0.805, 0.71)),  # 6 m about the car, three wide as two high
+        (59.0, 0.0, (0.79, 0.29, 1.0, 0.71)),  # at the right edge
+        (30.0, 12.0, (0.595, 0.0, 0.805, 0.42)),  # and at the upper one
+    ],
+)
+def test_a_thumbnail_of_a_change_lies_about_it_within_the_picture(
+    x_m: float, y_m: float, box: tuple[float, ...]
+) -> None:
+    """The window is 120 m x 40 m with the ego 54 m from its left edge."""
+    camera = Camera(x_min_m=-54, x_max_m=66, y_min_m=-20, y_max_m=20, px_per_m=10)
+    assert find_box([scenes.vehicle("Added1", x_m, y_m)], camera) == box
 
 
 def test_a_picture_of_very_many_pixels_is_refused_unread() -> None:

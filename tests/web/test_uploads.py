@@ -58,10 +58,12 @@ def test_from_a_file_to_a_scene(researcher: Client) -> None:
     again = reverse("upload-show", args=[moment.upload.code])
     assert picture in researcher.post(again, {"stop": "0"}, follow=True).content.decode()
     assert "no such moment" in researcher.post(again, {"stop": "1"}, follow=True).content.decode()
-    answer = researcher.post(again, {"stop": "0", "slug": "main-street"}, follow=True)
+    answer = researcher.post(
+        again, {"stop": "0", "keep": "1", "name": "Hauptstraße Süd"}, follow=True
+    )
     scene_row = BaseScene.objects.get()
     page = reverse("scene", args=[scene_row.code])
-    assert (scene_row.slug, answer.redirect_chain[-1][0]) == ("main-street", page)
+    assert (scene_row.slug, answer.redirect_chain[-1][0]) == ("hauptstrae-sud", page)
     for view in ("kept", "backdrop"):
         assert is_picture(researcher, reverse("picture", args=[view, scene_row.code]))
     assert "picture" in researcher.get(page).content.decode()

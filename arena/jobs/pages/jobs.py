@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.jobs.exports.realism import realism_context
 from arena.jobs.pages.measures import ask_to_measure, displacement_section, driving_section
-from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
+from arena.jobs.queries import Part, grid_part
 from arena.models import ScenarioFile
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.acts import Confirmation, ask, is_sure, refusals_told, send_later
@@ -98,10 +98,7 @@ def _first_tab(counts: JobCounts, tabs: list[str]) -> str:
 
 def _show_grid(request: HttpRequest, counts: JobCounts) -> Context:
     part = Part(
-        view=VIEWS.get(request.GET.get("view", ""), PICTURES),
         row=page_asked(request, "row"),
-        column=page_asked(request, "column"),
-        sample=page_asked(request, "sample"),
         state=choice_asked(request, "state", State.values),
         search=search_asked(request),
     )

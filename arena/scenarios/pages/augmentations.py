@@ -130,6 +130,9 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
             ).original_image
         case "augmentation":
             name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
+        case "change":
+            row = _augmentation(code)
+            return resize_picture(request, row.image, row)
         case "labelled":
             return _draw_labels(code)
         case "moment":

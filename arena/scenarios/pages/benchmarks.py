@@ -41,7 +41,7 @@ from augment.services.benchmarks import (
 class BenchmarkForm(RequestForm):
     """A new version; scenarios are words, as commands take them."""
 
-    inputs = to_inputs(BenchmarkRequest)
+    inputs = tuple(field for field in to_inputs(BenchmarkRequest) if field.name != "slug")
     scenarios = forms.CharField(
         max_length=60_000,
         help_text=next(field.help for field in inputs if field.name == "scenarios"),
@@ -64,11 +64,10 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
     form, more = BenchmarkForm(request.POST or None), dict[str, Any]()
     if "estimate" in request.POST:
         form.is_valid()
-        for name in ("slug", "title"):
-            form.errors.pop(name, None)
+        form.errors.pop("title", None)
         if not form.errors:
             with refusals_in(form, "scenarios"):
-                wanted = read_request(BenchmarkRequest, form.cleaned_data, slug="", title="")
+                wanted = read_request(BenchmarkRequest, form.cleaned_data, title="")
                 planned = plan_benchmark(wanted)
                 counts = count_tasks((task.split, task.stratum) for task in planned)
                 more = {"counts": counts, "total": len(planned)}

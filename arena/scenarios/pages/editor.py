@@ -17,6 +17,7 @@ from arena.shell.forms import offer, read_code, read_json
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
+from augment.services import SLUG_LENGTH, free_slug, make_slug
 from augment.services.judging import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios import (
@@ -38,17 +39,39 @@ PARTS = ("agents", "lanes", "connectors", "areas")
 class ScenarioForm(forms.Form):
     """A sentence and a drawing for a scene, and their circumstances."""
 
-    slug = forms.CharField(required=False, max_length=scenes.SLUG_LENGTH)
+    slug = forms.CharField(
+        required=False,
+        max_length=SLUG_LENGTH,
+        label="Name",
+        help_text="Empty: made of scene and type.",
+    )
     type = forms.ChoiceField(required=False)
-    own_type = forms.CharField(required=False, max_length=scenes.LONGEST_TYPE)
-    instruction = forms.CharField(required=False, max_length=scenes.INSTRUCTION_LENGTH, strip=True)
+    own_type = forms.CharField(
+        required=False,
+        max_length=scenes.LONGEST_TYPE,
+        label="A type of your own",
+        help_text="It counts where no other is chosen.",
+    )
+    instruction = forms.CharField(
+        required=False,
+        max_length=scenes.INSTRUCTION_LENGTH,
+        strip=True,
+        label="Sentence",
+        widget=forms.Textarea(
+            attrs={"class": "input", "rows": 4, "placeholder": "Made from the drawing."}
+        ),
+    )
     modification = forms.CharField(required=False, max_length=LONGEST_CHANGE)
     derives = forms.BooleanField(required=False)
     keep_traffic = forms.BooleanField(required=False)
     density = forms.ChoiceField(
-        required=False, choices=[(density.value, density.value) for density in DENSITIES]
+        label="Traffic spawned in place of the recorded one",
+        required=False,
+        choices=[(density.value, density.value) for density in DENSITIES],
     )
     goal = forms.ChoiceField(
+        label="Goal of the ego",
+        help_text="Where its way turns; drawn in the pictures, told in the prompts and driven.",
         required=False,
         choices=[
             ("", "as recorded, or straightest"),
@@ -67,12 +90,12 @@ class ScenarioForm(forms.Form):
             Conflict: Nothing is said, or the drawing is no JSON.
         """
         values = self.cleaned_data
-        names = ("instruction", "derives", "keep_traffic", "density", "goal")
+        names, own = ("instruction", "derives", "keep_traffic", "density"), values["own_type"]
         document = _document(values["modification"]) if values["modification"] else None
         if document is None and not values["instruction"]:
             raise InvalidDocument("scenario", [("instruction", NOTHING)])
-        return {name: values[name] for name in names} | {
-            "type": values["type"] or values["own_type"],
+        return {name: values[name] for name in (*names, "goal")} | {
+            "type": values["type"] or make_slug(own).replace("-", "_") or own,
             "reference": document,
         }
 
@@ -102,7 +125,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = ScenarioForm(request.POST or usual)
     if request.method == "POST" and form.is_valid():
         with refusals_in(form):
-            wanted = form.to_values()
+            wanted, name = form.to_values(), form.cleaned_data["slug"] or None
             if original is not None and not wanted["derives"]:
                 wanted |= {"intent": original.intent, "intent_origin": original.intent_origin}
             reference = editing.reference_document(
@@ -112,7 +135,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             new = scenes.NewScenario(
                 scene=scene.slug,
                 **wanted | {"reference": reference},
-                slug=form.cleaned_data["slug"] or None,
+                slug=name and free_slug(Scenario.objects, name, otherwise="scenario"),
                 follows="" if first is None else first.slug,
                 variant_of="" if original is None else original.slug,
             )

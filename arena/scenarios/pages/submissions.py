@@ -19,7 +19,6 @@ from arena.shell.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
 from augment.services import read_request, to_inputs
 from augment.services.benchmarks import submissions
-from augment.services.endpoints import make_free_slug
 from augment.services.running import AcceptRequest, accept_submission
 from augment.services.scenarios import most_megabytes
 from augment.tasks import enqueue_job, enqueue_submission
@@ -46,7 +45,7 @@ class SubmissionForm(forms.Form):
 class AcceptForm(RequestForm):
     """Name of an accepted submission, and whether it runs at once."""
 
-    inputs = to_inputs(AcceptRequest)
+    inputs = tuple(field for field in to_inputs(AcceptRequest) if field.name != "slug")
 
 
 @page_for(*STAFF, ENTRANT)
@@ -96,7 +95,7 @@ def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             send_later(request, enqueue_job, job.pk)
             return redirect("job", code=job.code)
     elif not form.is_bound:
-        form.initial = {"slug": make_free_slug(row.title), "name": row.title, "runs": True}
+        form.initial = {"name": row.title, "runs": True}
     page = Paginator(submissions.get_entries(row), AT_ONCE).get_page(page_asked(request))
     context = {
         "submission": row,

@@ -17,7 +17,7 @@ from arena.shell.listing import read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import SceneView, is_drawn, note_sentences, scene_picture, uploads
-from augment.services.scenarios.scene_imports import free_slug
+from augment.services.scenarios.scene_imports import free_scene_slug
 from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 UPLOADS_SHOWN = 10
@@ -76,13 +76,14 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     moment = moments.filter(code=wanted).first() or moments.first()
     if moment is not None and moment.scene is not None and "keep" in request.GET:
         return redirect("scene", code=moment.scene.code)
-    waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)
+    waits = row.state in row.UNDER_WAY or any(one.state in one.UNDER_WAY for one in moments)
     context = {
         "upload": row,
         "stops": list(enumerate(_stops(row))),
         "moment": moment,
         "notes": note_sentences(((moment and moment.report) or {}).get("notes", ())),
-        "slug": free_slug(row.name.partition(".")[0]),
+        "slug": free_scene_slug(row.name),
+        "strip": _list_strip(row, list(moments)),
         "kept": moments.filter(state=UploadMoment.State.KEPT),
         **wait_for_workers(waits=waits),
     }
@@ -93,17 +94,32 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have one moment drawn by a worker, or kept as a scene, which its page goes on to."""
     row = get_object_or_404(SceneUpload, code=code)
-    slug = request.POST.get("slug", "").strip()
+    is_kept = "keep" in request.POST
     try:
         chosen = _stops(row)[int(request.POST.get("stop", ""))]
     except (ValueError, IndexError):
         raise Conflict("This recording has no such moment.") from None
     moment = uploads.ask_for_moment(
-        row, item=chosen["item"], frame=chosen["frame"], slug=slug, actor=get_user(request)
+        *(row, chosen["item"], chosen["frame"]),
+        slug=free_scene_slug(request.POST.get("name", "") or row.name) if is_kept else "",
+        actor=get_user(request),
     )
     send_later(request, enqueue_moment, moment.pk)
-    goes_on = "&keep=1" if slug else ""
+    goes_on = "&keep=1" if is_kept else ""
     return redirect(f"{reverse('upload', args=[code])}?moment={moment.code}{goes_on}")
+
+
+def _list_strip(
+    row: SceneUpload, moments: list[UploadMoment]
+) -> list[tuple[int, dict[str, Any], UploadMoment]]:
+    """Return the moments that are drawn or will be, in their order, with the numbers of stops."""
+    by_stop = {(moment.item, moment.frame): moment for moment in moments}
+    places = [(stop["item"], stop["frame"]) for stop in _stops(row)]
+    return [
+        (number, _stops(row)[number], by_stop[place])
+        for number, place in enumerate(places)
+        if place in by_stop
+    ]
 
 
 def _stops(row: SceneUpload) -> list[dict[str, Any]]:

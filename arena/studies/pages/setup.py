@@ -22,6 +22,7 @@ from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
 from arena.shell.access import ADMIN, act_for, form_for, get_user
 from arena.shell.acts import is_sure, refusals_in, refusals_told, tell_errors
+from arena.shell.forms import read_code
 from arena.studies.forms import StudyForm
 from arena.studies.queries import (
     FINISHED,
@@ -91,7 +92,7 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     posted = request.POST
-    entered = _read_form(posted) if posted else _initial(draft)
+    entered = _read_form(posted) if posted else _initial(draft, request.GET.get("job", ""))
     if (preset := posted.get("preset")) in PRESETS:
         entered |= _quantities(preset)
     form = _form(entered)
@@ -170,15 +171,16 @@ def _revision(request: HttpRequest) -> int:
     return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else 0
 
 
-def _initial(draft: StudyDraft | None) -> dict[str, Any]:
-    """Return the draft's values, or a common default."""
+def _initial(draft: StudyDraft | None, job_code: str) -> dict[str, Any]:
+    """Return the draft's values, or a common default, of one job where that is given."""
     if draft is not None:
         return dict(draft.entered)
+    job = GenerationJob.objects.filter(code=read_code(job_code)).first()
     people = experts().filter(person__is_simulated=False)
     return _quantities(USUAL) | {
         "practice": has_practice(),
-        "contestants": latest_contestants(),
-        "scenarios": [FINISHED],
+        "contestants": latest_contestants(job),
+        "scenarios": [FINISHED if job is None else f"job:{job.code}"],
         "experts": [user.username for user in people],
     }
 

@@ -9,7 +9,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py import_scene [FORMAT] PATH --slug S [--frame N] [--ego NAME] ...`."""
+    """`manage.py import_scene [FORMAT] PATH [--slug S] [--frame N] [--ego NAME] ...`."""
 
     help = "Import one moment of a recording, or a scene in the own JSON. Formats: " + "; ".join(
         f"{reader.name}, {reader.title}" for reader in READERS.values()
@@ -40,8 +40,7 @@ class Command(TerminalCommand):
             "recorded one)",
         },
         "--slug": {
-            "required": True,
-            "help": "the scene's name: lower-case letters, digits, hyphens",
+            "help": "the scene's name: lower-case letters, digits, hyphens (default: the file's)"
         },
     }
 

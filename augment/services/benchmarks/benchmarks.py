@@ -31,6 +31,7 @@ from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios import scenes
 from augment.services.scenarios.choosing import resolve_scenarios
+from augment.services.slugs import SLUG_LENGTH, check_slug, free_slug
 from augment.services.texts import one_line
 
 
@@ -41,8 +42,10 @@ class BenchmarkRequest:
     slug: str = input_field(
         InputKind.TEXT,
         "Name",
-        "Lower-case letters, digits and hyphens; a name that is there gets its next version.",
-        most=scenes.SLUG_LENGTH,
+        "Lower-case letters, digits and hyphens; one that is there gets its next version. Empty: "
+        "made of the title.",
+        default="",
+        most=SLUG_LENGTH,
     )
     title: str = input_field(InputKind.TEXT, "Title", "In words, for a table's head.", most=120)
     scenarios: Sequence[str] = input_field(
@@ -174,16 +177,18 @@ def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benc
         InvalidDocument: Name, title or a number break their rules.
         Conflict: There are no scenarios, or too many, or somebody else makes the same version.
     """
-    scenes.check_slug(request.slug, what="benchmark")
     title = one_line("title", request.title, what="benchmark")
+    same = Benchmark.objects.filter(title=title).values_list("slug", flat=True).first()
+    slug = request.slug or same or free_slug(Benchmark.objects, title, otherwise="benchmark")
+    check_slug(slug, what="benchmark")
     # Locked as whoever changes a scenario locks it: none changes until the checksum is kept.
     chosen = Scenario.objects.filter(slug__in=resolve_scenarios(request.scenarios))
     list(chosen.order_by("pk").select_for_update(of=("self",)).only("pk"))
     planned = plan_benchmark(request)
     prefetch_related_objects([task.scenario for task in planned], "base_scene")
-    last = Benchmark.objects.filter(slug=request.slug).aggregate(last=Max("version"))["last"]
+    last = Benchmark.objects.filter(slug=slug).aggregate(last=Max("version"))["last"]
     row = Benchmark(
-        slug=request.slug,
+        slug=slug,
         title=title,
         version=(last or 0) + 1,
         made_on=timezone.now().date(),

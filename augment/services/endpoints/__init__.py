@@ -7,7 +7,6 @@ from augment.services.endpoints.contestants import (
     ContestantRequest,
     add_contestant,
     ensure_builtin,
-    make_free_slug,
     paper_variants,
 )
 from augment.services.endpoints.known_endpoints import (

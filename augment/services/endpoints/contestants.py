@@ -1,6 +1,5 @@
 """Contestants: who is there without being added, who is added, and what they would send."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,12 +10,12 @@ from django.db import transaction
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict
 from augment.models import Contestant, EndpointModel
-from augment.services.endpoints.known_endpoints import SLUG_RULE, find_endpoint
+from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.treatments import Respondent, check_roles
 from augment.services.events import log_change
 from augment.services.inputs import Input, InputKind, input_field
-from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug
+from augment.services.slugs import SLUG_RULE, check_slug, free_slug
 from augment.services.texts import one_line
 from augment.variants.options import RULES, ContestantOptions, check_options, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
@@ -63,7 +62,7 @@ class ContestantRequest:
         roles: Who else plays a role.
     """
 
-    slug: str = input_field(InputKind.TEXT, "Slug", SLUG_RULE, most=80)
+    slug: str = input_field(InputKind.TEXT, "Slug", SLUG_RULE, default="", most=80)
     name: str = input_field(
         InputKind.TEXT, "Name", "Empty: made of model and variant.", default="", most=LONGEST_NAME
     )
@@ -102,7 +101,8 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
         InvalidDocument: The slug, a model, a role, an option or the name can't be used.
         Conflict: The slug belongs to another contestant.
     """
-    check_slug(request.slug, what="contestant")
+    slug = request.slug or contestant_slug(request.model, request.variant, request.options)
+    check_slug(slug, what="contestant")
     recipe = find_recipe(request.variant)
     check_roles(recipe, request.roles)
     options = options_from_document(request.options)
@@ -112,7 +112,7 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
     others = _reviewers(request.roles, own, actor)
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
-    title = request.name or _title(request.slug, recipe, options, own, others)
+    title = request.name or _title(slug, recipe, options, own, others)
     is_simulated = any(respondent.endpoint.is_simulated for respondent in (own, *others.values()))
     columns: dict[str, Any] = {
         "name": one_line("name", title, what="contestant"),
@@ -126,7 +126,7 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
         },
         "options": options.to_document(),
     }
-    row, made = Contestant.objects.get_or_create(slug=request.slug, defaults=columns)
+    row, made = Contestant.objects.get_or_create(slug=slug, defaults=columns)
     if made:
         log_change(
             row, "add", actor, after=columns | {"slug": row.slug, "endpoint": own.endpoint.label}
@@ -145,18 +145,10 @@ def paper_variants(model: EndpointModel) -> tuple[str, ...]:
     return ("otm", "fc", "tqa", *(["vqa"] if model.vision else []))
 
 
-def free_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
+def contestant_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
     """Return a slug that says how a contestant asks and that nobody has."""
-    return make_free_slug("-".join((model, variant, options_from_document(options).slug())))
-
-
-def make_free_slug(words: str) -> str:
-    """Return a slug made of these words that no contestant has."""
-    stem = re.sub(r"[^a-z0-9]+", "-", words.lower())
-    stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
-    taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
-    numbered = (f"{stem}-{number}" for number in range(2, len(taken) + 3))
-    return next(free for free in (stem, *numbered) if free not in taken)
+    words = "-".join((model, variant, options_from_document(options).slug()))
+    return free_slug(Contestant.objects, words, otherwise="contestant")
 
 
 def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelRole, Respondent]:

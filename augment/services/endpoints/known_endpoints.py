@@ -28,11 +28,10 @@ from augment.llm.wire_transport import host_and_port
 from augment.models import Endpoint, EndpointModel, KeyBinding
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.scenarios.scenes import check_slug
+from augment.services.slugs import check_slug, free_slug
 
 OPENAI, OPENAI_URL, OPENAI_KEY = "openai", "https://api.openai.com/v1", "OPENAI_API_KEY"
 
-SLUG_RULE = "Lower-case letters, digits, hyphens."
 KEY_RULE = "a variable whose name ends in _API_KEY, or one that ARENA_KEY_VARIABLES lists"
 
 _VENDORS = resources.files(__package__).joinpath("vendor_keys.txt").read_text().split()
@@ -67,7 +66,11 @@ class EndpointRequest(EndpointFacts):
     """A new endpoint; label and kind stay for ever."""
 
     label: str = input_field(
-        InputKind.TEXT, "Name", f"{SLUG_RULE} Empty: made of the address.", default="", most=80
+        InputKind.TEXT,
+        "Name",
+        "Lower-case letters, digits, hyphens. Empty: made of the address.",
+        default="",
+        most=80,
     )
     is_simulated: bool = input_field(
         InputKind.SWITCH, "A stand-in: what it answers counts as simulated", default=False
@@ -287,13 +290,7 @@ def _read_bindings() -> dict[str, str]:
 def _make_label(base_url: str) -> str:
     """Return the host of an address as a label that no endpoint has."""
     server = host_and_port(base_url).removesuffix(":443").removesuffix(":80")
-    stem = re.sub(r"[^a-z0-9]+", "-", server).strip("-")[:70] or "endpoint"
-    taken = set(Endpoint.objects.values_list("label", flat=True))
-    return next(
-        name
-        for name in (stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3)))
-        if name not in taken
-    )
+    return free_slug(Endpoint.objects, server, otherwise="endpoint", column="label")
 
 
 def _change(

@@ -6,6 +6,7 @@ settles it. The one that was corrected stays as it is.
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import Q
 
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
@@ -13,8 +14,8 @@ from augment.scene.codec import modification_from_document, modification_to_docu
 from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.editing import read_edit
-from augment.services.scenarios.scenes import check_slug
-from augment.services.texts import LONGEST_NOTES, check_prose
+from augment.services.slugs import free_slug
+from augment.services.texts import LONGEST_NOTES, check_prose, one_line
 
 BY_HAND = "by-hand"
 NAME = "Corrected by hand"
@@ -36,12 +37,12 @@ def keep_correction(
     Args:
         original: What is corrected; it stays as it is.
         document: The modification as it should be.
-        slug: Of the contestant that it counts for; made if there is none.
+        slug: Of the contestant that it counts for, or a person's name; made if there is none.
         notes: Why it was corrected, or nothing.
         actor: Whose hand it was.
 
     Raises:
-        InvalidDocument: The document, the slug or the notes break their format.
+        InvalidDocument: The document, the name or the notes break their format.
         InvalidModification: The modification does not fit the scene.
         Conflict: Nothing was changed, nothing is left, or the slug is that of somebody who is no
             person or retired.
@@ -70,7 +71,11 @@ def keep_correction(
         corrects=original,
         made_by_id=actor_pk,
     )
-    made = {"augmentation": str(row.code), "contestant": slug, "modification": row.modification}
+    made = {
+        "augmentation": str(row.code),
+        "contestant": contestant.slug,
+        "modification": row.modification,
+    }
     log_change(original, "correct", actor, before={"modification": before}, after=made)
     return row
 
@@ -83,12 +88,13 @@ def starting_document(original: Augmentation) -> dict[str, object]:
     )
 
 
-def _find_or_add_person(slug: str) -> Contestant:
-    check_slug(slug, what="contestant")
-    name = NAME if slug == BY_HAND else slug
-    row, _ = Contestant.objects.get_or_create(
-        slug=slug, defaults={"name": name, "kind": Kind.HUMAN}
-    )
+def _find_or_add_person(name: str) -> Contestant:
+    is_meant = Q(slug=name) | Q(name=name, kind=Kind.HUMAN)
+    row = Contestant.objects.filter(is_meant).order_by("pk").first()
+    if row is None:
+        title = NAME if name == BY_HAND else one_line("name", name, what="contestant")
+        slug = free_slug(Contestant.objects, name, otherwise="person")
+        row = Contestant.objects.create(slug=slug, name=title, kind=Kind.HUMAN)
     if row.kind != Kind.HUMAN or row.retired_at:
-        raise Conflict(f"“{row.name}” is no person or is retired; choose another slug.")
+        raise Conflict(f"“{row.name}” is no person or is retired; choose another name.")
     return row

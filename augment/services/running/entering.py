@@ -9,11 +9,10 @@ from augment.errors import Conflict
 from augment.models import Contestant, GenerationJob, Submission
 from augment.services.benchmarks.submissions import Decision, State, decide, lock_undecided
 from augment.services.endpoints.contestants import LONGEST_NAME
-from augment.services.endpoints.known_endpoints import SLUG_RULE
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running.jobs import JobRequest, launch
-from augment.services.scenarios.scenes import check_slug
+from augment.services.slugs import SLUG_RULE, check_slug, free_slug
 from augment.services.texts import one_line
 from augment.variants.options import MOST_SAMPLES
 
@@ -22,7 +21,7 @@ from augment.variants.options import MOST_SAMPLES
 class AcceptRequest:
     """Name of an accepted submission, and whether it runs at once."""
 
-    slug: str = input_field(InputKind.TEXT, "Short name in files", SLUG_RULE, most=80)
+    slug: str = input_field(InputKind.TEXT, "Short name in files", SLUG_RULE, default="", most=80)
     name: str = input_field(InputKind.TEXT, "Name in results", most=LONGEST_NAME)
     runs: bool = input_field(
         InputKind.SWITCH, "Run it on all scenarios of the benchmark now", default=False
@@ -40,19 +39,20 @@ def accept_submission(
         Conflict: The submission is decided, not read, or nothing of it could be; or the slug is
             taken.
     """
-    check_slug(request.slug, what="contestant")
     name = one_line("name", request.name, what="contestant")
+    slug = request.slug or free_slug(Contestant.objects, name, otherwise="contestant")
+    check_slug(slug, what="contestant")
     row = lock_undecided(row)
     if row.state != State.CHECKED or row.summary is None:
         raise Conflict("It can't be accepted before its report is there.")
     if not row.summary["entries"].get("read"):
         raise Conflict("Nothing of it could be read; decline it with a reason.")
     contestant, is_new = Contestant.objects.get_or_create(
-        slug=request.slug,
+        slug=slug,
         defaults={"name": name, "kind": Contestant.Kind.SUBMISSION, "card": row.summary["card"]},
     )
     if not is_new:
-        raise Conflict(f"There is another contestant called {request.slug!r}: choose another.")
+        raise Conflict(f"There is another contestant called {slug!r}: choose another.")
     log_change(contestant, "add", actor, after={"slug": contestant.slug, "name": name})
     decide(row, Decision.ACCEPTED, actor=actor, contestant=contestant)
     return contestant, _run(row, contestant, actor) if request.runs else None

@@ -116,7 +116,7 @@ def _contestant(key: str, options: ContestantOptions) -> Contestant:
     chosen = options_from_document(document)
     endpoint = Endpoint.objects.get(label=label)
     return Contestant(
-        slug=contestants.free_slug(model, variant, document),
+        slug=contestants.contestant_slug(model, variant, document),
         name=f"{model} {spell_variant(variant)} {chosen.describe()}".strip()[
             : contestants.LONGEST_NAME
         ],

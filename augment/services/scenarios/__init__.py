@@ -11,8 +11,6 @@ from augment.services.scenarios.editing import (
 )
 from augment.services.scenarios.pair_pictures import draw_pair
 from augment.services.scenarios.pictures import (
-    THUMBNAILS,
-    WIDTHS_PX,
     SceneView,
     camera_key,
     film_document,
@@ -24,7 +22,6 @@ from augment.services.scenarios.pictures import (
     redraw,
     reference_picture,
     scene_picture,
-    shrink,
 )
 from augment.services.scenarios.prompts import (
     ShownPrompt,
@@ -36,7 +33,6 @@ from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
-    SLUG_LENGTH,
     NewScenario,
     ScenarioType,
     add_scenario,
@@ -44,4 +40,5 @@ from augment.services.scenarios.scenes import (
     type_choices,
     type_label,
 )
+from augment.services.scenarios.thumbnails import THUMBNAILS, WIDTHS_PX, shrink
 from augment.services.scenarios.uploads import most_megabytes

@@ -24,6 +24,7 @@ from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_change, retire
 from augment.services.scenarios import scenes as scene_rows
+from augment.services.slugs import check_slug
 
 SOURCE = "authored"
 _SHARED = {
@@ -91,7 +92,7 @@ def _read_files(
         try:
             made = parse(read_json(file, what=folder.name.removesuffix("s")))
             name = getattr(made, key)
-            scene_rows.check_slug(name, what="catalogue", key=key)
+            check_slug(name, what="catalogue", key=key)
             if name != file.stem:
                 text = f"expected {file.stem!r} as the file is called, got {name!r}"
                 raise InvalidDocument("catalogue", [(key, text)])

@@ -80,7 +80,7 @@ def make_draft(scene: BaseScene, scenario: Scenario | None, *, keep_traffic: boo
 def editor_document(draft: Scenario) -> dict[str, Any]:
     """Return the picture's window, who is there before the change, and what can be placed.
 
-    `ahead` is x, y and heading of what is placed ahead, on the ego's lane.
+    `ahead` is x, y and heading of what is placed ahead, on the ego's lane; `route` the ego's way.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
@@ -90,10 +90,12 @@ def editor_document(draft: Scenario) -> dict[str, Any]:
     ahead = (_AHEAD_M, 0.0, 0.0)
     if route is not None:
         ahead = (*route.position(_AHEAD_M), route.heading_at(_AHEAD_M))
+    points = [(0.0, 0.0), (1.0, 0.0)] if route is None else route.line.points_m.round(2).tolist()
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
         "ahead": [round(number, 2) for number in ahead],
+        "route": {"points": points, "ego_s_m": 0.0 if route is None else route.ego_s_m},
         "recorded": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=True)),
         "cleared": _list_agents(make_draft(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {

@@ -27,7 +27,7 @@ from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.density import keep_clear
 from augment.scene.entities import AgentType, InterplanRules, Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.services.scenarios.scene_imports import free_slug, keep_reading
+from augment.services.scenarios.scene_imports import free_scene_slug, keep_reading
 from augment.services.scenarios.scenes import NewScenario, add_scenario
 
 _KEY = "modification_details_dictionary"
@@ -128,7 +128,7 @@ def _keep_token(
         try:
             row, _ = keep_reading(reading, source=source, path=log, actor=actor)
         except Conflict:  # an earlier release kept less of the map under this name
-            scene = replace(reading.scene, name=free_slug(reading.scene.name))
+            scene = replace(reading.scene, name=free_scene_slug(reading.scene.name))
             reading = replace(reading, scene=scene)
             row, _ = keep_reading(reading, source=source, path=log, actor=actor)
     except AugmentError as fault:

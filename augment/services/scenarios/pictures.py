@@ -18,7 +18,6 @@ from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw, draw_empty, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
-from augment.render.canvas import shrink_png
 from augment.render.film import make_film
 from augment.render.legend import change_keys
 from augment.scene import codec
@@ -294,26 +293,6 @@ def draw_scenario(scenario_pk: int) -> None:
         return
     camera = camera_for(load_scene(row), reference, expect=partial(load_expected, row))
     _keep(name, *_draw(row, reference, camera))
-
-
-THUMBNAILS = "thumbnails"
-WIDTHS_PX = (400, 800)
-"""How wide they are at most: for a cell of a grid, and for one of a gallery; twice that on fine
-screens."""
-# Raised whenever the same picture is made smaller in another way.
-_LOOK = 1
-
-
-def shrink(name: str, widest_px: int) -> str:
-    """Return the name of a stored picture made smaller, "" where there is no such picture."""
-    small = f"{THUMBNAILS}/{_LOOK}-{widest_px}/{name}"
-    if not name or default_storage.exists(small):
-        return small if name else ""
-    if not default_storage.exists(name):
-        return ""
-    with default_storage.open(name) as file:
-        store_as(small, shrink_png(file.read(), widest_px))
-    return small
 
 
 def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[str]]:

@@ -1,8 +1,6 @@
 """Recorded and written scenes from outside, as rows."""
 
-import re
 from collections.abc import Iterable, Mapping
-from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,8 @@ from augment.formats.reading import Reading
 from augment.models import BaseScene
 from augment.scene.codec import recording_to_document, scene_to_document
 from augment.services.events import log_change
-from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
+from augment.services.scenarios.scenes import content_hash
+from augment.services.slugs import check_slug, free_slug
 
 
 def import_scene(
@@ -24,7 +23,7 @@ def import_scene(
     path: Path,
     frame: int | None = None,
     item: str | None = None,
-    slug: str,
+    slug: str | None = None,
     actor: User | None = None,
 ) -> BaseScene:
     """Read a scene from outside and keep it, with its recording and what the source left open.
@@ -34,7 +33,7 @@ def import_scene(
         path: The file or folder.
         frame: The step that becomes t0, from 0; None for what the format means.
         item: Which part of a file that holds several; None for the first.
-        slug: The new scene's name; lower-case letters, digits and hyphens.
+        slug: The new scene's name; made of the file's when None.
         actor: Who did it.
 
     Raises:
@@ -42,6 +41,7 @@ def import_scene(
         InvalidDocument: The input or the slug breaks its format.
         Conflict: The slug is taken, or the same scene is stored already.
     """
+    slug = slug or free_scene_slug(path.name)
     check_slug(slug, what="scene")
     recorded = UntrustedInput(path=path, format=source)
     name, reading = recorded.read(item=item, frame=frame, name=slug)
@@ -93,11 +93,9 @@ def note_sentences(notes: Iterable[Any]) -> list[str]:
     return [note if isinstance(note, str) else _earlier_sentence(note) for note in notes]
 
 
-def free_slug(stem: str) -> str:
-    """Return a name that no scene has, from letters of any kind."""
-    stem = re.sub(r"[^a-z0-9]+", "-", stem.lower())[: SLUG_LENGTH - 8].strip("-") or "scene"
-    names = chain([stem], (f"{stem}-{number}" for number in count(2)))
-    return next(name for name in names if not BaseScene.objects.filter(slug=name).exists())
+def free_scene_slug(name: str) -> str:
+    """Return a slug for a scene, made of its name or of a file's before the first dot."""
+    return free_slug(BaseScene.objects, name.partition(".")[0], otherwise="scene")
 
 
 def _earlier_sentence(note: Mapping[str, Any]) -> str:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -32,6 +31,7 @@ from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
+from augment.services.slugs import SLUG_LENGTH, check_slug, free_slug
 from augment.services.texts import check_prose
 from augment.simulation.expected import expect_recording
 
@@ -75,7 +75,6 @@ def label_for(name: str) -> str:
     return before.first() or re.sub(r"[_-]", " ", name).capitalize()
 
 
-SLUG_LENGTH = 80
 INSTRUCTION_LENGTH = 2_000
 """An instruction is read above the pictures, and by models: a few sentences."""
 
@@ -472,27 +471,14 @@ def check_reference(scene: entities.Scene, modification: entities.Modification) 
         raise InvalidDocument("modification", problems)
 
 
-def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
-    """Raise unless a slug can be stored.
-
-    Raises:
-        InvalidDocument: It has other characters, or is too long.
-    """
-    if len(slug) > SLUG_LENGTH or not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", slug):
-        rule = f"lower-case letters, digits and single hyphens, at most {SLUG_LENGTH}"
-        raise InvalidDocument(what, [(key, f"{slug!r} must be {rule}")])
-
-
 # Private
 
 
 def _free_slug(base_scene: BaseScene, name: str) -> str:
     kind = find_type(name)
     stem = (name if kind is None else kind.name).lower().replace("_", "-")
-    return _number_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}")
+    return _number_slug(f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 10].strip('-')}-{stem}")
 
 
 def _number_slug(stem: str) -> str:
-    stem = stem[: SLUG_LENGTH - 6].strip("-")
-    taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
-    return next(name for n in count(1) if (name := f"{stem}-{n}") not in taken)
+    return free_slug(Scenario.objects, stem, otherwise="scenario", starts_at=1)

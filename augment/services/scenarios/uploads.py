@@ -29,7 +29,7 @@ from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import draw_scene, store_as
 from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.scenarios.scenes import check_slug
+from augment.services.slugs import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
 
 State = SceneUpload.State
@@ -38,6 +38,8 @@ FOLDER, PREVIEWS = "uploads", "previews"
 FORMATS = {reader.name: reader.title for reader in READERS.values()}
 """By name, what can be read."""
 EVERY_S = 0.5
+STRIP = 20
+"""Moments of a recording that are drawn unasked, evenly spread over it."""
 MOST_STOPS = 2_000
 """Moments that are offered; later ones of a longer recording are not."""
 
@@ -167,6 +169,19 @@ class Uploads(WorkKind[SceneUpload]):
             defaults={"state": MomentState.DRAWN, "asked_by": row.uploaded_by},
         )
         UploadMoment.objects.filter(pk=shown.pk).update(**_preview(shown, reading))
+        spread = offered[:: -(-len(offered) // STRIP)]
+        UploadMoment.objects.bulk_create(
+            (
+                UploadMoment(
+                    upload=row,
+                    item=moment.item or "",
+                    frame=moment.frame,
+                    asked_by=row.uploaded_by,
+                )
+                for moment in spread
+            ),
+            ignore_conflicts=True,
+        )
         is_cut = len(moments) > MOST_STOPS
         columns = {"format": name, "tracks": _parts(offered), "is_cut": is_cut}
         return Settlement(state=State.READ, columns=columns)
@@ -191,7 +206,7 @@ def _parts(moments: Sequence[Moment]) -> list[dict[str, Any]]:
 
 
 def ask_for_moment(
-    upload: SceneUpload, *, item: str, frame: int, slug: str = "", actor: User | None = None
+    upload: SceneUpload, item: str, frame: int, *, slug: str = "", actor: User | None = None
 ) -> UploadMoment:
     """Have a moment that the upload offers drawn, or kept as a scene.
 
