@@ -18,7 +18,7 @@ from augment.scene.intent import Spot
 from augment.scene.intent_parts import MotionWish, Side, StartWish
 from augment.scene.motion import STEP_S
 from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo, PlannedMotion
-from augment.scene.planned_mover import carry_out, walk_as_motion
+from augment.scene.planned_mover import walk_as_motion
 from augment.scene.presets import find_bend_end
 
 # Since its start.
@@ -45,7 +45,7 @@ def check_course(case: Case) -> Iterator[Finding]:
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
             motion = agent.motion
             if motion is None and agent.speed_mps > 0.0:
-                motion = PlannedMotion()  # it holds its velocity along its lane
+                motion = PlannedMotion()  # it goes on as its scene has it
             if motion is None:
                 words = f"{{agents[0]}} has no motion; asked for: {wish.preset.label.lower()}."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
@@ -98,10 +98,10 @@ def _start(
 def _carry_out(case: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
     """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
     begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
-    alone = replace(agent, motion=replace(motion, start=begins))
+    alone = agent.motion and replace(agent, motion=replace(motion, start=begins))
     times_s = np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist()
     # (T, 4), without the steps past the map.
-    states = carry_out(alone, case.route.graph, times_s)
+    states = case.carry_out(alone or agent, times_s)
     return states[~np.isnan(states[:, 0])]
 
 

@@ -6,8 +6,10 @@ number comes from.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+
+import numpy as np
 
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import Ground
@@ -15,6 +17,9 @@ from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
+from augment.scene.motion import STEP_S, FloatArray
+from augment.scene.planned_motion import PlannedMotion
+from augment.scene.planned_mover import carry_out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,6 +269,17 @@ class Case:
     def left_m(self, agent: TrafficAgent) -> float:
         """Return how far left of the ego's route an agent is."""
         return self.route.locate_agent(agent).left_m
+
+    def carry_out(self, agent: TrafficAgent, times_s: Sequence[float]) -> FloatArray:
+        """Return the states (T, 4) of a changed agent whose motion, if any, waits for nobody."""
+        if agent.motion is not None or self.ground.scene.options.interplan is None:
+            planned = replace(agent, motion=agent.motion or PlannedMotion())
+            return carry_out(planned, self.route.graph, times_s)
+        change = self.modification.with_changed(agent)
+        movements = self.ground.motion_after(change, of_all=False).others
+        (states,) = (one.states for one in movements if one.agent.id == agent.id)
+        steps = np.round(np.array(times_s) / STEP_S).astype(int)
+        return np.asarray(states[steps])
 
     def gap(self, wanted: wish.Length) -> "Bounds":
         """Return how far apart two things may be of which this is asked for."""

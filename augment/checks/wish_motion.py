@@ -22,7 +22,7 @@ from augment.scene import planned_motion, presets
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.intent import MotionWish, Request, Spot, VehicleRequest
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
-from augment.scene.planned_mover import carry_out, walk_as_motion, way_and_speed
+from augment.scene.planned_mover import walk_as_motion, way_and_speed
 
 _FURTHER_S = 15.0
 """So long after its start a motion is followed to see where it leads."""
@@ -81,14 +81,9 @@ class MotionCase:
 
     def carry_out(self, agent: TrafficAgent, until_s: float = HORIZON_S) -> FloatArray:
         """Return the states (T, 4) of an agent whose motion, if any, waits for nobody."""
-        if agent.motion is None:
-            change = self.whole.modification.with_changed(agent)
-            movements = self.whole.ground.motion_after(change, of_all=False).others
-            (states,) = (one.states for one in movements if one.agent.id == agent.id)
-            return states[: round(until_s / STEP_S) + 1]
         # Half a step more, so that rounding loses no last step.
         times_s = np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist()
-        return carry_out(agent, self.whole.route.graph, times_s)
+        return self.whole.carry_out(agent, times_s)
 
     def find_offsets(self, agent: TrafficAgent) -> FloatArray:
         """Return from an agent to the answer (T, 2), in m; NaN where one is past the map."""

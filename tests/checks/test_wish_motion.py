@@ -10,14 +10,21 @@ from typing import Any
 
 import pytest
 
-from augment.checks import Ground, Severity
+from augment.checks import FindingKind, Ground, Severity
 from augment.checks.registry import check_against_intent
 from augment.checks.wish import measure_wish
 from augment.metrics.displacement import displacement
-from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.entities import (
+    AgentType,
+    InterplanRules,
+    Modification,
+    SceneOptions,
+    TrafficAgent,
+)
 from augment.scene.intent import Intent, VehicleRequest
 from augment.scene.intent_parts import Amount, StartWish
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, PointPath
+from augment.simulation.expected import expect_recording
 from tests.fixtures.shelf import MOVING_SLUGS, ROUNDED_M, entry, shown_scene
 
 CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
@@ -238,3 +245,15 @@ def test_where_a_motion_begins_is_judged_over_time() -> None:
     found = displacement(change, entry(slug).reference, Ground.of(shown_scene(slug)))
     assert found.mean_m is not None
     assert wish_m(slug, change) < found.mean_m
+
+
+def test_by_interplans_rules_a_bus_without_a_motion_runs_no_red_light() -> None:
+    authored, change = entry(BUS), Modification(added=(bus(-60.0),))
+    assert authored.intent is not None
+    options = SceneOptions(interplan=InterplanRules())
+    ground = Ground.of(replace(shown_scene(BUS), options=options), expect_recording)
+    findings = check_against_intent(ground, change, authored.intent)
+    assert FindingKind.ASKED_CROSSING in [one.kind for one in findings if one.is_fault]
+    measured = measure_wish(ground, change, authored.intent)
+    assert measured is not None
+    assert measured.matches[0].distance_m > 1.0
