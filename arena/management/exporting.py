@@ -10,6 +10,7 @@ from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
 from arena.exports.formats import Export, format_named
+from arena.jobs.exports.faults import tabulate_votes
 from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
@@ -137,6 +138,14 @@ def _write_table(name: str, chosen: Chosen, **more: Any) -> ExportedFile:
     return _write(JOB_FILES[name], chosen["format"], lambda: find_job(chosen["job"]), **more)
 
 
+def _write_faults(options: Chosen, say: Say) -> ExportedFile:
+    """Write the table of labels by hand, or of what was marked on ballots."""
+    if options["from"] == "labels":
+        return _write_table("faults", options)
+    table = Export(JOB_FILES["faults"].formats, tabulate_votes)
+    return _write(table, options["format"], lambda: find_job(options["job"]))
+
+
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """Write how far from the references: in groups, or one row an object."""
     part = "objects" if options["by"] == BY_OBJECT else f"by-{options['by']}"
@@ -211,6 +220,7 @@ _OF_RATING = _option("--rating", "the code of an older rating", type=UUID) | _op
 )
 _CONTESTANT = _option("--contestant", "the slug of one; all unless given")
 _DRIVEN = "as it was simulated with"
+_FAULT_SOURCES = {"choices": ["labels", "votes"], "default": "labels"}
 
 KINDS: dict[str, ExportKind] = {
     "leaderboard": ExportKind(
@@ -292,6 +302,13 @@ KINDS: dict[str, ExportKind] = {
         for name, table in JOB_FILES.items()
         if table.help
     },
+    "faults": ExportKind(
+        "job",
+        JOB_FILES["faults"].help,
+        _write_faults,
+        _option("--from", "what experts labelled, or marked on ballots", **_FAULT_SOURCES)
+        | _format(JOB_FILES["faults"].formats),
+    ),
     "analyses": ExportKind(
         "job",
         "pairs of contestants, wordings, refusals",

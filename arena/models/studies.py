@@ -1,5 +1,7 @@
 """Studies and what they show."""
 
+from typing import Any
+
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
@@ -42,6 +44,9 @@ class Study(CodedModel):
     )
     ask_strength = models.BooleanField(
         default=False, help_text="experts say whether a preference is slight or clear"
+    )
+    ask_why = models.BooleanField(
+        default=False, help_text="experts may mark which object is wrong, and in what"
     )
     allow_replay = models.BooleanField(
         default=False,
@@ -124,6 +129,9 @@ class Matchup(CodedModel):
     )
     asked = ""
     """The question that comes next, where a query of the voting page has looked it up."""
+    objects_shown: list[list[Any]] | None = None
+    """Of either side, left first, the changed objects that can be marked, where a query of the
+    voting page has looked them up: id, x, y and radius in pixels of the picture each."""
 
     batch = models.PositiveIntegerField(
         default=0, help_text="0 was planned at the opening; later plannings count up"

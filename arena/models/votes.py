@@ -98,6 +98,11 @@ class Vote(AppendOnly):
     aids = models.CharField(
         max_length=80, blank=True, help_text="aids used, in a fixed order, joined by blanks"
     )
+    faults = models.JSONField(
+        default=list,
+        blank=True,
+        help_text="what the expert marked as wrong: [side, id of the object, class of fault] each",
+    )
     winner = models.ForeignKey(
         Augmentation, null=True, blank=True, on_delete=models.PROTECT, related_name="wins"
     )

@@ -26,7 +26,13 @@ from arena.people.services import keep_voting
 from arena.voting.queries.ballots import require_open, upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
-from arena.voting.services.casting import LONGEST_COMMENT, Decision, receive_vote
+from arena.voting.services.casting import (
+    FAULT_CLASSES,
+    LONGEST_COMMENT,
+    Decision,
+    FaultMark,
+    receive_vote,
+)
 from arena.voting.services.reports import SIDES, Complaint, report
 
 PNG = "image/png"
@@ -68,11 +74,25 @@ class MatchupDocument(serializers.Serializer[Any]):
     ego_px = serializers.ListField(child=serializers.FloatField())
     width = serializers.IntegerField()
     height = serializers.IntegerField()
+    objects = serializers.DictField(
+        child=serializers.ListField(child=serializers.ListField(child=serializers.FloatField())),
+        required=False,
+        help_text="Where the study asks what is wrong: of a and b the changed objects that can be "
+        "marked, x, y and radius in pixels each.",
+    )
     legend = serializers.ListField(
         child=serializers.CharField(),
         required=False,
         help_text="Which kinds of marks the two pictures hold; absent of pairs planned before.",
     )
+
+
+class FaultBody(StrictSerializer):
+    """A mark of what is wrong."""
+
+    side = serializers.ChoiceField(choices=["A", "B"])
+    object = WholeNumberField(min_value=0, help_text="Its place in `objects` of the side.")
+    fault = serializers.ChoiceField(choices=FAULT_CLASSES)
 
 
 class VoteBody(StrictSerializer):
@@ -98,6 +118,7 @@ class VoteBody(StrictSerializer):
     aids = serializers.ListField(
         child=serializers.ChoiceField(choices=AIDS), required=False, default=list, max_length=16
     )
+    faults = FaultBody(many=True, required=False, default=list)
     supersedes = CodeField(required=False, allow_null=True, default=None)
     n = WholeNumberField(required=False, default=AHEAD, min_value=1, max_value=MOST)
 
@@ -174,6 +195,10 @@ class VotesView(ApiView):
         The same key counts once, however often it arrives.
         """
         n, outcome = params.pop("n"), OUTCOMES[params.pop("outcome")]
+        marks = params.pop("faults")
+        params["faults"] = [
+            FaultMark(SIDES[mark["side"]].value, mark["object"], mark["fault"]) for mark in marks
+        ]
         received = receive_vote(expert=self.user, decision=Decision(outcome=outcome, **params))
         progress = received.progress
         coming = upcoming(study=received.study, expert=self.user, n=n)

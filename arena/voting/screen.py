@@ -14,7 +14,7 @@ from django.utils.translation import pgettext
 from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
 from arena.voting.queries.ballots import list_voters, own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
-from arena.voting.queries.showings import as_shown
+from arena.voting.queries.showings import as_shown, note_objects
 from arena.voting.services.reports import SIDES
 
 AHEAD = 5
@@ -22,6 +22,9 @@ AHEAD = 5
 
 UNDOABLE = 10
 """How many pairs back; each question of one is a step."""
+
+FIRST_PAIRS = 5
+"""Over so many the legend stands as a strip, however low the window."""
 
 LONGEST = 3
 """How many instructions: which of them takes most lines depends on words and fonts."""
@@ -60,14 +63,22 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         matchup__code__in=[pair["matchup"] for pair in shown]
     )
     last = {vote.pk: vote for vote in (*context["last"], *on_them.reverse())}
+    if study.ask_why:
+        note_objects([vote.matchup for vote in last.values()])
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
         "is_filmed": has["play"],
         "alts": alts,
-        "modules": MODULES,
+        "first_pairs": FIRST_PAIRS,
+        "modules": [*MODULES, *(["js/vote-why.js"] if study.ask_why else [])],
         "legend": switches["legend"],
         "pressed": [name for name, is_on in switches.items() if is_on],
-        "tools": [("skip", _("Skip")), ("report", _("Report")), ("comment", _("Comment"))],
+        "tools": [(name, label) for name, label in _tools().items() if name in keys],
+        "fault_classes": [
+            ("position", _("Position")),
+            ("heading", pgettext("of an object", "Heading")),
+            ("logic", pgettext("of a scene", "Logic")),
+        ],
         "skip_reasons": Vote.SkipReason.choices,
         "report_reasons": Report.Reason.choices,
         "report_sides": [(name, side.label) for name, side in SIDES.items()],
@@ -79,6 +90,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "outbox": f"arena votes {expert.person.code} {study.code}",
             "urls": _urls(study),
             "alts": alts,
+            "first_pairs": FIRST_PAIRS,
             "pairs": pairs,
             "last": [_as_json(vote) for vote in last.values()],
             "change": changed,
@@ -86,6 +98,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "rings": has["rings"],
             "today": _times_today(study, expert),
             "ask_strength": study.ask_strength,
+            "ask_why": study.ask_why,
             "preferences": {**switches, "keys": keys},
             "saved": progress.voted,
             "total": progress.total,
@@ -113,6 +126,7 @@ def _has(study: Study) -> dict[str, bool]:
         **dict.fromkeys(("play", "back", "on", "rate"), is_filmed),
         "replay": study.allow_replay,
         "both_miss": study.allow_both_miss,
+        "why": study.ask_why,
         "rings": not study.rules.get("hide_rings"),
     }
 
@@ -141,7 +155,11 @@ def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
         vote = own_votes(study, expert).filter(key=key).first() if key else None
     except ValidationError:  # it is no key at all
         return None
-    return None if vote is None else _as_json(vote)
+    if vote is None:
+        return None
+    if study.ask_why:
+        note_objects([vote.matchup])
+    return _as_json(vote)
 
 
 def _as_json(vote: Vote) -> dict[str, Any]:
@@ -154,8 +172,22 @@ def _as_json(vote: Vote) -> dict[str, Any]:
         "both_miss": vote.both_miss,
         "strength": vote.strength,
         "comment": vote.comment,
+        "aids": vote.aids.split(),
+        "ms_visible": vote.ms_visible,
+        "faults": _list_faults(vote),
         "shown": as_shown(vote.matchup),
     }
+
+
+def _list_faults(vote: Vote) -> list[dict[str, Any]]:
+    """Return what was marked as the wire has it: by side and place."""
+    left, right = vote.matchup.objects_shown or ([], [])
+    places = {
+        (side, mark[0]): {"side": letter, "object": place}
+        for side, letter, marks in (("left", "A", left), ("right", "B", right))
+        for place, mark in enumerate(marks)
+    }
+    return [places[side, name] | {"fault": fault} for side, name, fault in vote.faults]
 
 
 def _urls(study: Study) -> dict[str, str]:
@@ -165,6 +197,15 @@ def _urls(study: Study) -> dict[str, str]:
         "matchups": f"{reverse('api-matchups')}?study={study.code}",
         "reports": reverse("api-reports"),
         "preferences": reverse("api-preferences"),
+    }
+
+
+def _tools() -> dict[str, str]:
+    return {
+        "why": _("What is wrong"),
+        "skip": _("Skip"),
+        "report": _("Report"),
+        "comment": _("Comment"),
     }
 
 

@@ -211,6 +211,13 @@ export class Player {
     this.paint();
   }
 
+  // Where what began at a place is at this step; undefined for who is not filmed.
+  placeOf(side, [x, y]) {
+    const film = this.films[side];
+    const mover = film?.movers.find(({ first, poses: [[left, top]] }) => first === 0 && Math.hypot(left - x, top - y) < 1);
+    return mover && poseOf(mover, this.step);
+  }
+
   #tick(now) {
     if (!this.isPlaying) return;
     const gone = this.#from + (Math.max(0, now - this.begun) * RATES[this.#rate]) / (1000 * this.films[0].step_s);

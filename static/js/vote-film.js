@@ -11,6 +11,12 @@ for (const scene of bar ? document.querySelectorAll(".panel > .scene") : []) {
 
 export const filmActions = Object.fromEntries(["play", "back", "on", "rate"].map((name) => [name, () => player[name]()]));
 
+// Where something is now that a still shows at a place, both in pixels of the picture.
+export const placeOf = (side, spot) => player?.placeOf(side, spot) ?? spot;
+
+// The stills, where things are marked.
+export const stand = () => player?.jump(0);
+
 // Both at once, in the frame of their stills where they are there already.
 export function roll(pair, frames, isShown) {
   player?.clear();

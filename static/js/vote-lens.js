@@ -8,10 +8,11 @@ const CLOSE = 4;
 const SVG = "http://www.w3.org/2000/svg";
 const between = (low, value, high) => Math.min(high, Math.max(low, value));
 
+const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 const RING_M = 10;
 const LABEL_PX = [22, 9];
 
-function drawn(name, attributes, ...inside) {
+export function drawn(name, attributes, ...inside) {
   const element = document.createElementNS(SVG, name);
   for (const [attribute, value] of Object.entries(attributes)) element.setAttribute(attribute, value);
   element.append(...inside);
@@ -182,6 +183,16 @@ export class Lens {
     const [x, y] = this.#at;
     this.#at = [between(0, x + ahead_m * scale, width), between(0, y - left_m * scale, height)];
     this.#draw();
+  }
+
+  // Whether an arrow moved the ruler or, with Shift, what is zoomed.
+  arrow({ key, shiftKey }) {
+    const [ahead, left] = ARROWS[key] ?? [];
+    if (ahead === undefined) return false;
+    if (this.isRuling) this.step(ahead, left);
+    else if (shiftKey && this.isZoomed) this.pan(-ahead / 4, left / 4);
+    else return false;
+    return true;
   }
 
   // What the ruler says, "" without one. The ego looks to the right of the picture.

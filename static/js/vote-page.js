@@ -47,7 +47,7 @@ export function replay(element) {
 }
 
 const sides = document.querySelector(".sides");
-const isLow = matchMedia("(max-width: 50rem), (max-height: 33rem)");
+const isLow = matchMedia("(max-width: 50rem), (max-height: 22rem)");
 let ratio = 0;
 
 // Side by side or one above the other, whichever shows more pixels a metre.
@@ -61,9 +61,13 @@ addEventListener("resize", () => ratio && lay());
 export function drawPair({ instruction, position, legend, unchanged = [], width, height }) {
   for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
   all(".same").forEach((same, side) => { same.hidden = !unchanged.includes("ab"[side]); });
-  if (ratio !== width / height) {
+  const { classList } = at("main");
+  const isFirst = position <= given.first_pairs;
+  if (ratio !== width / height || classList.contains("is-first") !== isFirst) {
     ratio = width / height;
     body.style.setProperty("--ratio", ratio);
+    classList.toggle("is-first", isFirst);
+    press("legend", at("legend").checkVisibility());
     lay();
   }
   at("instruction").textContent = instruction;

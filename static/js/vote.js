@@ -12,7 +12,6 @@ import { hold } from "./vote-tabs.js";
 
 // The second half of a double press must not judge the next pair.
 const BOUNCE_MS = 200;
-const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
 const { at, given, text } = page;
 const { preferences, undoable, urls } = given;
@@ -34,6 +33,7 @@ let isLeaving = false;
 
 const pairs = new Pairs(given.alts, fetchPairs, draw);
 const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens, given.rings);
+const why = given.ask_why && new (await import("./vote-why.js")).Why(lens);
 const outbox = new Outbox(given.outbox, urls, {
   wanted: () => Math.min(12, pairs.depth + outbox.entries.length),
   changed: () => page.drawSaved(outbox.entries.length, outbox.isCut),
@@ -100,6 +100,7 @@ function paint(pair) {
     form.dataset.matchup = pair.shown.matchup;
     form.elements.report_side.value = "both";
   }
+  if (why) why.show(review?.faults ?? []);
   page.drawQuestion(question(), review);
   if (!isNew) page.say(page.asking(question()));
   field.value = (review ? review.comment : pair.draft) ?? "";
@@ -132,16 +133,15 @@ function decide(outcome, more = {}) {
   const [key, comment] = [page.freshKey(), field.value.trim()];
   // A skip is of the whole pair, whatever was asked last.
   const body = { key, matchup: shown.matchup, question: outcome === "skip" ? questions[0] : question() };
-  Object.assign(body, { outcome, ...more, comment, aids: [...lens.aids] });
-  body.ms_visible = Math.round(now - shownAt - hiddenMs);
+  const faults = why && outcome !== "skip" ? why.marks : [];
+  Object.assign(body, { outcome, comment, faults, aids: [...lens.aids], ms_visible: Math.round(now - shownAt - hiddenMs), ...more });
   const vote = voteOf({ body, shown }, onScreen);
-  const isIt = (one) => one?.question === body.question;
-  const old = isIt(review) ? review : votesOn(shown).find(isIt);
+  const old = [review, ...votesOn(shown)].find((one) => one?.question === body.question);
   page.note("");
   page.closePop();
   if (old) {
-    const isSame = ["outcome", "both_miss", "strength", "comment"].every((name) => vote[name] === old[name]);
-    if (isSame && outcome !== "skip") return leave();
+    const said = (one) => JSON.stringify(["outcome", "both_miss", "strength", "comment", "faults"].map((name) => one[name]));
+    if (said(vote) === said(old) && outcome !== "skip") return leave();
     body.supersedes = old.key;
     Object.assign(old, vote);
   } else {
@@ -163,10 +163,9 @@ function settle(pair) {
   return next;
 }
 
-function voteOf({ body, shown }, pair) {
-  const { key, question: of = questions[0], outcome, comment, both_miss = false, strength = "" } = body;
-  return { key, question: of, outcome, comment, both_miss, strength, position: shown.position, shown, pair };
-}
+const voteOf = ({ body, shown }, pair) => (
+  { question: questions[0], both_miss: false, strength: "", faults: [], ...body, position: shown.position, shown, pair }
+);
 
 function undo(vote) {
   const earlier = changeable();
@@ -185,6 +184,15 @@ function leave() {
   if (!review) return;
   review = null;
   draw();
+}
+
+// On a pair that was answered the mark goes out at once, the answer as it was.
+function markFault(fault) {
+  why.mark(fault);
+  page.closePop();
+  if (!review || review.outcome === "skip") return;
+  const { outcome, both_miss, strength, aids, ms_visible } = review;
+  decide(outcome, { both_miss, strength, aids, ms_visible });
 }
 
 function report(reason) {
@@ -263,6 +271,7 @@ const actions = {
   both_miss: () => given.allow_both_miss && page.maybeNeither(question()) && decide("E", { both_miss: true }),
   undo: () => undo(),
   ...Object.fromEntries(["skip", "report", "comment", "tools"].map((name) => [name, () => page.showPop(name)])),
+  why: () => why && onScreen?.state === "ready" && why.next(),
   rest,
   leave,
   original: () => lens.flip(true),
@@ -296,22 +305,13 @@ async function zoom(changeOf) {
 const always = new Set(["undo", "leave", "tools", "rings", "legend", "help", "again"]);
 const held = new Map();
 
-function arrow({ key, shiftKey }) {
-  const [ahead, left] = ARROWS[key] ?? [];
-  if (ahead === undefined || !onScreen) return false;
-  if (lens.isRuling) lens.step(ahead, left);
-  else if (shiftKey && lens.isZoomed) lens.pan(-ahead / 4, left / 4);
-  else return false;
-  return true;
-}
-
 addEventListener("keydown", (event) => {
   const { target, repeat, code } = event;
   if (document.querySelector("dialog[open]")) return;
   const pop = page.openPop();
   // The tools show which key does what; any of them may be pressed.
-  if (pop && (pop.id !== "tools" || event.key === "Escape")) return page.keyInPop(event);
-  if (arrow(event)) return event.preventDefault();
+  if (pop && !(pop.id === "why" && actionOf(event, preferences) === "why") && (pop.id !== "tools" || event.key === "Escape")) return page.keyInPop(event);
+  if (onScreen && lens.arrow(event)) return event.preventDefault();
   const action = actionOf(event, preferences);
   // Enter, held on a button, would click on and on.
   if (action || (repeat && target.closest("button"))) event.preventDefault();
@@ -337,6 +337,7 @@ form.addEventListener("submit", (event) => {
   const { name, value, dataset } = event.submitter ?? {};
   if (name === "skip") decide("skip", { reason: value });
   else if (name === "report") report(value);
+  else if (name === "why") markFault(value);
   else actions[page.ACTIONS[value] + (dataset?.strength === "clearly" ? "_clearly" : "")]?.();
 });
 form.addEventListener("input", () => page.drawComment(field.value));

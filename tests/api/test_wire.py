@@ -9,10 +9,14 @@ from pytest_django import Settings
 
 from arena.models import Study, Vote
 from arena.studies.services.opening import close_study
+from arena.voting.queries.ballots import current_votes
 from arena.voting.queries.showings import VIEW_OF_OLD
-from augment.models import Contestant, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import Modification
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.append_only import rewriting
+from tests.scenes import vehicle
 from tests.study_rows import a_study, expert, matchups_of, vote
 
 pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
@@ -127,6 +131,31 @@ def test_a_vote_says_all_that_an_expert_can_say(study: Study) -> None:
     assert (preference.outcome, preference.strength) == ("right", "slightly")
     assert (tie.both_miss, tie.comment, tie.aids) == (True, "Both off the road.", "zoom ruler")
     assert (skip.outcome, skip.reason, skip.winner_id) == ("skip", "picture_missing", None)
+
+
+def test_a_vote_says_what_is_wrong_by_a_place_that_tells_no_id(study: Study) -> None:
+    change = Modification(added=(vehicle("Zoe", 12.0, 1.0), vehicle("Amy", 5.0, -1.0)))
+    Augmentation.objects.update(modification=modification_to_document(change))
+    client, (first, *_) = signed_in("eva"), matchups_of(study, "eva")
+    mark = {"side": "B", "object": 1, "fault": "heading"}
+    refused = post(client, body_for(first, "A", faults=[mark]))
+    assert "does not ask" in str(error_of(refused, 422, "invalid"))
+    Study.objects.update(ask_why=True)
+    answer = client.get(f"/api/v1/matchups?study={study.code}")
+    (ego_x, ego_y), scale = VIEW_OF_OLD["ego_px"], VIEW_OF_OLD["px_per_m"]
+    spots = [[ego_x + scale * x, ego_y - scale * y] for x, y in ((5.0, -1.0), (12.0, 1.0))]
+    for side in "ab":  # from left to right, whatever their names
+        assert [spot[:2] for spot in answer.json()[0]["objects"][side]] == spots
+    assert not any(name in answer.content.decode() for name in ("Zoe", "Amy"))
+    refused = post(client, body_for(first, "A", faults=[mark | {"object": 2}]))
+    assert "2 on the left, 2 on the right" in str(error_of(refused, 422, "invalid"))
+    body = body_for(first, "A", faults=[mark])
+    assert post(client, body).status_code == post(client, body).status_code == 200
+    assert Vote.objects.get().faults == [["right", "Zoe", "heading"]]
+    assert post(client, body | {"faults": []}).status_code == 409
+    # A vote that takes the place of another takes its marks away.
+    post(client, body_for(first, "E", supersedes=body["key"]))
+    assert current_votes(study).get().faults == []
 
 
 def test_more_votes_than_a_person_can_give_are_refused(settings: Settings) -> None:

@@ -54,18 +54,9 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
     assert faults(page) == [], "closed"
 
 
-BLANK = """() => {
-  const images = [...document.querySelectorAll(".scene > img")];
-  const shown = images.map((one) => one.getBoundingClientRect());
-  const seen = shown.reduce((sum, { width, height }) => sum + width * height, 0);
-  return 1 - seen / (innerWidth * innerHeight);
-}"""
-"""The share of the window that is no picture: text, buttons, frames, bands and margins."""
-
-
 @pytest.mark.parametrize("films", [0, 2])
 @pytest.mark.parametrize("size", [(1280, 720), (1440, 900), (1920, 1080)])
-def test_over_the_catalogue_a_quarter_at_most_is_no_picture_and_nothing_moves(
+def test_over_the_catalogue_everything_fits_and_nothing_moves(
     live_server: LiveServer, browser: Browser, size: tuple[int, int], films: int
 ) -> None:
     # Films take long to draw, and the longest instructions alone settle how high the text is.
@@ -87,7 +78,6 @@ def test_over_the_catalogue_a_quarter_at_most_is_no_picture_and_nothing_moves(
             "document.documentElement.scrollHeight <= innerHeight"
             " && document.documentElement.scrollWidth <= innerWidth"
         )
-        assert page.evaluate(BLANK) <= 0.25
         press(page, "1")
     for button in page.locator(".voting .button:visible").all():
         box = button.bounding_box()

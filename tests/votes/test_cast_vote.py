@@ -8,7 +8,7 @@ from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, To
 from arena.models import EarlyLook, Vote
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes, own_votes, upcoming
-from arena.voting.services.casting import PACE_WINDOW, Decision, cast_vote, receive_vote
+from arena.voting.services.casting import PACE_WINDOW, Decision, FaultMark, cast_vote, receive_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 
@@ -58,6 +58,7 @@ def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
         ("equal", {"both_miss": True}, "both_miss"),
         ("right", {"aids": ["replay"]}, "aids"),
         ("right", {"strength": "clearly"}, "strength"),
+        ("right", {"faults": [FaultMark("left", 0, "heading")]}, "faults"),
     ],
 )
 def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections import Counter
 
 import pytest
 from django.contrib.auth.models import User
@@ -9,15 +10,20 @@ from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
-from arena.jobs.exports.faults import COUNTS, FORMATS, fault_table
+from arena.jobs.exports.faults import COUNTS, FORMATS, fault_table, tabulate_votes
 from arena.jobs.queries import labelling_progress, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
-from arena.models import FaultLabel, LabellingRound, LabelTask
+from arena.models import FaultLabel, LabellingRound, LabelTask, Study
+from arena.studies.services.opening import close_study
+from arena.voting.services.casting import FaultMark
 from augment.errors import Conflict
-from augment.models import Event, GenerationJob
+from augment.models import Augmentation, Event, GenerationJob
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import Modification
 from augment.services.judging.findings import FaultClass
 from tests.exports.test_displacement import a_job
-from tests.study_rows import expert
+from tests.scenes import vehicle
+from tests.study_rows import a_study, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -111,6 +117,35 @@ def test_of_several_experts_more_than_half_must_see_a_fault(job: GenerationJob, 
     assert [ann[name] for name in COUNTS] == [2, 1, 0, 1]
     assert [sim[name] for name in COUNTS] == [2, None, None, None], "nothing of it was labelled"
     assert (ann["labelled"], ann["labels"], sim["labelled"], sim["missed"]) == (2, 3, 0, 2)
+
+
+def test_marks_on_ballots_of_closed_studies_are_labels_of_who_made_them() -> None:
+    study = a_study(scenarios=2, votes_per_expert=3)
+    change = modification_to_document(Modification(added=(vehicle("car", 12.0, 1.0),)))
+    Augmentation.objects.update(modification=change)
+    Study.objects.update(ask_why=True)
+    job = GenerationJob.objects.earliest("pk")
+    Augmentation.objects.update(job=job)
+    first, second, *_ = matchups_of(study, "eva")
+    marks = [FaultMark("left", 0, P), FaultMark("left", 0, L)]
+    vote(first, "equal", supersedes=vote(first, faults=[FaultMark("right", 0, H)]).key)
+    vote(second, "right", faults=marks)
+    assert tabulate_votes(job).labels == 0, "the study is open"
+    close_study(study=study)
+    table = tabulate_votes(job)
+    seen = {second.left.contestant.slug: [2, 1, 0, 1]}
+    judged = Counter(
+        row.contestant.slug for row in {first.left, first.right, second.left, second.right}
+    )
+    for line in table.lines:
+        nothing = [0, 0, 0, 0] if judged[line["slug"]] else [None] * 4
+        assert [line[name] for name in COUNTS] == seen.get(line["slug"], nothing)
+        assert line["labelled"] == judged[line["slug"]]
+    assert [line["n"] for line in table.agreement] == [1, 1, 1]
+    out = io.StringIO()
+    options = ("--from", "votes", "--format", "latex", "--out", "-")
+    call_command("export", "faults", str(job.code), *options, stdout=out)
+    assert out.getvalue() == FORMATS["latex"].write(table).decode()
 
 
 def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(

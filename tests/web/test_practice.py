@@ -5,7 +5,6 @@ from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
-from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
 from arena.voting.queries.ballots import voting_progress
 from arena.voting.services.practice import practice_pairs
@@ -34,8 +33,7 @@ def opened(*, outside: int = 6, **options: object) -> Study:
     draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
     for number, row in enumerate(Augmentation.objects.all()):
         Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
-    given = {"practice": True, **cast, **options}
-    return open_study(name="Round 1", votes_per_expert=9, seed=7, **given)
+    return open_study(**{"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast, **options})
 
 
 def eva() -> User:
@@ -95,8 +93,10 @@ def test_a_second_answer_to_a_pair_changes_nothing() -> None:
     assert first.is_right
 
 
-def test_a_study_with_nothing_to_practise_on_is_not_opened() -> None:
-    given = {"name": "Round 1", "votes_per_expert": 9, "practice": True}
-    with pytest.raises(NothingToPlan, match="nothing to practise on"):
-        open_study(**given, **cast_of())
-    assert not Study.objects.exists()
+def test_a_study_with_nothing_to_practise_on_has_no_practice() -> None:
+    assert not open_study(name="Round 0", votes_per_expert=9, **cast_of()).practice
+
+
+@pytest.mark.parametrize(("said", "practises"), [({}, True), ({"practice": False}, False)])
+def test_a_study_has_practice_unless_it_is_said(said: dict[str, bool], practises: bool) -> None:
+    assert opened(**said).practice == practises

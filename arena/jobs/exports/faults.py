@@ -1,7 +1,7 @@
 """Fault labels of a job in the form of the paper's table, and how well the checks foresaw them."""
 
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Any
@@ -12,10 +12,10 @@ from django.db.models import Count, Q
 from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, latex_values
-from arena.models import FaultLabel
+from arena.models import FaultLabel, Matchup, Study, Vote
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.judging import FaultClass
+from augment.services.judging import FaultClass, guess_faults
 
 _MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 _LABEL = (
@@ -55,12 +55,60 @@ class FaultTable:
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
-    """Return the table of a job; two queries, which read a row a label and a row a contestant.
+    """Return the table of labels by hand; two queries, a row a label and a contestant.
 
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
     rows = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
-    labels = list(rows.only(*_LABEL).order_by("augmentation", "pk"))
+    return _tabulate(job, list(rows.only(*_LABEL).order_by("augmentation", "pk")))
+
+
+def tabulate_votes(job: GenerationJob) -> FaultTable:
+    """Return the table of what experts marked on ballots of closed studies that ask what is wrong.
+
+    Nobody has to mark anything, so only who marked an augmentation has a label on it, and its
+    counts are lower bounds. `labelled` are all that were judged, marked or not.
+    """
+    asks = Q(matchup__study__ask_why=True, matchup__study__state=Study.State.CLOSED)
+    votes = Vote.objects.filter(asks, superseded_by=None, matchup__kind=Matchup.Kind.MAIN)
+    votes = votes.exclude(outcome=Vote.Outcome.SKIP).order_by("pk")
+    judged: dict[int, Augmentation] = {}
+    marks: defaultdict[tuple[int, int], set[str]] = defaultdict(set)
+    for side in ("left", "right"):
+        own = votes.filter(**{f"shown_{side}__job": job, f"shown_{side}__state": "done"})
+        for vote in own.select_related(f"shown_{side}"):
+            row = getattr(vote, f"shown_{side}")
+            judged[row.pk] = row
+            if classes := {fault for marked, _, fault in vote.faults if marked == side}:
+                marks[row.pk, vote.expert_id] |= classes
+    guesses = {pk: guess_faults(judged[pk]) for pk, _ in marks}
+    labels = [
+        FaultLabel(
+            augmentation=judged[pk],
+            expert_id=expert,
+            **{fault.value: fault in classes for fault in FaultClass},
+            **{
+                f"guessed_{fault.value}": fault in guess
+                for fault in FaultClass
+                if guess is not None
+            },
+        )
+        for (pk, expert), classes in sorted(marks.items())
+        for guess in [guesses[pk]]
+    ]
+    return _tabulate(job, labels, Counter(row.contestant_id for row in judged.values()))
+
+
+def _tabulate(
+    job: GenerationJob, labels: list[FaultLabel], judged: Mapping[int, int] | None = None
+) -> FaultTable:
+    """Make the table of labels, in the order of their augmentations.
+
+    Args:
+        job: Whose augmentations they are on.
+        labels: At least one on each augmentation that was labelled.
+        judged: How many augmentations of each contestant were judged; None for those with labels.
+    """
     by_augmentation: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
         by_augmentation[label.augmentation_id].append(label)
@@ -71,7 +119,7 @@ def fault_table(job: GenerationJob) -> FaultTable:
     missed = Count("augmentations", filter=mine & Q(augmentations__state__in=_MISSES))
     contestants = Contestant.objects.filter(mine).annotate(missed=missed)
     lines = [
-        _line(who, who.missed, by_contestant[who.pk])
+        _line(who, by_contestant[who.pk], who.missed, judged)
         for who in contestants.only("name", "slug", "kind").order_by("name", "slug")
     ]
     agreement = [_agreement(fault, labels, by_augmentation.values()) for fault in FaultClass]
@@ -122,18 +170,22 @@ FORMATS = table_formats(fault_sheet) | formats(latex=fault_latex)
 
 
 def _line(
-    who: Contestant, missed: int, labelled: Sequence[Sequence[FaultLabel]]
+    who: Contestant,
+    labelled: Sequence[Sequence[FaultLabel]],
+    missed: int,
+    judged: Mapping[int, int] | None,
 ) -> dict[str, Any]:
+    number = len(labelled) if judged is None else judged.get(who.pk, 0)
     seen = {fault.value: sum(_is_seen(fault, own) for own in labelled) for fault in FaultClass}
-    counted = len(labelled) + missed
+    counted = number + missed
     return {
         "name": who.name,
         "shown_name": show_name(who),
         "slug": who.slug,
         "is_simulated": who.is_simulated,
         "all": sum(seen.values()) + missed if counted else None,
-        **(seen if labelled else dict.fromkeys(seen)),
-        "labelled": len(labelled),
+        **(seen if number else dict.fromkeys(seen)),
+        "labelled": number,
         "labels": sum(map(len, labelled)),
         "missed": missed,
         "counted": counted,

@@ -22,6 +22,7 @@ from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
 from arena.results.exports.writers import bundle_files
 from arena.results.services import stored_rows
 from arena.results.services.restored_rows import UNFINISHED
+from arena.results.services.vote_files import faults_text
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging import measure_job
@@ -68,6 +69,7 @@ _JUDGED: dict[str, Value] = {
     "vote": "key",
     "supersedes": "supersedes.key",
     "simulated": "is_simulated",
+    "faults": lambda vote: faults_text(vote.faults),
 }
 """One line a vote, superseded ones and skips included, and one for each pair without a vote."""
 

@@ -14,8 +14,8 @@ from arena.results.services.ratings import read_votes, votes_version
 
 _KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
-LIST_COLUMNS = (*vote_columns.COLUMNS, "mark", "reason", "vote")
-"""Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
+LIST_COLUMNS = (*vote_columns.vote_columns(4), "mark", "reason", "vote", "faults")
+"""Those of the rating's own file, with why a vote does not count ("counted" where it does), why it
 was skipped, and the code in its address."""
 
 VOTE_FORMATS = formats(csv=sheet_csv, parquet=sheet_parquet)
@@ -58,7 +58,8 @@ def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
 def _list_row(line: ListedVote) -> tuple[object, ...]:
     vote = line.given
     if isinstance(vote, RatedVote):  # whoever the tie counts for has not judged it
-        return (*next(vote_files.vote_rows([vote], {vote.judge: ""})), line.mark, None, None)
+        *row, faults = next(vote_files.vote_rows([vote], {vote.judge: ""}))
+        return (*row, line.mark, None, None, faults)
     left, right, matchup = vote.shown_left, vote.shown_right, vote.matchup
     return (
         *(left.contestant.slug, right.contestant.slug),
@@ -68,5 +69,5 @@ def _list_row(line: ListedVote) -> tuple[object, ...]:
         *(vote.ms_visible, vote.is_simulated, vote.at.isoformat(timespec="milliseconds")),
         *(matchup.position, vote.aids, vote.comment, left.code, right.code, vote.strength),
         vote.question,
-        *(line.mark, vote.reason, vote.key),
+        *(line.mark, vote.reason, vote.key, vote_files.faults_text(vote.faults)),
     )

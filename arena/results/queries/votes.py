@@ -87,6 +87,7 @@ class RatedVote(NamedTuple):
         left_code, right_code: The augmentations that were shown.
         strength: slightly or clearly better.
         question: What was asked.
+        faults: What was marked as wrong, as a Vote keeps it.
     """
 
     judge: str
@@ -111,6 +112,7 @@ class RatedVote(NamedTuple):
     right_code: str = ""
     strength: str = ""
     question: str = Question.INSTRUCTION.value
+    faults: Sequence[Sequence[str]] = ()
 
     @property
     def winner(self) -> str | None:
@@ -283,7 +285,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Rate
         *("shown_left__contestant__slug", "shown_right__contestant__slug"),
         *("outcome", "both_miss", "is_simulated", F("mark"), "ms_visible"),
         *("matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment"),
-        *("shown_left__code", "shown_right__code", "strength", "question"),
+        *("shown_left__code", "shown_right__code", "strength", "question", "faults"),
     )
     current = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk")
     return [

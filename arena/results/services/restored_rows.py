@@ -14,7 +14,7 @@ from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
 from arena.studies.services.opening import check_questions, check_seed
 from arena.studies.services.planning import frozen_rules
-from arena.voting.services.casting import Decision
+from arena.voting.services.casting import Decision, FaultMark
 from arena.voting.services.reports import Complaint
 from augment.errors import AugmentError
 from augment.models import FAILED, Augmentation, GenerationJob, Work
@@ -52,6 +52,10 @@ def check_row(row: models.Model) -> None:
                 reason=row.reason,
                 comment=row.comment,
                 aids=row.aids.split(),
+                faults=[
+                    FaultMark(side, place, str(fault))
+                    for place, (side, _object, fault) in enumerate(row.faults)
+                ],
             )
         case Report():
             side = row.side or Report.Side.BOTH  # reports from before it was asked name none

@@ -3,7 +3,8 @@
 A vote set is known by the hash of its CSV file, so whoever has the file can check it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from arena.exports.cells import csv_text
 from arena.models import Vote
@@ -47,7 +48,13 @@ def vote_rows(votes: Iterable[RatedVote], names: Mapping[str, str]) -> Iterator[
             vote.right_code,
             vote.strength,
             vote.question,
+            faults_text(vote.faults),
         )
+
+
+def faults_text(faults: Sequence[Sequence[str]]) -> str:
+    """Return what was marked as JSON, empty for nothing."""
+    return json.dumps(faults) if faults else ""
 
 
 def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:

@@ -28,7 +28,7 @@ from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypothes
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
 from arena.voting.services.pictures import Cells, check_pictures, require_checks
-from arena.voting.services.practice import require_practice_pictures
+from arena.voting.services.practice import has_practice
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
 from augment.services import check_prose, log_change, one_line
@@ -101,8 +101,6 @@ def open_study(
     study.scenarios.set(scenarios)
     study.experts.set(experts)
     store(study, planned.matchups, cells, experts)
-    if study.practice:
-        require_practice_pictures()
     text = json.dumps(_preregistration(study), indent=1, ensure_ascii=False, sort_keys=True)
     study.preregistration = text + "\n"
     study.save(update_fields=["preregistration"])
@@ -254,7 +252,11 @@ def _insert(
                 rules=frozen,
                 questions=list(study_plan.questions) or one_question(),
                 opened_at=timezone.now(),
-                **switches | {"allow_simulated": has_simulated},
+                **switches
+                | {
+                    "allow_simulated": has_simulated,
+                    "practice": study_plan.practice and has_practice(),
+                },
             )
     except IntegrityError:  # taken since it was looked up
         raise Conflict(f"There is a study named '{name}' already.") from None

@@ -217,6 +217,10 @@ class StudyPlan:
         "Ask how clear a preference is",
         "Experts say slightly or clearly. The order is rated without it; a cross-check is shown.",
     )
+    ask_why: bool = _switch(
+        "Ask what is wrong",
+        "Experts may click an object of either image and say position, heading or logic.",
+    )
     show_alike: bool = _switch(
         "Also show pairs that nobody can tell apart",
         "Pairs that differ by at most 0.1 m, 0.1 s and 10° in every object otherwise count as "
@@ -238,8 +242,9 @@ class StudyPlan:
     )
     practice: bool = _switch(
         "Practice before the first pair",
-        "Five pairs, a reference beside a broken image, each followed by what was right and why; "
-        "nothing of it counts.",
+        "Five pairs, a reference beside a broken image, each followed by what was right; nothing "
+        "of it counts. Only where scenarios have both images drawn.",
+        default=True,
     )
     allow_simulated: bool = _switch("Simulated may take part", "Every page and file then says so.")
 

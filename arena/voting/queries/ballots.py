@@ -28,6 +28,7 @@ from django.utils import timezone
 from arena.errors import NotYours, StudyNotOpen
 from arena.models import EnrolledVoter, Matchup, Study, Vote
 from arena.people.queries import by_pseudonym
+from arena.voting.queries.showings import note_objects
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +123,10 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     matchups = _PAIRS.filter(waits, study=study, expert=expert)[:n]
     for matchup in matchups:
         matchup.asked = study.questions[matchup.answered]
-    return list(takewhile(_is_drawn, matchups))
+    drawn: list[Matchup] = list(takewhile(_is_drawn, matchups))
+    if study.ask_why:
+        note_objects(drawn)
+    return drawn
 
 
 def find_undrawn(study: Study) -> QuerySet[Matchup]:
@@ -211,7 +215,8 @@ def voting_state(
 # Votes have the expert of their matchup; said so, PostgreSQL reads no other expert's matchups.
 _STATE = f"""
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
-       study.ask_strength, study.allow_replay, study.questions, own.decided, own.skipped,
+       study.ask_strength, study.ask_why, study.allow_replay, study.questions,
+       own.decided, own.skipped,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
        (SELECT COUNT(*) FROM arena_vote vote

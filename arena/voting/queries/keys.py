@@ -14,6 +14,7 @@ KEYS: dict[str, tuple[str, ...]] = {
     "report": ("r",),
     "comment": ("c",),
     "tools": ("t",),
+    "why": ("w",),
     "original": ("o",),
     "zoom": ("z",),
     "reset": ("0",),

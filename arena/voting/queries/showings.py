@@ -1,5 +1,6 @@
 """Content of a pair: pictures behind tokens, and drives."""
 
+from collections.abc import Iterable
 from typing import Any
 from uuid import UUID
 
@@ -12,7 +13,7 @@ from arena.models import LabelTask, Matchup, PracticePair
 from arena.shell.accounts import top_role
 from augment.models import Augmentation, Simulation
 from augment.services.driving import blind_drive
-from augment.services.scenarios import camera_key, film_name
+from augment.services.scenarios import camera_key, film_name, list_marks
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -76,9 +77,22 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "is_filmed": bool(film_name(matchup.left_image)),
         **view_shown(matchup),
     }
+    if matchup.objects_shown is not None:
+        # Without their ids, and in an order that does not come from them.
+        sides = zip("ab", matchup.objects_shown, strict=True)
+        shown["objects"] = {side: [spot for _, *spot in spots] for side, spots in sides}
     if legend := (matchup.view or {}).get(LEGEND):
         shown["legend"] = sorted({*legend["scene"], *legend["pair"]})
     return shown
+
+
+def note_objects(matchups: Iterable[Matchup]) -> None:
+    """Look up what can be marked in these pairs; one query."""
+    by_pk = {matchup.pk: matchup for matchup in matchups}
+    names = ("pk", "left__modification", "right__modification")
+    for pk, *changes in Matchup.objects.filter(pk__in=by_pk).values_list(*names):
+        view = view_shown(by_pk[pk])
+        by_pk[pk].objects_shown = [list_marks(change, view) for change in changes]
 
 
 def _list_unchanged_sides(matchup: Matchup) -> list[str]:

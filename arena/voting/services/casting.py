@@ -8,6 +8,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
+from typing import NamedTuple
 from uuid import UUID
 
 from django.conf import settings
@@ -19,13 +20,31 @@ from django.utils import timezone
 from arena.errors import AlreadyDecided, InvalidVote, TooFast
 from arena.models import AIDS, Matchup, Question, Study, Vote
 from arena.voting.queries.ballots import VotingProgress, hold_matchup, require_open, voting_state
+from arena.voting.queries.showings import note_objects
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services import make_storable
+from augment.services.judging import FaultClass
 
 LONGEST_COMMENT = 1000
 PACE_WINDOW = timedelta(seconds=5)
 PREFERENCES = (Vote.Outcome.LEFT, Vote.Outcome.RIGHT)
+MOST_FAULTS = 20
+FAULT_CLASSES = tuple(fault.value for fault in FaultClass)
+
+
+class FaultMark(NamedTuple):
+    """Mark of an expert on an object: wrong in one class.
+
+    Attributes:
+        side: left or right.
+        place: Of the object among those that its pair lists for the side, from 0.
+        fault: One of FAULT_CLASSES.
+    """
+
+    side: str
+    place: int
+    fault: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +61,7 @@ class Decision:
         reason: With "skip": why, one of Vote.SkipReason.
         comment: Whatever the expert wants to add.
         aids: What was used to look, out of AIDS.
+        faults: What is wrong in the pictures, where the study asks for it; nothing is needed.
         supersedes: The key of the matchup's current vote on the question, to change it.
         ms_visible: How long the pair was on screen.
 
@@ -58,6 +78,7 @@ class Decision:
     reason: str = ""
     comment: str = ""
     aids: Collection[str] = ()
+    faults: Collection[FaultMark] = ()
     supersedes: UUID | None = None
     ms_visible: int | None = None
 
@@ -131,7 +152,20 @@ def _find_faults(decision: Decision) -> dict[str, str]:
         faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
     if unknown := sorted(set(decision.aids) - set(AIDS)):
         faults["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
+    if fault := _find_fault_of_marks(decision):
+        faults["faults"] = fault
     return faults
+
+
+def _find_fault_of_marks(decision: Decision) -> str:
+    marks = decision.faults
+    if marks and decision.outcome == Vote.Outcome.SKIP:
+        return "A skip marks nothing."
+    if len(set(marks)) < len(marks) or len(marks) > MOST_FAULTS:
+        return f"At most {MOST_FAULTS} marks, and each only once."
+    if any(mark.side not in PREFERENCES or mark.fault not in FAULT_CLASSES for mark in marks):
+        return f"Each mark is of left or right, and one of: {', '.join(FAULT_CLASSES)}."
+    return ""
 
 
 def _store(expert: User, decision: Decision, *, is_paced: bool) -> VoteResult:
@@ -183,12 +217,33 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
         shown_right_id=matchup.right_id,
         winner_id=winners.get(Vote.Outcome(decision.outcome)),
         comment=make_storable(decision.comment.strip()),
+        faults=_name_objects(matchup, decision.faults),
         aids=" ".join(aid for aid in AIDS if aid in decision.aids),
         supersedes=old,
         is_simulated=expert.person.is_simulated,
     )
     vote.save(force_insert=True)
     return vote
+
+
+def _name_objects(matchup: Matchup, marks: Collection[FaultMark]) -> list[list[str]]:
+    """Return marks as they are stored, with the ids of their objects."""
+    if not marks:
+        return []
+    note_objects([matchup])
+    left, right = matchup.objects_shown or ([], [])
+    try:
+        return [
+            [
+                mark.side,
+                (left if mark.side == Vote.Outcome.LEFT else right)[mark.place][0],
+                mark.fault,
+            ]
+            for mark in sorted(marks)
+        ]
+    except IndexError:
+        counts = f"{len(left)} on the left, {len(right)} on the right"
+        raise InvalidVote({"faults": f"Only listed objects can be marked: {counts}."}) from None
 
 
 def _find_superseded(stored: list[Vote], supersedes: UUID | None) -> Vote | None:
@@ -210,6 +265,7 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
     old = None if vote.supersedes is None else vote.supersedes.key
     parts = ("question", "outcome", "both_miss", "strength", "reason")
     is_same = all(getattr(vote, part) == getattr(decision, part) for part in parts)
+    is_same = is_same and vote.faults == _name_objects(matchup, decision.faults)
     if not is_same or old != decision.supersedes:
         raise AlreadyDecided(vote.outcome)
 
@@ -234,5 +290,7 @@ def _check_allowed(decision: Decision, study: Study) -> None:
         raise InvalidVote({"both_miss": "Nobody is asked here whether both miss."})
     if decision.strength and not study.ask_strength:
         raise InvalidVote({"strength": "This study does not ask how clear a preference is."})
+    if decision.faults and not study.ask_why:
+        raise InvalidVote({"faults": "This study does not ask what is wrong."})
     if "replay" in decision.aids and not study.allow_replay:
         raise InvalidVote({"aids": "This study has no drives to play."})

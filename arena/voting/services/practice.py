@@ -8,7 +8,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import QuerySet
 
-from arena.errors import InvalidVote, NothingToPlan
+from arena.errors import InvalidVote
 from arena.models import PracticePair, Study, Vote
 from arena.voting.queries.ballots import require_open
 from arena.voting.services.pictures import latest_pairs
@@ -76,16 +76,6 @@ def skip_practice(*, study: Study, expert: User) -> None:
 def has_practice() -> bool:
     """Return whether there is something to practise on."""
     return bool(latest_pairs(Scenario.objects.all()))
-
-
-def require_practice_pictures() -> None:
-    """Raise NothingToPlan, with what to do, where there is nothing to practise on."""
-    if not has_practice():
-        raise NothingToPlan(
-            "There is nothing to practise on yet: no scenario has a picture of its reference "
-            "and a broken one. Generate the contestant reference and press “Draw missing "
-            "attention checks” on the page of a new study, or open it without practice."
-        )
 
 
 def _open_practice(study: Study, expert: User) -> QuerySet[PracticePair]:

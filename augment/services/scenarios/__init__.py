@@ -17,6 +17,7 @@ from augment.services.scenarios.pictures import (
     film_name,
     is_drawn,
     legends_of_changes,
+    list_marks,
     load_camera,
     picture_view,
     redraw,

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
@@ -97,6 +98,26 @@ def picture_view(camera: Camera) -> dict[str, Any]:
         "width": camera.width_px,
         "height": camera.height_px,
     }
+
+
+def list_marks(document: Any, view: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the changed objects inside a picture: id, x, y and radius in its pixels each.
+
+    Args:
+        document: A stored modification, None for no change.
+        view: Of `picture_view`.
+    """
+    change = codec.modification_from_document(document) if document else Modification()
+    scale, (ego_x, ego_y) = view["px_per_m"], view["ego_px"]
+    marks = [
+        [
+            *(one.id, round(ego_x + scale * one.x_m, 1), round(ego_y - scale * one.y_m, 1)),
+            round(scale * math.hypot(one.length_m, one.width_m) / 2.0, 1),
+        ]
+        for one in change.changed
+    ]
+    seen = [mark for mark in marks if 0 < mark[1] < view["width"] and 0 < mark[2] < view["height"]]
+    return sorted(seen, key=lambda mark: mark[1:])
 
 
 def draw_picture(scenario: Scenario, modification: Modification, camera: Camera) -> str:
