@@ -1,5 +1,6 @@
 """Content of the voting page, and the data of its script."""
 
+from collections.abc import Collection
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -53,11 +54,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     switches, progress = voting_switches(expert), context["progress"]
     has = _has(study)
     keys = {name: keys for name, keys in KEYS.items() if has.get(name, True)}
-    alts = {
-        "a": _("Image A, edited scene"),
-        "b": _("Image B, edited scene"),
-        "original": _("The scene before the edit"),
-    }
+    context |= _list_choices(keys)
     shown = [*pairs, changed["shown"]] if changed else pairs
     on_them = own_votes(study, expert).filter(
         matchup__code__in=[pair["matchup"] for pair in shown]
@@ -68,28 +65,18 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
     return context | {
         "shown": changed["shown"] if changed else pairs[0],
         "is_filmed": has["play"],
-        "alts": alts,
+        "alts": _alts(),
         "first_pairs": FIRST_PAIRS,
         "modules": [*MODULES, *(["js/vote-why.js"] if study.ask_why else [])],
         "legend": switches["legend"],
         "pressed": [name for name, is_on in switches.items() if is_on],
-        "tools": [(name, label) for name, label in _tools().items() if name in keys],
-        "fault_classes": [
-            ("position", _("Position")),
-            ("heading", pgettext("of an object", "Heading")),
-            ("logic", pgettext("of a scene", "Logic")),
-        ],
-        "skip_reasons": Vote.SkipReason.choices,
-        "report_reasons": Report.Reason.choices,
-        "report_sides": [(name, side.label) for name, side in SIDES.items()],
-        "looks": [(name, label) for name, label in _looks().items() if name in keys],
         "given": {
             "study": str(study.code),
             "questions": context["questions"],
             "undoable": UNDOABLE * len(study.questions),
             "outbox": f"arena votes {expert.person.code} {study.code}",
             "urls": _urls(study),
-            "alts": alts,
+            "alts": _alts(),
             "first_pairs": FIRST_PAIRS,
             "pairs": pairs,
             "last": [_as_json(vote) for vote in last.values()],
@@ -128,6 +115,30 @@ def _has(study: Study) -> dict[str, bool]:
         "both_miss": study.allow_both_miss,
         "why": study.ask_why,
         "rings": not study.rules.get("hide_rings"),
+    }
+
+
+def _alts() -> dict[str, str]:
+    return {
+        "a": _("Image A, edited scene"),
+        "b": _("Image B, edited scene"),
+        "original": _("The scene before the edit"),
+    }
+
+
+def _list_choices(keys: Collection[str]) -> dict[str, Any]:
+    """Return the buttons of the tools and of the panels that they open."""
+    return {
+        "tools": [(name, label) for name, label in _tools().items() if name in keys],
+        "fault_classes": [
+            ("position", _("Position")),
+            ("heading", pgettext("of an object", "Heading")),
+            ("logic", pgettext("of a scene", "Logic")),
+        ],
+        "skip_reasons": Vote.SkipReason.choices,
+        "report_reasons": Report.Reason.choices,
+        "report_sides": [(name, side.label) for name, side in SIDES.items()],
+        "looks": [(name, label) for name, label in _looks().items() if name in keys],
     }
 
 

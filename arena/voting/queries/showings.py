@@ -1,6 +1,6 @@
 """Content of a pair: pictures behind tokens, and drives."""
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Any
 from uuid import UUID
 
@@ -86,13 +86,14 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     return shown
 
 
-def note_objects(matchups: Iterable[Matchup]) -> None:
+def note_objects(matchups: Collection[Matchup]) -> None:
     """Look up what can be marked in these pairs; one query."""
-    by_pk = {matchup.pk: matchup for matchup in matchups}
+    rows = Matchup.objects.filter(pk__in={matchup.pk for matchup in matchups})
     names = ("pk", "left__modification", "right__modification")
-    for pk, *changes in Matchup.objects.filter(pk__in=by_pk).values_list(*names):
-        view = view_shown(by_pk[pk])
-        by_pk[pk].objects_shown = [list_marks(change, view) for change in changes]
+    changes = {pk: sides for pk, *sides in rows.values_list(*names)}
+    for matchup in matchups:
+        view = view_shown(matchup)
+        matchup.objects_shown = [list_marks(side, view) for side in changes[matchup.pk]]
 
 
 def _list_unchanged_sides(matchup: Matchup) -> list[str]:
