@@ -57,18 +57,13 @@ def write_sentence(board: Leaderboard) -> str:
 
 
 def measure_claims(world: World, studies: int) -> Measured:
-    """Return the share of studies of equals of whom somebody is called better.
-
-    By the sentence, and by intervals of which one is above another, as the sentence was written
-    before where experts or scenarios are fewer than five.
-    """
-    claims: dict[str, list[bool]] = {"sentence": [], "intervals": []}
+    """Return the share of studies of equals of whom the sentence calls somebody better."""
+    claims: list[bool] = []
     for seed in range(studies):
         board = rate(world.votes(np.random.default_rng(seed)), rounds=ROUNDS, seed=seed)
         text = write_sentence(board)
-        claims["sentence"].append(any(claim in text for claim in CLAIMS))
-        claims["intervals"].append(any((line.rank or 1) > 1 for line in board.lines))
-    return {way: float(np.mean(wrong)) for way, wrong in claims.items()}
+        claims.append(any(claim in text for claim in CLAIMS))
+    return {"sentence": float(np.mean(claims))}
 
 
 def board_worlds() -> list[World]:
@@ -178,7 +173,7 @@ def report(studies: int) -> str:
     return "\n\n".join(
         [
             f"{studies} simulated studies a world; {form} of the worlds.",
-            table(["nine equals", "worlds", "sentence", "intervals apart, before"], sentence),
+            table(["nine equals", "worlds", "sentence"], sentence),
             table(["board", "worlds", "founders", "newcomers", "newcomers, before"], boards),
             table(["left side", "worlds", f"{BEFORE}, before", AFTER], sides),
         ]

@@ -35,7 +35,7 @@ from arena.rating.sandwich import (
 
 SingleArray = NDArray[np.float32]
 
-_MOST_NUMBERS = 30_000
+_MOST_NUMBERS = 20_000
 """Cells times contestants of a round; of more, clusters are dealt into groups."""
 _FEWEST_GROUPS = 10
 _NUMBERS_AT_ONCE = 1_000_000

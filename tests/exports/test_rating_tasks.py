@@ -4,7 +4,7 @@ import pytest
 from django.urls import reverse
 
 from arena.models import Snapshot
-from arena.results.services.ratings import RATINGS, is_big, plan_snapshot
+from arena.results.services.ratings import CLOSED_FORM_FROZEN, RATINGS, is_big, plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.models import Event
 from tests.study_rows import a_study, vote
@@ -18,6 +18,18 @@ def planned() -> Snapshot:
     for matchup in study.matchups.all():
         vote(matchup)
     return plan_snapshot(study=close_study(study=study), rounds=10)
+
+
+def test_intervals_are_those_that_were_preregistered() -> None:
+    study = planned().study
+    assert study.snapshots.get().intervals == "bootstrap"
+    frozen = study.preregistration.replace(
+        "bootstrap with random effects of experts and of scenarios", CLOSED_FORM_FROZEN
+    )
+    assert frozen != study.preregistration
+    study.preregistration = frozen
+    chosen = [plan_snapshot(study=study, intervals=way).intervals for way in (None, "bootstrap")]
+    assert chosen == ["closed", "bootstrap"]
 
 
 def test_the_task_computes_what_was_planned_and_a_second_message_changes_nothing() -> None:
