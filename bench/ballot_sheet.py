@@ -69,19 +69,15 @@ def _open_study(pairs: int) -> Any:
     from arena.voting.services.drawing import draw_pictures
     from augment.models import Augmentation
 
-    Study.objects.filter(name=STUDY).delete()
     done = Augmentation.objects.filter(state=Augmentation.State.DONE)
-    names = [f"sheet-{pairs}"]
-    from django.contrib.auth.models import User
-
-    if not User.objects.filter(username=names[0]).exists():
-        create_person(username=names[0], password=None, role="expert")
+    username = f"sheet-{Study.objects.count() + 1}"
+    create_person(username=username, password=None, role="expert")
     study = open_study(
         StudyPlan(
-            name=STUDY,
+            name=f"{STUDY} {Study.objects.count() + 1}",
             contestants=("reference", "rule-placer", "sim-good-otm", "sim-careless-otm"),
             scenarios=tuple(set(done.values_list("scenario__slug", flat=True))),
-            experts=tuple(names),
+            experts=(username,),
             votes_per_expert=pairs,
             seed=5,
             repeats=0.0,

@@ -83,6 +83,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "change": changed,
             "allow_both_miss": study.allow_both_miss,
             "rings": has["rings"],
+            "aids": ["measures"] if study.rules.get("show_ticks") else [],
             "today": _times_today(study, expert),
             "ask_strength": study.ask_strength,
             "ask_why": study.ask_why,

@@ -25,13 +25,14 @@ from augment.scene.trails import find_trails
 
 AROUND_M = 10.0
 # Both pictures of a pair have so many pixels in a window of 1280 x 720.
-_PANEL_PX = (1210.0, 610.0)
+_PANEL_PX = (1212.0, 586.0)
 MOST_PX_PER_M = 40.0
 """Of a picture, and of an inset: there 0.1 m, which nobody need see, are 4 pixels."""
 
 INSET_BELOW_PX = 12.0
 """Changes that come no farther from each other are shown enlarged."""
-_INSET_SHARE, _INSET_AROUND_M, _INSET_GAIN, _INSET_EDGE_PX = 0.42, 0.75, 1.5, 12.0
+_INSET_SHARE, _INSET_AROUND_M, _INSET_GAIN = 0.4, 0.75, 1.5
+_INSET_EDGE_PX, _INSET_GAP_PX, _INSET_PLACES = 8.0, 6.0, 16
 
 _JUNCTION = {MapPlace.JUNCTION_START, MapPlace.JUNCTION_END}
 _BY_JUNCTION = {
@@ -194,16 +195,17 @@ def _with_inset(
     weights = [1] * len(scene.agents)
     weights = [1 + len(weights)] * (len(marks) - len(weights)) + weights
     width, height = across * scale, up * scale
-    lefts = (camera.width_px - width - _INSET_EDGE_PX, _INSET_EDGE_PX)
-    tops = (_INSET_EDGE_PX, camera.height_px - height - _INSET_EDGE_PX)
-    corners = [(left, top, left + width, top + height) for top in tops for left in lefts]
+    # Along the upper and the lower edge, from the right.
+    edge = _INSET_EDGE_PX
+    lefts = np.linspace(camera.width_px - width - edge, edge, _INSET_PLACES).tolist()
+    tops = (edge, camera.height_px - height - edge)
+    boxes_px = [(left, top, left + width, top + height) for top in tops for left in lefts]
 
     def count_hidden(box: Box) -> int:
-        return sum(
-            weight for weight, at in zip(weights, hidden, strict=True) if overlap(box, at, 4.0)
-        )
+        pairs = zip(weights, hidden, strict=True)
+        return sum(weight for weight, at in pairs if overlap(box, at, _INSET_GAP_PX))
 
-    box = min(corners, key=count_hidden)
+    box = min(boxes_px, key=count_hidden)
     window = Camera(
         x_min_m=low[0], x_max_m=high[0], y_min_m=low[1], y_max_m=high[1], px_per_m=scale
     )

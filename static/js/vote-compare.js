@@ -70,9 +70,12 @@ export async function changeOf(pair) {
   const size = { width: COARSE_PX, height: Math.round((COARSE_PX * shown.height) / shown.width) };
   const [a, b, before] = [...images, originals?.[0] ?? images[1]].map((image) => pixels(image, size));
   const found = { left: 1, right: 0, top: 1, bottom: 0 };
+  // An inset shows the change at another place.
+  const isCovered = (x, y) => shown.covered_px?.some(([left, top, right, low]) => x > left - 6 && x < right + 6 && y > top - 6 && y < low + 6);
   for (let at = 0; at < a.length; at += 4) {
     if (!apart(a, before, at) && !apart(b, before, at)) continue;
     const [x, y] = [((at / 4) % size.width) / size.width, Math.floor(at / 4 / size.width) / size.height];
+    if (isCovered(x * shown.width, y * shown.height)) continue;
     Object.assign(found, { left: Math.min(found.left, x), right: Math.max(found.right, x) });
     Object.assign(found, { top: Math.min(found.top, y), bottom: Math.max(found.bottom, y) });
   }

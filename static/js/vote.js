@@ -134,7 +134,7 @@ function decide(outcome, more = {}) {
   // A skip is of the whole pair, whatever was asked last.
   const body = { key, matchup: shown.matchup, question: outcome === "skip" ? questions[0] : question() };
   const faults = why && outcome !== "skip" ? why.marks : [];
-  Object.assign(body, { outcome, comment, faults, aids: [...lens.aids], ms_visible: Math.round(now - shownAt - hiddenMs), ...more });
+  Object.assign(body, { outcome, comment, faults, aids: [...given.aids, ...lens.aids], ms_visible: Math.round(now - shownAt - hiddenMs), ...more });
   const vote = voteOf({ body, shown }, onScreen);
   const old = [review, ...votesOn(shown)].find((one) => one?.question === body.question);
   page.note("");

@@ -36,7 +36,7 @@ from arena.studies.services.importing import ImportedVotes, import_votes
 from arena.studies.services.opening import open_study
 from arena.studies.services.outlook import compare_votes
 from arena.studies.services.plan import PRESETS
-from arena.voting.screen import vote_context
+from arena.voting.screen import AHEAD, vote_context
 from arena.voting.services.drawing import show_own_pictures
 from arena.voting.services.practice import has_practice
 from augment.models import GenerationJob
@@ -202,7 +202,7 @@ def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
             study = open_study(form.study_plan(), actor=get_user(request))
-            show_own_pictures(study)
+            show_own_pictures(study, pairs=AHEAD)
             context = _first_pairs(study, draft) | {"draft": draft}
             shown = render(request, "studies/preview.html", context)
             transaction.set_rollback(True)

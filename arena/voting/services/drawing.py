@@ -38,13 +38,16 @@ def draw_pictures(study: Study, *, within_s: float = math.inf) -> bool:
     return False
 
 
-def show_own_pictures(study: Study) -> None:
-    """Have a study that is opened to be looked at show the pictures that its answers have.
+def show_own_pictures(study: Study, *, pairs: int | None = None) -> None:
+    """Have each expert's first pairs, or all, show the pictures that their answers have.
 
     They are of a window that holds all answers to a scenario, wider than what voters will see.
     """
     views: dict[int, dict[str, Any]] = {}
-    for row in find_undrawn(study).select_related("left", "right", "scenario__base_scene"):
+    rows = (
+        find_undrawn(study) if pairs is None else find_undrawn(study).filter(position__lte=pairs)
+    )
+    for row in rows.select_related("left", "right", "scenario__base_scene"):
         view = views.setdefault(row.scenario_id, {}) or picture_view(load_camera(row.scenario))
         views[row.scenario_id] = view
         row.left_image, row.right_image = row.left.image, row.right.image
