@@ -25,8 +25,9 @@ EXAMPLE = "my_planners.AlongTheCentreline"
 PLANNERS = ("pdm-closed", "pdm-closed:original", "idm", EXAMPLE)
 PROCESSES = 2
 NOTE = (
-    "`python -m bench.planners FOLDER [--write]`: our simulator, nuPlan's score; intervals "
-    "clustered by scene, differences on the same drives"
+    "`python -m bench.planners FOLDER [--write]`: nuPlan's score in percent of what was driven "
+    "with references by then, scenarios in random order; 95 % intervals clustered by scene; "
+    "planners that share a letter can't be told apart"
 )
 
 
@@ -74,7 +75,7 @@ def work(seed: int) -> None:
 
 
 def make_table() -> str:
-    """Return the tables of all sets, as the command writes them."""
+    """Return a row a set: the scenes with references, as the command writes them."""
     from django.core.management import call_command
 
     rows = []
@@ -82,23 +83,20 @@ def make_table() -> str:
         written = StringIO()
         arguments = ["driving", name, "--planners", *PLANNERS, "--format", "json", "--out", "-"]
         call_command("export", *arguments, stdout=written)
-        rows += [[name, *_row(line)] for line in json.loads(written.getvalue())["lines"]]
-    head = ["set", "scenes", "planner", "minus", "score (%)", "95 %", "p (Holm)", "set of equals"]
-    return table([*head, "drives, scenes"], rows)
+        lines = json.loads(written.getvalue())["lines"]
+        means = [
+            line for line in lines if line["scenarios"] == "Reference" and not line["against"]
+        ]
+        drives = [line["drives"] for line in means]
+        scenes = [line["scenes"] for line in means]
+        counts = f"{min(drives)} to {max(drives)} on {min(scenes)} to {max(scenes)}"
+        rows.append([name, counts, *map(_cell, means)])
+    return table(["set", "drives on scenes", "PDM-Closed, paper", *PLANNERS[1:3], "example"], rows)
 
 
-def _row(line: dict[str, Any]) -> list[str]:
-    mean, low, high = (_number(line[f"{name}_percent"], ".1f") for name in ("mean", "low", "high"))
-    planners = (
-        str(line[name] or "").replace("my_planners.", "") for name in ("planner", "against")
-    )
-    p = _number(line["p_holm"], ".3f") if line["against"] else ""
-    counts = f"{line['drives']}, {line['scenes']}"
-    return [line["scenarios"], *planners, mean, f"{low} to {high}", p, line["sets"], counts]
-
-
-def _number(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
+def _cell(line: dict[str, Any]) -> str:
+    mean, low, high = (line[f"{name}_percent"] for name in ("mean", "low", "high"))
+    return f"{mean:.1f} [{low:.1f}, {high:.1f}] {line['sets']}"
 
 
 def main() -> None:
