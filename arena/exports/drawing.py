@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial, wraps
@@ -10,6 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
+
+from django.contrib.staticfiles import finders
 
 from augment.services.judging import compute_once, digest_code
 
@@ -19,6 +22,14 @@ if TYPE_CHECKING:
 
 INK, SOFT, GRID, MARK, SIMULATED = "#1d2733", "#5b6773", "#d5dbe3", "#2f6db5", "#7a4fae"
 DPI = 200
+_PAGE_COLOURS = {
+    **{INK: "ink", "#000000": "ink", SOFT: "ink-soft", GRID: "line", "#ffffff": "surface"},
+    **{MARK: "accent", SIMULATED: "simulated", "#2c7a4b": "good", "#a35a00": "warn"},
+}
+"""Variables of the pages' colours, by the colour of a chart."""
+
+_DIM = "@media (prefers-color-scheme: dark) { image { opacity: 0.28; } }"
+"""In the dark a heat map, a picture within the chart, has to stay behind its numbers."""
 
 Interval = tuple[float | None, float | None, float | None]
 """Lower bound, rating, upper bound."""
@@ -66,6 +77,16 @@ def draw_once(
         return compute_once(file_format, partial(draw, *parts, file_format=file_format), *key)
 
     return draw_or_read
+
+
+def recolour(svg: bytes) -> bytes:
+    """Return a chart in the colours of the pages, light or dark as the page around it."""
+    tokens, _, _ = Path(str(finders.find("css/tokens.css"))).read_text().partition("\n}")
+    text = svg.decode()
+    for colour, name in _PAGE_COLOURS.items():
+        text = text.replace(colour, f"var(--{name})")
+    style = f"<style>{tokens}\n}}{_DIM}</style>"
+    return re.sub(r"<svg[^>]*>", lambda tag: tag[0] + style, text, count=1).encode()
 
 
 @contextmanager

@@ -4,11 +4,13 @@ Every step can be repeated: what is there already is used again, so a second run
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 from django.contrib.auth.models import User
+from django.db import transaction
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
@@ -32,7 +34,8 @@ from augment.services.endpoints import (
     ensure_model,
     paper_variants,
 )
-from augment.services.endpoints.contestants import contestant_slug
+from augment.services.endpoints.contestants import REFERENCE, contestant_slug
+from augment.services.judging.displacement import of_rows
 from augment.services.running import JobRequest, count_rows
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import cancel, launch, retry_failed
@@ -45,7 +48,9 @@ PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
 PEOPLE = (("admin", "admin"), ("researcher", "researcher"), ("expert", "expert"))
 OPEN_STUDY = "Try it yourself"
 OPEN_STUDY_WITH_MODEL = f"{OPEN_STUDY}, with your model"
-YOUR_VOTES = 30
+YOUR_VOTES = 20
+VISIBLE_M = 1.0
+SEEDS_TRIED = 12
 STUCK_S = 600.0
 """A job in which nothing ends for so long is stuck; a slow computer only takes its time."""
 
@@ -211,17 +216,16 @@ def vote_and_rate(
     scenarios: list[str], folder: Path, own: OwnModel | None = None
 ) -> tuple[str, list[Path]]:
     """Return the table of a study with simulated votes, and the files that it is written to."""
-    name, to_try = demo.SIMULATED_STUDY, OPEN_STUDY
+    name = demo.SIMULATED_STUDY
     contestants: tuple[str, ...] = demo.RATED
     if own is not None:
-        name, to_try = f"Demo with {own.name[:80]} (simulated votes)", OPEN_STUDY_WITH_MODEL
+        name = f"Demo with {own.name[:80]} (simulated votes)"
         contestants += own.contestants
     study = demo.hold_study(scenarios=scenarios, name=name, contestants=contestants)
-    if not Study.objects.filter(name=to_try).exists():
-        # Two of a scenario's six pairs can be decided, and nobody sees one twice.
-        votes = min(YOUR_VOTES, 2 * len(scenarios))
-        values = demo.study_asked(to_try, scenarios, contestants) | {"experts": ["expert"]}
-        draw_pictures(open_study(StudyPlan.read(values | {"votes_per_expert": votes})))
+    if own is not None:
+        open_to_try(OPEN_STUDY_WITH_MODEL, contestants, scenarios)
+    else:
+        open_to_try(OPEN_STUDY, *choose_visible(scenarios))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []
@@ -229,6 +233,51 @@ def vote_and_rate(
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
     return plain_text(table), files
+
+
+def choose_visible(scenarios: list[str]) -> tuple[tuple[str, ...], list[str]]:
+    """Return three contestants and the scenarios where each two differ by VISIBLE_M or more.
+
+    Two whose distances from the reference differ by so much are at least that far apart.
+    """
+    rows = models.Augmentation.objects.filter(scenario__slug__in=scenarios, state=State.DONE)
+    errors_m: dict[str, dict[str, float]] = {slug: {} for slug in scenarios}
+    for line in of_rows(rows.values_list("pk", flat=True)):
+        if line.displacement is not None:
+            at = errors_m[line.row.scenario.slug]
+            at[line.row.contestant.slug] = line.displacement.error_m
+
+    def list_apart(slugs: tuple[str, ...]) -> list[str]:
+        return [
+            scenario
+            for scenario, at in errors_m.items()
+            if at.keys() >= set(slugs)
+            and all(abs(at[a] - at[b]) >= VISIBLE_M for a, b in combinations(slugs, 2))
+        ]
+
+    others = sorted({slug for at in errors_m.values() for slug in at} - {REFERENCE})
+    trios = [(REFERENCE, *pair) for pair in combinations(others, 2)]
+    trio = max(trios, key=lambda slugs: len(list_apart(slugs)), default=demo.RATED)
+    return trio, list_apart(trio) or scenarios
+
+
+def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str]) -> None:
+    """Open a study for the expert, with a film among the first three pairs if it has any."""
+    if Study.objects.filter(name=name).exists():
+        return
+    votes = min(YOUR_VOTES, 2 * len(scenarios))  # of a few pairs most are decided already
+    values = demo.study_asked(name, scenarios, contestants) | {"experts": ["expert"]}
+    moves = models.Scenario.objects.filter(slug__in=scenarios, catalogue_set="moving").exists()
+    seeds = range(demo.SEED, demo.SEED + (SEEDS_TRIED if moves else 1))
+    for seed in seeds:
+        with transaction.atomic():
+            plan = StudyPlan.read(values | {"votes_per_expert": votes, "seed": seed})
+            study = open_study(plan)
+            first = study.matchups.filter(position__lte=3, scenario__catalogue_set="moving")
+            if seed == seeds[-1] or first.exists():
+                break
+            transaction.set_rollback(True)
+    draw_pictures(study)
 
 
 def login_lines() -> list[str]:

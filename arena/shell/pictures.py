@@ -1,13 +1,31 @@
 """Responses with pictures: private, without their file's name."""
 
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
 from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest, JsonResponse
 from django.http.response import HttpResponseBase
 
+from arena.exports.drawing import recolour
 from augment.models import Augmentation
 from augment.services.scenarios import WIDTHS_PX, film_document, shrink
 
 _KEPT = "private, max-age=31536000, immutable"
+
+
+def charts_for_pages(view: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a view whose charts have the pages' colours where the address says `?page`."""
+
+    @wraps(view)
+    def answer(request: HttpRequest, *args: Any, **kwargs: Any) -> Any:
+        response = view(request, *args, **kwargs)
+        if "page" in request.GET and response.get("Content-Type") == "image/svg+xml":
+            response.content = recolour(response.content)
+        return response
+
+    return answer
 
 
 def picture_response(name: str) -> FileResponse:

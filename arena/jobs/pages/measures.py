@@ -30,6 +30,7 @@ from arena.shell import sending
 from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.shell.acts import looks_again, refusals_told, send_later
 from arena.shell.listing import choice_asked, read_page
+from arena.shell.pictures import charts_for_pages
 from augment.errors import Conflict
 from augment.models import GenerationJob, Simulation
 from augment.services.driving import NUPLAN, compare_job, drive_file, driving_scores, simulations
@@ -169,6 +170,7 @@ GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: 
 
 
 @page_for(*STAFF)
+@charts_for_pages
 def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
     """Answer with a table as a file, with the options that its part of the page has."""
     job = get_object_or_404(GenerationJob, code=code)

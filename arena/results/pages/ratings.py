@@ -15,7 +15,7 @@ from arena.models import Snapshot, Study
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHART_FORMATS, download_rating
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import FOR_EXPERTS, TABS, describe
+from arena.results.pages.tabs import FOR_EXPERTS, MAIN, TABS, describe
 from arena.results.queries.access import list_snapshots, snapshot_to_export
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
@@ -24,6 +24,7 @@ from arena.shell import sending
 from arena.shell.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, get_user, page_for
 from arena.shell.accounts import top_role
 from arena.shell.acts import refusals_told, tell_errors, wait_for_workers
+from arena.shell.pictures import charts_for_pages
 from arena.studies.pages.studies import export_place
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access, votes_in
 from augment.services import read_request
@@ -59,7 +60,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "under_way": [rating for rating in ratings if rating.state != Snapshot.State.READY],
         "tab": tab,
         "tab_template": f"results/{tab}.html",
-        "tabs": TABS if is_staff else FOR_EXPERTS,
+        "more": [name for name in (TABS if is_staff else FOR_EXPERTS) if name not in MAIN],
         "is_staff": is_staff,
         "has_evidence": is_staff and not is_imported(study),
         "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
@@ -120,6 +121,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> None:
 
 
 @page_for(ADMIN, RESEARCHER, EXPERT)
+@charts_for_pages
 def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A file of the rating that the address names, else of the newest.
 

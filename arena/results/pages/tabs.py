@@ -139,6 +139,11 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "parts": parts,
         "few_votes": FEW_VOTES,
         "any_few": any(row.votes_cast < FEW_VOTES for part in parts for row in part["rows"]),
+        "thin": [
+            (part["kept"].label, part["kept"].votes - (part["kept"].settled or 0))
+            for part in parts
+            if all(row.votes_cast < FEW_VOTES for row in part["rows"])
+        ],
     }
 
 
@@ -278,6 +283,9 @@ TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
     "cost": fill_cost,
     "log": fill_log,
 }
+MAIN = ("table", "pairs")
+"""The tabs in the first line; the others are further measures."""
+
 FOR_EXPERTS = ("table", "pairs", "types")
 """The tabs that not only researchers and admins see."""
 

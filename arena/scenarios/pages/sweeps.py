@@ -16,6 +16,7 @@ from arena.scenarios.exports.sweeps import SWEEP_FORMATS
 from arena.shell import acts
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.forms import RequestForm, offer
+from arena.shell.pictures import charts_for_pages
 from augment.models import Scenario, Sweep
 from augment.services import read_request, to_inputs
 from augment.services.driving import driver_name, list_allowed_planners, sweep_result, sweeps
@@ -117,6 +118,7 @@ def sweep_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @page_for(*STAFF)
+@charts_for_pages
 def sweep_file(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     """Answer with the table or the curve as a file."""
     sweep = _sweep(code)
