@@ -21,6 +21,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Error, Page, TimeoutError
 
 from tests.browser.chromium import PATIENCE_MS, chromium
+from tests.formats.av2_logs import write_log
 from tests.processes import ROOT
 from tests.stack import SMALL_DEMO, Home
 
@@ -40,6 +41,7 @@ QUALITIES = (50, 35, 20)
 LIGHT = 40_000
 """Bytes: the first quality that stays below, else the last one."""
 IDLE_MS = 10_000
+RECORDED = "recorded-street"
 TRIES = 3
 VOTES_HERE = ("vote", "vote-practice", "vote-skipped")
 OPEN_HERE = ("study", "enrolment", "preregistration", "invite")
@@ -62,6 +64,8 @@ def main() -> None:
         home.folder.mkdir(exist_ok=True)
         if not home.database.exists():
             home.must(*SMALL_DEMO)
+            log = write_log(home.folder / "log")
+            home.must("import_scene", str(log), "--slug", RECORDED)
         os.environ.update(home.environment)
         os.environ |= {
             "DJANGO_SETTINGS_MODULE": "arena.config.settings",
@@ -92,7 +96,8 @@ def _shots() -> list[Shot]:
     from arena.models import Study
     from arena.results.pages.tabs import TABS
     from arena.site.demo import JOB, SIMULATED_STUDY
-    from augment.models import Augmentation, GenerationJob, Simulation
+    from augment.models import Augmentation, BaseScene, GenerationJob, Simulation
+    from augment.services.scenarios.pictures import draw_scene
     from tests.web.addresses import address
     from tests.web.cast import World
     from tests.web.test_access import ACTIONS, PAGES
@@ -124,6 +129,10 @@ def _shots() -> list[Shot]:
         Shot(name=f"job-{tab}", who="admin", path=f"/jobs/{job.code}/{tab}/") for tab in PARTS
     ]
     shots += [Shot(name="job-again", who="admin", path=f"/jobs/new/?like={job.code}")]
+    if recorded := BaseScene.objects.filter(slug=RECORDED).first():
+        draw_scene(recorded.pk)
+        path = f"/scenes/{recorded.code}/"
+        shots.append(Shot(name="scene-of-a-recording", who="admin", path=path))
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     return shots

@@ -72,7 +72,7 @@ def test_a_model_of_ones_own_runs_within_its_cap(
     assert not Contestant.objects.get(slug=own.contestants[0]).is_simulated
     for slug in ("near", "far"):
         add_scenario(slug, instruction=f"{INSTRUCTION} It is {slug}.")
-    monkeypatch.setattr("arena.management.demo.CALLS_PER_SCENARIO", 11)
+    monkeypatch.setattr("arena.management.demo.CALLS_PER_SCENARIO", 10)
     lines: list[str] = []
     job = launch_model(own, ["near", "far"], lines.append)
     assert "on 2 scenarios" in lines[0]
@@ -85,7 +85,7 @@ def test_a_model_of_ones_own_runs_within_its_cap(
 
     complete = finish(job, lines.append, work_on_one)
     asked = ModelCall.objects.filter(served_from=None).count()
-    assert asked + own.probe_calls <= 22
+    assert asked + own.probe_calls <= 20
     assert complete == (["near"] if sees else ["far", "near"])
     states = set(job.augmentations.values_list("state", flat=True))
     assert states == ({"done", "cancelled"} if sees else {"done"})
