@@ -3,6 +3,7 @@
 Each function writes into an empty folder and says what to read; none takes long or much itself.
 """
 
+import math
 import pickle
 import sqlite3
 import struct
@@ -16,7 +17,8 @@ from pyarrow import feather, parquet
 
 from augment.formats.waymo.scenario import mask_crc32c
 from augment.scene.codec import SCENE_FORMAT
-from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
+from tests.formats import av2_logs, av2_motion, nuplan_files, openscenario_files, waymo_files
+from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 from tests.formats.test_commonroad import HEAD, PROBLEM
 
 Made = tuple[str, Path]
@@ -199,6 +201,75 @@ def nuplan_a_map_of_broken_shapes(root: Path) -> Made:
     return made
 
 
+def opendrive_of_a_million_lane_sections(root: Path) -> Made:
+    file = root / "made.xodr"
+    file.write_text(by_hand(lanes='<laneSection s="0"/>' * 1_000_000))
+    return "opendrive", file
+
+
+def opendrive_that_laughs_a_billion_times(root: Path) -> Made:
+    _, bomb = commonroad_that_laughs_a_billion_times(root)
+    return "opendrive", bomb
+
+
+def opendrive_of_widths_that_are_none(root: Path) -> Made:
+    file = root / "made.xodr"
+    file.write_text(by_hand(width=WIDTH.replace("3.5", "NaN")))
+    return "opendrive", file
+
+
+def opendrive_of_roads_that_follow_each_other_in_circles(root: Path) -> Made:
+    """Twenty there and twenty back, each joined to all of the others: 20 ** 8 ways."""
+    there, back = range(2, 22), range(22, 42)
+    parts = {"junction": "9", "shape": "<line/>", "lanes": LANES.format(width=WIDTH, outer="")}
+    parts |= dict.fromkeys(("more", "type", "link", "offset", "end"), "")
+    roads = "".join(ROAD.format(id=n, x=0, **parts) for n in there)
+    returns = "".join(ROAD.format(id=n, x=100, **parts) for n in back)
+    roads += returns.replace('hdg="0"', f'hdg="{math.pi}"')
+    links = "".join(
+        f'<connection incomingRoad="{a}" connectingRoad="{b}" contactPoint="start"><laneLink '
+        'from="-1" to="-1"/></connection>'
+        for before, after in ((there, back), (back, there), ([1], back))
+        for a in before
+        for b in after
+    )
+    file = root / "made.xodr"
+    file.write_text(by_hand(rest=f'{roads}<junction id="9">{links}</junction>'))
+    return "opendrive", file
+
+
+def openscenario_whose_catalogs_lie_elsewhere(root: Path) -> Made:
+    inner, entry = root / "inner", '<Vehicle name="car" vehicleCategory="car"/>'
+    (root / "cars.xosc").write_text(openscenario_files.catalog(entry))
+    inner.mkdir()
+    (inner / "link.xosc").symlink_to(root / "cars.xosc")
+    refers = '<CatalogReference catalogName="Cars" entryName="car"/>'
+    text = openscenario_files.scenario(other=refers).replace(openscenario_files.CAR, refers)
+    return "openscenario", openscenario_files.write(inner, text)
+
+
+def openscenario_of_a_power_of_powers(root: Path) -> Made:
+    at = '<LanePosition roadId="1" laneId="-1" s="${9 ** 9 ** 9 ** 9}"/>'
+    text = openscenario_files.scenario(other_at=at)
+    return "openscenario", openscenario_files.write(root, text)
+
+
+def openscenario_that_is_nested_without_an_end(root: Path) -> Made:
+    more = "<Story>" * 200_000 + "</Story>" * 200_000
+    text = openscenario_files.scenario(more=more)
+    return "openscenario", openscenario_files.write(root, text)
+
+
+def openscenario_of_parameters_that_name_each_other(root: Path) -> Made:
+    declared = "".join(
+        f'<ParameterDeclaration name="{a}" parameterType="double" value="${{${b} + 1}}"/>'
+        for a, b in ("ab", "ba")
+    )
+    head = f"<ParameterDeclarations>{declared}</ParameterDeclarations>"
+    text = openscenario_files.scenario(head=head)
+    return "openscenario", openscenario_files.write(root, text)
+
+
 def _pickled(root: Path, instructions: bytes) -> Made:
     file = root / "made.pkl"
     file.write_bytes(b"\x80\x04" + instructions)
@@ -225,6 +296,9 @@ HOSTILE: dict[str, Callable[[Path], Made]] = {
     name: made
     for name, made in list(globals().items())
     if name.split("_")[0]
-    in {"av2", "motion", "json", "commonroad", "waymo", "scenarionet", "nuplan", "zip"}
+    in {
+        *("av2", "motion", "json", "commonroad", "waymo", "scenarionet", "nuplan", "zip"),
+        *("opendrive", "openscenario"),
+    }
     and callable(made)
 }

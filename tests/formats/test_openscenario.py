@@ -352,6 +352,8 @@ def test_a_trajectory_is_followed_by_its_times_or_speed(
          "refers to itself in a circle"),
         (scenario(other='<MiscObject miscObjectCategory="tree"/>'), "A tree was left out"),
         (scenario(other_does=("<ControllerAction/>",)), "ControllerAction at t0 was left out"),
+        (scenario(more="<GlobalAction><EnvironmentAction/></GlobalAction>"),
+         "EnvironmentAction at t0 was left out"),
     ],
 )  # fmt: skip
 def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from django.core.management.base import CommandError
 
 from augment.models import BaseScene, Event
 from augment.scene.codec import scene_to_document
+from tests.formats import openscenario_files
 from tests.formats.av2_logs import write_log
 from tests.formats.test_commonroad import newer
 from tests.scenes import junction
@@ -59,6 +60,13 @@ def test_an_ego_is_put_on_a_lane_of_a_map_without_one(tmp_path: Path) -> None:
     out = run("commonroad", file, "--slug", "put", "--ego-at", "1,12.5")
     assert "The ego was put on lane 1, 12.5 m along it; nobody recorded it." in out
     assert BaseScene.objects.get(slug="put").document["ego"]["speed_mps"] == 0.0
+
+
+def test_an_ego_is_named_or_put_on_a_road_of_a_map(tmp_path: Path) -> None:
+    file = openscenario_files.write(tmp_path, openscenario_files.scenario())
+    assert "1 agents, 3 lanes" in run(file, "--slug", "other", "--ego", "Other")
+    out = run(tmp_path / "roads.xodr", "--slug", "alone", "--ego-at", "1,-2,120")
+    assert "The ego was put on lane -2 of road 1, at s = 120 m." in out
 
 
 def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from augment.services.scenarios import uploads
 from augment.services.scenarios import uploads as upload_moments
 from augment.services.scenarios.scene_imports import note_sentences
 from tests.formats.av2_logs import write_log
+from tests.formats.openscenario_files import CAR, ROADS, catalog, scenario
 
 pytestmark = pytest.mark.django_db
 
@@ -146,3 +147,24 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
 )
 def test_a_name_is_kept_in_plain_letters(given: str, kept: str) -> None:
     assert uploads.plain_name(given) == kept
+
+
+def test_a_zip_of_a_scenario_with_map_and_catalog_offers_each_ego() -> None:
+    refers = '<CatalogReference catalogName="Cars" entryName="car"/>'
+    files = {
+        "pack/xosc/made.xosc": scenario(other=refers, logic="../xodr/roads.xodr"),
+        "pack/xosc/Catalogs/cars.xosc": catalog(CAR),
+        "pack/xodr/roads.xodr": ROADS,
+    }
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w") as made:
+        for name, text in files.items():
+            made.writestr(name, text)
+    row = read(sent(packed.getvalue(), "scenario.zip"))
+    assert (row.state, row.format, row.reason) == ("read", "openscenario", "")
+    assert [track["name"] for track in row.tracks] == ["Ego", "Other"]
+    moment = upload_moments.ask_for_moment(row, item="Other", frame=0, slug="by-the-other")
+    upload_moments.MOMENTS.perform(moment.pk)
+    scene = BaseScene.objects.get(slug="by-the-other")
+    assert scene.source_item == "Other"
+    assert [agent["speed_mps"] for agent in scene.document["agents"]] == [10.0]

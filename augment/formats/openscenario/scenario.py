@@ -29,19 +29,14 @@ from augment.formats.openscenario.events import (
 )
 from augment.formats.openscenario.motions import MotionReader, read_speed_target
 from augment.formats.openscenario.positions import Placer
-from augment.formats.openscenario.sources import (
-    EGO_NAMES,
-    MARKER,
-    Entity,
-    ScenarioSource,
-    is_catalog,
-)
+from augment.formats.openscenario.sources import EGO_NAMES, Entity, ScenarioSource, is_catalog
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, Scene, TrafficLight
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import STEP_S, Motion, find_motion, read_at
 
+_LIGHT_ACTION = "TrafficSignalStateAction"
 LONGEST_S = 60.0
 """Trajectories are read so far."""
 _STATES = {
@@ -60,7 +55,7 @@ class OpenScenario(LogReader):
 
     name = "openscenario"
     title = "OpenSCENARIO scenario, 1.0 to 1.3, with its OpenDRIVE map (.xosc file, or a zip)"
-    suffix, marker = ".xosc", MARKER
+    suffix, marker = ".xosc", b"<OpenSCENARIO"
 
     def recognises(self, path: Path) -> bool:
         """Return whether the file is a scenario, and no catalog."""
@@ -101,6 +96,9 @@ class _Scenario:
         for private in self._source.root.findall("Storyboard/Init/Actions/Private"):
             for action in private.findall("PrivateAction"):
                 self._begin(private.get("entityRef", ""), action)
+        for action in self._source.root.findall("Storyboard/Init/Actions/GlobalAction"):
+            if (kind := describe_action(action)) != _LIGHT_ACTION:
+                self._doubts.assume(f"{kind} at t0 was left out")
         self._placer = Placer(self._network, self._positions)
         self._middles = dict[str, FloatArray]()
         for name in self._entities.keys() & self._positions.keys():
@@ -310,9 +308,7 @@ class _Scenario:
             first = phases.find("Phase")
             for state in [] if first is None else first.findall("TrafficSignalState"):
                 rows.append((state.get("trafficSignalId", ""), state.get("state", "")))
-        for action in root.iterfind(
-            "Storyboard/Init/Actions/GlobalAction//TrafficSignalStateAction"
-        ):
+        for action in root.iterfind(f"Storyboard/Init/Actions/GlobalAction//{_LIGHT_ACTION}"):
             rows.append((action.get("name", ""), action.get("state", "")))
         lights = {}
         for name, text in rows:

@@ -18,7 +18,6 @@ from augment.formats.openscenario.parameters import resolve
 from augment.scene.entities import AgentType
 from augment.scene.planned_motion import EGO_ID
 
-MARKER = b"<OpenSCENARIO"
 _CATALOG = b"<Catalog "
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
@@ -50,7 +49,6 @@ class Entity:
     """
 
     name: str
-    category: str
     type: AgentType
     centre_m: tuple[float, float]
     size_m: tuple[float, float]
@@ -177,7 +175,6 @@ class ScenarioSource:
         properties = body.findall("Properties/Property")
         return Entity(
             name=name,
-            category=category,
             type=_CLASSES.get(category, AgentType.GENERIC_OBJECT),
             centre_m=(ahead_m, left_m),
             size_m=(length_m, width_m),
