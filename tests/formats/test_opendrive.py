@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from augment.errors import InvalidDocument
+from augment.formats.apart import UntrustedInput
 from augment.formats.opendrive.reader import OpenDrive
 from augment.formats.reading import Reading
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
@@ -186,3 +187,22 @@ def test_left_hand_traffic_is_that_of_the_rule(tmp_path: Path) -> None:
     reading = read_text(tmp_path, by_hand(), None)
     assert reading.scene.traffic_side is TrafficSide.RIGHT
     assert reading.moment.item == "@1,1,50"
+
+
+def test_a_town_is_read_within_the_sandbox_and_kept_round_the_ego(tmp_path: Path) -> None:
+    # 5.3 km2 of streets 10 m apart, 23 roads of 100 m each: the sandbox gives 8 s and 1 GB.
+    parts = {"junction": "-1", "shape": "<line/>", "lanes": LANES.format(width=WIDTH, outer="")}
+    parts |= dict.fromkeys(("more", "link", "type", "offset", "end"), "")
+    roads = "".join(
+        ROAD.format(id=f"{x}-{y}", x=100 * x, **parts).replace('y="0"', f'y="{10 * y}"')
+        for x in range(23)
+        for y in range(230)
+    )
+    file = tmp_path / "town.xodr"
+    file.write_text(f'<OpenDRIVE><header revMajor="1" revMinor="6"/>{roads}</OpenDRIVE>')
+    town = UntrustedInput(path=file)
+    _, reading = town.read(item="@11-115,-1,50", frame=None, name="town")
+    nearest_m = [lane.centerline.project(0.0, 0.0).distance_m for lane in reading.scene.lanes]
+    # Three to four roads in each of some thirty streets, with two lanes.
+    assert 150 < len(nearest_m) < 250
+    assert max(nearest_m) <= 150.0
