@@ -11,7 +11,7 @@ import pytest
 from django.urls import reverse
 
 from arena import tasks
-from arena.exports.drawing import SIMULATED
+from arena.exports.drawing import INK, SIMULATED, recolour
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     DisplacementSummary,
@@ -158,3 +158,11 @@ def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone(snapshot: 
     with ThreadPoolExecutor(THREADS) as pool:
         drawn = [one for several in pool.map(draw_twice, range(THREADS)) for one in several]
     assert all(one == alone for one in drawn)
+
+
+def test_a_chart_on_a_page_has_the_colours_of_its_theme() -> None:
+    drawn = f'<svg width="9"><text style="fill: {INK}">A</text></svg>'.encode()
+    shown = recolour(drawn).decode()
+    assert shown.startswith('<svg width="9"><style>')
+    assert "--ink: light-dark(" in shown
+    assert '<text style="fill: var(--ink)">A</text></svg>' in shown

@@ -167,3 +167,18 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     model.refresh_from_db()
     assert (model.vision, model.native_tools) == (False, True)
     assert not probing.PROBES.perform(probe.pk), "a second message asks nothing"
+
+
+def test_models_that_the_server_lists_and_nobody_named_are_suggested(
+    admin: Client, model: EndpointModel
+) -> None:
+    address = reverse("endpoint-listed", args=[model.endpoint.code])
+    silent = admin.get(address).json()
+    assert (silent["models"], "refused" in silent["problem"]) == ([], True)
+    with running() as server:
+        Endpoint.objects.update(base_url=server.url)
+        EndpointModel.objects.update(model="fake-good")
+        listed = admin.get(address).json()
+    assert listed["problem"] == ""
+    assert "fake-careless" in listed["models"]
+    assert "fake-good" not in listed["models"]

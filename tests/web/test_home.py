@@ -48,6 +48,19 @@ def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed()
     assert offered not in admin.get("/").content.decode()
 
 
+def test_a_bar_says_what_comes_next_until_a_study_is_closed() -> None:
+    admin = signed_in(create_person(username="ada", password=None, role="admin"))
+
+    def shown() -> str:
+        return " ".join(admin.get(reverse("jobs")).content.decode().split())
+
+    first = reverse("endpoint-new")
+    assert "0 of 6 steps," in shown()
+    assert f'<a href="{first}">next: say where language models answer</a>' in shown()
+    close_study(study=study_rows.a_study())
+    assert "next:" not in shown()
+
+
 def test_the_theme_is_kept_with_the_person_and_leads_back() -> None:
     expert = people()["expert"]
     client = signed_in(expert)
