@@ -45,7 +45,7 @@ def test_a_study_is_opened_closed_rated_and_exported_by_commands(tmp_path: Path)
     assert "There are no votes to rate." in run("rate", "Round 1")
     run("export", "leaderboard", "Round 1", "--format", "json", "--out", tmp_path / "board.json")
     assert json.loads((tmp_path / "board.json").read_text())["study"] == "Round 1"
-    assert [path.name for path in tmp_path.iterdir()] == ["board.json"]
+    assert {path.name for path in tmp_path.iterdir()} == {"board.json", "media"}
 
 
 def test_hypotheses_of_a_repeated_option_are_all_frozen() -> None:

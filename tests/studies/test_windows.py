@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from django.urls import reverse
 
 from arena.models import Study
 from arena.studies.services.opening import open_study
@@ -18,6 +19,7 @@ from augment.services.scenarios import camera_key
 from tests import opening
 from tests.scenes import vehicle
 from tests.study_rows import cast_of, expert
+from tests.web.cast import signed_in
 
 pytestmark = pytest.mark.django_db
 AHEAD_M = {"ann": 20.0, "bob": 20.3, "cid": 45.0}
@@ -37,6 +39,8 @@ def study() -> Study:
 def test_pairs_wait_until_they_are_drawn_each_in_its_own_window(study: Study) -> None:
     eva = study.experts.get()
     assert upcoming(study=study, expert=eva, n=5) == []
+    page = reverse("vote", args=[study.code])
+    assert "being drawn" in signed_in(eva).get(page).content.decode()
     assert draw_pictures(study, within_s=0.0)
     assert len(upcoming(study=study, expert=eva, n=5)) == 1
     assert not draw_pictures(study)
