@@ -38,7 +38,7 @@ SingleArray = NDArray[np.float32]
 _MOST_NUMBERS = 20_000
 """Cells times contestants of a round; of more, clusters are dealt into groups."""
 _FEWEST_GROUPS = 10
-_NUMBERS_AT_ONCE = 1_000_000
+_NUMBERS_AT_ONCE = 300_000
 """Cells times contestants times rounds of a block: for memory and caches alone."""
 
 
