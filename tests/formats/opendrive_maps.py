@@ -207,5 +207,5 @@ def by_hand(**parts: str) -> str:
     road = dict.fromkeys(("more", "link", "type", "offset", "end"), "")
     road |= {"id": "1", "junction": "-1", "shape": "<line/>", "x": "0"}
     road |= {"lanes": LANES.format(**lanes)} | {n: parts[n] for n in parts if n != "rest"}
-    head = '<header revMajor="1" revMinor="7"/>'
+    head = f'<header revMajor="1" revMinor="7">{parts.pop("header", "")}</header>'
     return f"<OpenDRIVE>{head}{ROAD.format(**road)}{parts.get('rest', '')}</OpenDRIVE>"

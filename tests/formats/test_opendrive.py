@@ -155,6 +155,7 @@ def test_a_crosswalk_is_an_area_whatever_its_outline(outline: str, tmp_path: Pat
             **{"x": "100", "shape": "<bezier/>", "end": "", "lanes": LANES},
         )}, "road 2.planView: unknown 'bezier'"),
         ({"end": SIGNAL.replace('"+"', '"-"')}, "A light governs no way"),
+        ({"header": '<offset x="0.0" y="-7" z="0" hdg="0"/>'}, "The header's offset was left out"),
     ],
 )  # fmt: skip
 def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: Path) -> None:

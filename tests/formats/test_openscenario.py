@@ -216,6 +216,10 @@ GAP = (
                    '<TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
                    "</TimeToCollisionConditionTarget></TimeToCollisionCondition>", "Ego"), 5.0),
         (by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego"), 2.0),
+        (by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego").replace(
+            "<Condition>", '<Condition conditionEdge="rising">'), 2.0),
+        (by_entity('<TraveledDistanceCondition value="19.9" rule="lessThan"/>', "Ego").replace(
+            "<Condition>", '<Condition conditionEdge="falling">'), 2.0),
         (by_entity('<TraveledDistanceCondition value="19.9"/>'), 5.0),
         (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
                    'y="-1.75"/></Position></ReachPositionCondition>', "Ego"), 3.0),
@@ -352,6 +356,15 @@ def test_a_trajectory_is_followed_by_its_times_or_speed(
          "refers to itself in a circle"),
         (scenario(other='<MiscObject miscObjectCategory="tree"/>'), "A tree was left out"),
         (scenario(other_does=("<ControllerAction/>",)), "ControllerAction at t0 was left out"),
+        (scenario(event(BRAKES, by_entity('<SpeedCondition value="1" rule="greaterThan"/>')
+                        .replace("<Condition>", '<Condition conditionEdge="rising">'))),
+         "its conditions never hold"),
+        (scenario(event(BRAKES).replace("<Event", '<Event maximumExecutionCount="3"')),
+         "What may happen several times happens once"),
+        (scenario(event(BRAKES)).replace("</Act>", "<StopTrigger><ConditionGroup>"
+                                         f"{by_time(9)}</ConditionGroup></StopTrigger></Act>"),
+         "The condition that stops an act was left out"),
+        (scenario(more="<VariableDeclaration/>"), "VariableDeclaration was left out"),
         (scenario(more="<GlobalAction><EnvironmentAction/></GlobalAction>"),
          "EnvironmentAction at t0 was left out"),
     ],

@@ -40,7 +40,7 @@ def read_float(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Profile:
+class PiecewiseCubic:
     """A value along s as cubics, each from its start to that of the next.
 
     Attributes:
@@ -52,7 +52,7 @@ class Profile:
     rows: FloatArray
 
     @classmethod
-    def read(cls, elements: Iterable[Element], at: str, place: str) -> "Profile":
+    def read(cls, elements: Iterable[Element], at: str, place: str) -> "PiecewiseCubic":
         """Return the profile in elements whose attribute `at` is their start."""
         table = [
             [read_float(element, name, place) for name in (at, *_CUBIC)] for element in elements

@@ -19,7 +19,7 @@ import shapely
 from augment import foreign
 from augment.foreign import FloatArray
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.opendrive.network import CONTACTS, END, START, Road, RoadNetwork, Section
+from augment.formats.opendrive.network import CONTACTS, END, START, MapRoad, RoadNetwork, Section
 from augment.formats.road_map import RoadMap, Segment
 from augment.geometry.frames import Pose
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
@@ -110,7 +110,7 @@ def _name(key: LaneKey) -> str:
 
 
 def _lay_section(
-    road: Road,
+    road: MapRoad,
     number: int,
     section: Section,
     segments: dict[LaneKey, Segment],
@@ -170,7 +170,7 @@ def _thin(points: FloatArray) -> FloatArray:
     )
 
 
-def _read_area(road: Road, element: Element) -> tuple[AreaKind, FloatArray]:
+def _read_area(road: MapRoad, element: Element) -> tuple[AreaKind, FloatArray]:
     """Return the outline of an object in the map's frame."""
     place = f"road {road.id}.object {element.get('id', '')[:20]}"
     own_s_m, own_t_m = (read_float(element, name, place) for name in "st")
@@ -192,7 +192,7 @@ def _read_area(road: Road, element: Element) -> tuple[AreaKind, FloatArray]:
 
 
 def _join(
-    network: RoadNetwork, roads: Mapping[str, Road], segments: Mapping[LaneKey, Segment]
+    network: RoadNetwork, roads: Mapping[str, MapRoad], segments: Mapping[LaneKey, Segment]
 ) -> dict[LaneKey, list[LaneKey]]:
     """Return which segments follow each one."""
     following: dict[LaneKey, list[LaneKey]] = {key: [] for key in segments}
@@ -208,7 +208,7 @@ def _join(
     return following
 
 
-def _list_links(roads: Mapping[str, Road], segments: Iterable[LaneKey]) -> Iterator[Joint]:
+def _list_links(roads: Mapping[str, MapRoad], segments: Iterable[LaneKey]) -> Iterator[Joint]:
     """Yield the joints that lanes name, with the next section or the road that is joined."""
     for key in segments:
         road_id, number, lane_id = key
@@ -222,7 +222,7 @@ def _list_links(roads: Mapping[str, Road], segments: Iterable[LaneKey]) -> Itera
                     yield (key, end), ((joined.id, _last(joined, other_end), other), other_end)
 
 
-def _list_connections(network: RoadNetwork, roads: Mapping[str, Road]) -> Iterator[Joint]:
+def _list_connections(network: RoadNetwork, roads: Mapping[str, MapRoad]) -> Iterator[Joint]:
     """Yield the joints that junctions name."""
     for junction in network.root.findall("junction"):
         is_virtual = junction.get("type") == "virtual"
@@ -241,12 +241,12 @@ def _list_connections(network: RoadNetwork, roads: Mapping[str, Road]) -> Iterat
                     yield (before, outer_end), ((inner.id, _last(inner, end), onto), end)
 
 
-def _last(road: Road, end: str) -> int:
+def _last(road: MapRoad, end: str) -> int:
     """The number of the section at an end of a road."""
     return 0 if end == START else len(road.sections) - 1
 
 
-def _nearest_end(road: Road, other: Road, other_end: str) -> str:
+def _nearest_end(road: MapRoad, other: MapRoad, other_end: str) -> str:
     """The end of a road that lies at an end of another one."""
     ends = [of.line.poses_at(np.array([0.0, of.line.length_m]))[:, :2] for of in (road, other)]
     gaps_m = np.hypot(*(ends[0] - ends[1][0 if other_end == START else 1]).T)
@@ -258,7 +258,7 @@ def _nearest_end(road: Road, other: Road, other_end: str) -> str:
 
 def _find_lights(
     network: RoadNetwork,
-    roads: Sequence[Road],
+    roads: Sequence[MapRoad],
     segments: Mapping[LaneKey, Segment],
     following: Mapping[LaneKey, Sequence[LaneKey]],
     left_out: Counter[str],
@@ -292,7 +292,7 @@ def _find_lights(
     return governing
 
 
-def _signals(roads: Sequence[Road]) -> Iterator[tuple[Road, Element]]:
+def _signals(roads: Sequence[MapRoad]) -> Iterator[tuple[MapRoad, Element]]:
     for road in roads:
         for element in road.element.findall("signals/*"):
             if element.tag in ("signal", "signalReference"):

@@ -16,7 +16,7 @@ import numpy as np
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.documents import read_xml
-from augment.formats.opendrive.geometry import LONGEST_M, Profile, ReferenceLine, read_float
+from augment.formats.opendrive.geometry import LONGEST_M, PiecewiseCubic, ReferenceLine, read_float
 from augment.geometry.frames import Pose, wrap
 
 MOST_SECTIONS = 5_000
@@ -46,7 +46,7 @@ class RoadLane:
     """
 
     kind: str
-    widths: Profile
+    widths: PiecewiseCubic
     is_border: bool
     links: Mapping[str, tuple[int, ...]]
     speed_limit_mps: float | None
@@ -67,7 +67,7 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Road:
+class MapRoad:
     """One road.
 
     Attributes:
@@ -83,7 +83,7 @@ class Road:
     is_left_hand: bool
     links: Mapping[str, tuple[str, str]]
     line: ReferenceLine
-    lane_offset: Profile
+    lane_offset: PiecewiseCubic
     sections: tuple[Section, ...]
     limits: tuple[tuple[float, float | None], ...]
     element: Element
@@ -157,12 +157,15 @@ class RoadNetwork:
         version = "" if header is None else f"{header.get('revMajor')}.{header.get('revMinor')}"
         if not version.startswith("1."):
             raise fault_at(f"{path.name}: header", f"version {version[:20]!r} is not read; 1.x is")
+        self.doubts, self._roads = Doubts(), dict[str, MapRoad]()
+        offset = self.root.find("header/offset")
+        if offset is not None and any(value.strip("0.+-") for value in offset.attrib.values()):
+            self.doubts.assume("The header's offset was left out: places are the file's own")
         self.elements = {element.get("id", ""): element for element in self.root.findall("road")}
         if not self.elements:
             raise fault_at(path.name, "holds no road")
-        self.doubts, self._roads = Doubts(), dict[str, Road]()
 
-    def road(self, road_id: str, place: str = "road") -> Road:
+    def road(self, road_id: str, place: str = "road") -> MapRoad:
         """Return a road.
 
         Raises:
@@ -173,7 +176,7 @@ class RoadNetwork:
             self._roads[road_id] = _read_road(element, self.doubts)
         return self._roads[road_id]
 
-    def roads_near(self, x_m: float, y_m: float, reach_m: float) -> list[Road]:
+    def roads_near(self, x_m: float, y_m: float, reach_m: float) -> list[MapRoad]:
         """Return the roads that can be within reach of a place; unreadable ones are doubts."""
         x, y, length_m, number = self._extents.T
         near = ~(np.hypot(x - x_m, y - y_m) > length_m + reach_m)
@@ -204,7 +207,7 @@ class RoadNetwork:
 # Private
 
 
-def _read_road(element: Element, doubts: Doubts) -> Road:
+def _read_road(element: Element, doubts: Doubts) -> MapRoad:
     road_id = element.get("id", "")
     place = f"road {road_id[:20]}"
     line = ReferenceLine(element.find("planView"), place)
@@ -230,7 +233,7 @@ def _read_road(element: Element, doubts: Doubts) -> Road:
     doubts.assume("A road's slopes and superelevation were left out: scenes are flat", not is_flat)
     joined = ((link.find(end), end) for link in element.findall("link") for end in (START, END))
     junction = element.get("junction", "-1")
-    return Road(
+    return MapRoad(
         id=road_id,
         junction=None if junction == "-1" else junction,
         is_left_hand=foreign.look_up(_RULES, element.get("rule", "RHT"), f"{place}.rule"),
@@ -240,7 +243,9 @@ def _read_road(element: Element, doubts: Doubts) -> Road:
             if link is not None and link.get("elementType") == "road"
         },
         line=line,
-        lane_offset=Profile.read(element.findall("lanes/laneOffset"), "s", f"{place}.laneOffset"),
+        lane_offset=PiecewiseCubic.read(
+            element.findall("lanes/laneOffset"), "s", f"{place}.laneOffset"
+        ),
         sections=tuple(
             Section(start_m=start_m, end_m=end_m, lanes=_read_lanes(section, place, doubts))
             for section, start_m, end_m in zip(sections, starts, ends, strict=True)
@@ -259,7 +264,7 @@ def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLa
             widths = element.findall("width")
             lanes[number] = RoadLane(
                 kind=element.get("type", "none"),
-                widths=Profile.read(widths or element.findall("border"), "sOffset", place),
+                widths=PiecewiseCubic.read(widths or element.findall("border"), "sOffset", place),
                 is_border=not widths and element.find("border") is not None,
                 links={
                     end: tuple(

@@ -15,13 +15,19 @@ import numpy as np
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.openscenario.events import Event
+from augment.formats.openscenario.events import StoryEvent
 from augment.geometry.frames import Pose
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, Trigger
 
 _RULES: dict[str, Callable[[FloatArray, float], np.ndarray]] = {
     **{"lessThan": np.less, "lessOrEqual": np.less_equal, "equalTo": np.isclose},
     **{"greaterThan": np.greater, "greaterOrEqual": np.greater_equal, "notEqualTo": np.not_equal},
+}
+_EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "none": lambda now, before: now,
+    "rising": lambda now, before: now & ~before,
+    "falling": lambda now, before: ~now & before,
+    "risingOrFalling": lambda now, before: now != before,
 }
 _MARGIN_M = 1e-3
 _AHEAD_M = 2.0
@@ -56,7 +62,7 @@ class Expectation:
 
 
 def find_trigger(
-    event: Event, actor: str, expected: Expectation, doubts: Doubts
+    event: StoryEvent, actor: str, expected: Expectation, doubts: Doubts
 ) -> tuple[Trigger, int]:
     """Return the trigger of ours for an event, and the step at which it fires.
 
@@ -72,6 +78,8 @@ def find_trigger(
         all_hold = np.ones(len(holds), dtype=bool)
         for condition in group:
             met, names = _watch(condition, expected, event.place)
+            edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
+            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
             delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
             steps = min(round(delay_s / float(expected.times_s[1])), len(met))
             all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])

@@ -21,7 +21,7 @@ _TIME = "ByValueCondition/SimulationTimeCondition"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Event:
+class StoryEvent:
     """One event of one actor.
 
     Attributes:
@@ -47,9 +47,9 @@ class Event:
         return max(read_float(times[0], "value", self.place) + delay_s, 0.0)
 
 
-def list_events(source: ScenarioSource) -> dict[str, list[Event]]:
+def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
     """Return everybody's events in the order of the file; what is left out is noted."""
-    events, doubts = defaultdict[str, list[Event]](list), source.doubts
+    events, doubts = defaultdict[str, list[StoryEvent]](list), source.doubts
     for act in source.root.findall("Storyboard/Story/Act"):
         begins = _list_conditions(act)
         for group in act.findall("ManeuverGroup"):
@@ -110,7 +110,7 @@ def _holds_at_once(condition: Element) -> bool:
 
 def _split(
     event: Element, actors: list[str], begins: tuple[tuple[Element, ...], ...], doubts: Doubts
-) -> Iterator[tuple[str, Event]]:
+) -> Iterator[tuple[str, StoryEvent]]:
     """Yield an event for each of those who act in it."""
     place, groups = f"event {event.get('name', '')[:60]}", _list_conditions(event)
     if begins and groups and begins != groups:
@@ -129,6 +129,6 @@ def _split(
         else:
             actions.append((kind, found))
     names = (event.get("name", ""), *(a.get("name", "") for a in event.findall("Action")))
-    made = Event(place=place, names=names, groups=groups or begins, actions=tuple(actions))
+    made = StoryEvent(place=place, names=names, groups=groups or begins, actions=tuple(actions))
     for actor in sorted(owners) if actions else ():
         yield actor, made

@@ -19,7 +19,7 @@ from augment.errors import InvalidModification
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.openscenario.conditions import Expectation, find_trigger
-from augment.formats.openscenario.events import Event, read_vertices
+from augment.formats.openscenario.events import StoryEvent, read_vertices
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import TrafficAgent
@@ -70,7 +70,7 @@ class MotionReader:
     doubts: Doubts
     done: dict[str, Done] = field(default_factory=dict)
 
-    def read(self, name: str, agent: TrafficAgent, events: Iterable[Event]) -> TrafficAgent:
+    def read(self, name: str, agent: TrafficAgent, events: Iterable[StoryEvent]) -> TrafficAgent:
         """Return the agent with the motion in its events; without one where none can be read."""
         draft = _Draft(self, name, agent)
         for event in events:
@@ -94,7 +94,7 @@ class _Draft:
         self.speeds: list[tuple[float, float]] = []
         self._line: Polyline | None = None
 
-    def add(self, event: Event) -> None:
+    def add(self, event: StoryEvent) -> None:
         """Add what an event does; raises InvalidDocument if it can't be."""
         begins_s, ends_s = self._begin(event), 0.0
         start = self.start
@@ -110,7 +110,7 @@ class _Draft:
         done = Done(actor=self._name, start=start, begins_s=begins_s, ends_s=ends_s)
         self._reader.done |= dict.fromkeys(event.names, done)
 
-    def _begin(self, event: Event) -> float:
+    def _begin(self, event: StoryEvent) -> float:
         """Set the start by the first event, and return how long after it an event begins."""
         waits = [c.find(_WAIT) for group in event.groups for c in group]
         start: Trigger

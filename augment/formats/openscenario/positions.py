@@ -16,18 +16,18 @@ import numpy as np
 from augment import foreign
 from augment.foreign import fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.opendrive.network import END, START, Road, RoadNetwork
+from augment.formats.opendrive.network import END, START, MapRoad, RoadNetwork
 from augment.geometry.frames import Pose, difference, wrap
 
 _REACH_M: Final = 30.0
 """So far from a reference line a place can be on its road."""
 _MOST_ROADS = 200
 """A way along roads that is longer is none."""
-Place = tuple[Road, float, float, int]
+Place = tuple[MapRoad, float, float, int]
 """Road, s and t there, and the id of the lane."""
 
 
-class Placer:
+class PositionReader:
     """Finds poses; those of entities by the actions that place them.
 
     Args:
@@ -151,8 +151,8 @@ class Placer:
         return self.locate(self.entity_pose(element.get("entityRef", "")), place)
 
     def _advance(
-        self, road: Road, s_m: float, lane_id: int, along_m: float, place: str
-    ) -> tuple[Road, float, int]:
+        self, road: MapRoad, s_m: float, lane_id: int, along_m: float, place: str
+    ) -> tuple[MapRoad, float, int]:
         """Return road, station and lane so far along s, over no junction."""
         s_m += along_m
         for _ in range(_MOST_ROADS):
@@ -177,7 +177,7 @@ def _number(element: Element, name: str) -> float:
     return read_float(element, name, element.tag) if name in element.attrib else 0.0
 
 
-def _project(road: Road, pose: Pose) -> tuple[float, float]:
+def _project(road: MapRoad, pose: Pose) -> tuple[float, float]:
     """Return s and t of the nearest place of a road's reference line."""
     low_m, high_m = 0.0, road.line.length_m
     for _ in range(6):  # each time between the neighbours of the nearest of 200 stations

@@ -22,13 +22,13 @@ from augment.formats.openscenario.conditions import Expectation
 from augment.formats.openscenario.events import (
     ACTIONS,
     GONE,
-    Event,
+    StoryEvent,
     describe_action,
     list_events,
     read_vertices,
 )
 from augment.formats.openscenario.motions import MotionReader, read_speed_target
-from augment.formats.openscenario.positions import Placer
+from augment.formats.openscenario.positions import PositionReader
 from augment.formats.openscenario.sources import EGO_NAMES, Entity, ScenarioSource, is_catalog
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap
@@ -99,7 +99,7 @@ class _Scenario:
         for action in self._source.root.findall("Storyboard/Init/Actions/GlobalAction"):
             if (kind := describe_action(action)) != _LIGHT_ACTION:
                 self._doubts.assume(f"{kind} at t0 was left out")
-        self._placer = Placer(self._network, self._positions)
+        self._placer = PositionReader(self._network, self._positions)
         self._middles = dict[str, FloatArray]()
         for name in self._entities.keys() & self._positions.keys():
             with self._doubts.about("entities"):
@@ -219,7 +219,7 @@ class _Scenario:
             doubts=self._doubts,
         )
 
-    def _choose_events(self, events: list[Event]) -> list[Event]:
+    def _choose_events(self, events: list[StoryEvent]) -> list[StoryEvent]:
         """Return the events of a motion, without trajectories before one that waits."""
         kinds = [{kind for kind, _ in event.actions} for event in events]
         waits = any(
@@ -250,7 +250,7 @@ class _Scenario:
         elif kind == "SpeedAction" and found is not None and _is_step(found):
             self._speeds[name] = found
         elif found is not None:
-            made = Event(
+            made = StoryEvent(
                 place=f"Init of {name[:40]}", names=(), groups=(), actions=((kind, found),)
             )
             self._events[name].insert(0, made)

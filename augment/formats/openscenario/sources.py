@@ -19,6 +19,7 @@ from augment.scene.entities import AgentType
 from augment.scene.planned_motion import EGO_ID
 
 _CATALOG = b"<Catalog "
+_IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
 _CLASSES = {
@@ -83,6 +84,13 @@ class ScenarioSource:
         if root.find("Storyboard") is None:
             raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
         self.root = resolve(root, {})
+        for tag in _IGNORED:
+            self.doubts.assume(f"{tag} was left out", len([*self.root.iter(tag)]))
+        stops = len(self.root.findall(".//Act/StopTrigger//Condition"))
+        self.doubts.assume("The condition that stops an act was left out", stops)
+        counts = [element.get("maximumExecutionCount", "1") for element in self.root.iter()]
+        repeated = sum(count.strip() != "1" for count in counts)
+        self.doubts.assume("What may happen several times happens once", repeated)
 
     def open_map(self) -> RoadNetwork:
         """Return the map that the scenario names.
