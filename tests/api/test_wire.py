@@ -10,7 +10,6 @@ from pytest_django import Settings
 from arena.models import Study, Vote
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes
-from arena.voting.queries.showings import VIEW_OF_OLD
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
@@ -37,8 +36,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
             "original": f"/i/{matchup.original_token}",
             "unchanged": ["a"],
             "is_filmed": False,
-            **VIEW_OF_OLD,
-            "legend": ["ego", "grid", "motion", "other", "own", "walkway"],
+            **(matchup.view or {}),
         }
         for matchup in mine
     ]
@@ -142,8 +140,12 @@ def test_a_vote_says_what_is_wrong_by_a_place_that_tells_no_id(study: Study) -> 
     assert "does not ask" in str(error_of(refused, 422, "invalid"))
     Study.objects.update(ask_why=True)
     answer = client.get(f"/api/v1/matchups?study={study.code}")
-    (ego_x, ego_y), scale = VIEW_OF_OLD["ego_px"], VIEW_OF_OLD["px_per_m"]
-    spots = [[ego_x + scale * x, ego_y - scale * y] for x, y in ((5.0, -1.0), (12.0, 1.0))]
+    view = first.view or {}
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
+    spots = [
+        [pytest.approx(ego_x + scale * x, abs=0.1), pytest.approx(ego_y - scale * y, abs=0.1)]
+        for x, y in ((5.0, -1.0), (12.0, 1.0))
+    ]
     for side in "ab":  # from left to right, whatever their names
         assert [spot[:2] for spot in answer.json()[0]["objects"][side]] == spots
     assert not any(name in answer.content.decode() for name in ("Zoe", "Amy"))
