@@ -55,7 +55,7 @@ def _work(home: Home, address: str, packed: Path) -> None:
 def _keep_a_moment(page: Page, packed: Path) -> None:
     page.goto("/scenes/")
     page.set_input_files("[name=file]", packed)
-    page.fill("[name=slug]", "recorded")
+    page.fill("[name=name]", "Recorded")
     page.get_by_role("button", name="Use this moment").click()
     expect(page.get_by_role("heading", name="recorded")).to_be_visible()
 

@@ -158,7 +158,6 @@ def _enter_contestant(page: Page) -> None:
     for variant in ("fc", "tqa", "vqa"):
         page.uncheck(f"[name=variant][value={variant}]")
     page.get_by_text("Advanced").click()
-    page.fill("[name=slug]", "careless-otm")
     page.fill("[name=temperature]", "0.7")
     page.click("button.main.big")
     expect(page.get_by_text("OTM with fake-careless")).to_be_visible()

@@ -81,7 +81,6 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
         ("key_variable", "sk-abc", "The name of an environment variable is needed, not the key"),
         ("max_concurrency", "0", "greater than or equal to 1"),
         ("requests_per_minute", "0", "greater than or equal to 1"),
-        ("label", "No Label", "must be lower-case letters"),
     ],
 )
 def test_what_no_endpoint_can_be_is_refused_at_its_field(
