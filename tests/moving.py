@@ -43,4 +43,8 @@ def a_moving_study(*, scenarios: int, votes: int) -> Study:
         row.scenario.matchups.update(
             original_image=row.scenario.original_image, view=picture_view(camera)
         )
+    # The page has a bar where a picture of the plan has a film.
+    for entry in study.rules["entries"]:
+        entry["picture"] = camera.key + "/x.png"
+    study.save()
     return study
