@@ -116,11 +116,25 @@ def hold_study(
 ) -> Study:
     """Open a study, let simulated experts vote, close and rate it; by default of the last job.
 
+    One that was begun and cut short is gone on with.
+
     Raises:
         Conflict: No job is finished.
     """
-    if study := Study.objects.filter(name=name).first():
-        return study
+    study = Study.objects.filter(name=name).first()
+    if study is None:
+        study = _open_simulated(actor, scenarios, name, contestants)
+    if study.state == Study.State.OPEN:
+        simulate_votes(study=study, seed=SEED)
+        study = close_study(study=study, actor=actor)
+    if not study.snapshots.exists():
+        rate_now(study=study, seed=SEED)
+    return study
+
+
+def _open_simulated(
+    actor: User | None, scenarios: Sequence[str], name: str, contestants: Sequence[str]
+) -> Study:
     if not scenarios:
         job = GenerationJob.objects.filter(state=GenerationJob.State.FINISHED).first()
         if job is None:
@@ -132,11 +146,7 @@ def hold_study(
     values = study_asked(name, scenarios, contestants)
     values |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
     plan = StudyPlan.read(values | {"votes_per_expert": SIMULATED_VOTES_EACH})
-    study = open_study(plan, actor=actor)
-    simulate_votes(study=study, seed=SEED)
-    study = close_study(study=study, actor=actor)
-    rate_now(study=study, seed=SEED)
-    return study
+    return open_study(plan, actor=actor)
 
 
 def study_asked(

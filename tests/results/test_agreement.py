@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from django.urls import reverse
 
-from arena.models import Snapshot, Vote
+from arena.models import Snapshot, Study, Vote
 from arena.rating.agreement import AgreementLine, LineRole, measure_agreement, rater_by_pairs
 from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.votes import Filters, current_votes
 from arena.results.services.agreement import pair_votes
 from arena.results.services.ratings import rate_now
+from arena.site import demo
 from arena.site.demo import RATED, SIMULATED_EXPERTS, hold_study
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant
@@ -63,6 +64,22 @@ def decided(rating: Snapshot) -> Iterator[tuple[Augmentation, Augmentation]]:
     for row in rows.select_related("shown_left__contestant", "shown_right__contestant"):
         sides = [row.shown_left, row.shown_right]
         yield tuple(sorted(sides, key=lambda side: side.pk != row.winner_id))  # type: ignore[misc]
+
+
+def test_a_simulated_study_that_was_cut_short_is_gone_on_with(
+    rating: Snapshot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def kill(**_: object) -> None:
+        raise KeyboardInterrupt
+
+    places = [f"place-{number:02d}" for number in range(PLACES)]
+    with monkeypatch.context() as killed:
+        killed.setattr(demo, "rate_now", kill)
+        with pytest.raises(KeyboardInterrupt):
+            hold_study(scenarios=places, name="Cut short")
+    study = hold_study(name="Cut short")
+    assert (study.state, study.snapshots.count()) == (Study.State.CLOSED, 1)
+    assert hold_study() == rating.study
 
 
 def test_displacement_and_the_experts_are_those_counted_from_the_rows(rating: Snapshot) -> None:
