@@ -249,12 +249,10 @@ def test_a_folder_of_an_earlier_release_is_read_and_means_our_function_by_fc(
     folder = tmp_path / "out"
     export(study, folder)
     empty()
-    dropped = {"version"} if len(lacking) > 1 else set()
-    craft(
-        folder,
-        "augment.simulation",
-        lambda row: {name: value for name, value in row.items() if name not in dropped},
-    )
+    for column in frozenset[str]().union(*(EARLIER[migration][1] for migration in lacking)):
+        label, _, name = column.rpartition(".")
+        if (folder / f"rows/{label}.jsonl").exists():
+            craft(folder, label, lambda row, name=name: {k: row[k] for k in row if k != name})
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["migrations"] = [one for one in manifest["migrations"] if one not in lacking]
     (folder / "manifest.json").write_text(json.dumps(manifest))

@@ -46,7 +46,7 @@ def study() -> Study:
     )
     Contestant.objects.filter(slug="quixotic").update(kind=Contestant.Kind.SUBMISSION, card=CARD)
     for number, row in enumerate(Augmentation.objects.order_by("pk")):
-        hang(row, store(png(number, width=1200, height=800)))
+        hang(row, store(png(number, width=1200, height=300)))
     job = GenerationJob.objects.filter(augmentations__contestant__slug="zanzibar").first()
     assert job is not None
     open_labelling(name="Faults", job=job, experts=["eva"], seed=1)

@@ -114,8 +114,9 @@ def test_each_question_has_a_rating_of_its_own_votes() -> None:
     assert [usual.results.trust.tie_share, other.results.trust.tie_share] == [0.0, 1.0]
     with pytest.raises(UnknownName, match="beauty"):
         rate_now(study=study, filters=Filters(question="beauty"))
-    rows = list_unrated(study).rows
-    assert [row[-1] for row in rows].count("instruction") == 7
+    sheet = list_unrated(study)
+    at = [*sheet.columns].index("question")
+    assert [row[at] for row in sheet.rows].count("instruction") == 7
 
 
 def test_checks_are_judged_by_the_primary_question_alone() -> None:

@@ -80,7 +80,7 @@ def test_a_list_is_shown_page_by_page_and_found_in(
     add_many()
     mark, size = LISTS[name]
     admin.get(reverse(name))
-    with django_assert_max_num_queries(16):  # type: ignore[attr-defined]
+    with django_assert_max_num_queries(18):  # type: ignore[attr-defined]
         first = page(admin, name)
     assert first.count(mark) == size
     assert "<span>1 of " in first
