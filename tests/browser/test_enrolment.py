@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 from arena.models import Study
 from arena.people.services import create_person
 from arena.studies.services.taking_part import set_enrolment
+from arena.voting.services.drawing import show_own_pictures
 from augment.models import Augmentation
 from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import faults
@@ -50,6 +51,8 @@ def test_somebody_enrols_votes_and_gets_a_code(booth: Booth) -> None:
     expect(page.get_by_label("Your Prolific ID")).to_have_value("w-17")
     page.get_by_label("I have read this and agree").check()
     page.get_by_role("button", name="Take part").click()
+    expect(page.get_by_text("Your next pictures are being drawn")).to_be_visible()
+    show_own_pictures(booth.study)  # as workers would
     for pair in (1, 2):
         expect(page.locator("#place")).to_have_text(str(pair))
         ready(page)

@@ -189,6 +189,10 @@ def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
     assert len(rows.splitlines()) == 1
 
 
+def without(name: str, row: dict[str, Any]) -> dict[str, Any]:
+    return {column: row[column] for column in row if column != name}
+
+
 def craft(folder: Path, label: str, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
     """Change the rows of a table as somebody would who also recomputes the hash."""
     path = folder / f"rows/{label}.jsonl"
@@ -252,7 +256,7 @@ def test_a_folder_of_an_earlier_release_is_read_and_means_our_function_by_fc(
     for column in frozenset[str]().union(*(EARLIER[migration][1] for migration in lacking)):
         label, _, name = column.rpartition(".")
         if (folder / f"rows/{label}.jsonl").exists():
-            craft(folder, label, lambda row, name=name: {k: row[k] for k in row if k != name})
+            craft(folder, label, partial(without, name))
     manifest = json.loads((folder / "manifest.json").read_text())
     manifest["migrations"] = [one for one in manifest["migrations"] if one not in lacking]
     (folder / "manifest.json").write_text(json.dumps(manifest))
