@@ -67,6 +67,15 @@ class StillUnderWay(ArenaError):
         super().__init__("The same request came before and is not answered yet.")
 
 
+class BeingDrawn(ArenaError):
+    """Workers still draw the pictures of the pairs that come next."""
+
+    retry_after_s = 2
+
+    def __init__(self) -> None:
+        super().__init__("The next pictures are being drawn. Ask again in a moment.")
+
+
 class KeyReused(ArenaError):
     """The key of a request was used for another one; nothing was done."""
 

@@ -31,6 +31,7 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (errors.TooFast, 429, "too_fast"),
     (errors.DatabaseBusy, 503, "busy"),
     (errors.StillUnderWay, 409, "under_way"),
+    (errors.BeingDrawn, 409, "being_drawn"),
     (errors.KeyReused, 422, "key_reused"),
     (Conflict, 409, "conflict"),
     (AugmentError, 400, "refused"),

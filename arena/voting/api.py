@@ -21,9 +21,11 @@ from arena.api.fields import (
     WholeNumberField,
 )
 from arena.api.views import ApiView, FileView, Params, file_operation, operation
+from arena.errors import BeingDrawn
 from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Vote
 from arena.people.services import keep_voting
-from arena.voting.queries.ballots import require_open, upcoming
+from arena.shell.sending import send_pictures
+from arena.voting.queries.ballots import find_undrawn, is_being_drawn, require_open, upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import (
@@ -174,11 +176,15 @@ class MatchupsView(ApiView):
     def get(self, params: Params) -> Response:
         """The next pairs of the expert who asks.
 
-        An empty list when all is done.
+        An empty list when all is done; 409 `being_drawn` while workers draw what comes next.
         """
         study = get_object_or_404(self.user.studies, code=params["study"])
         require_open(study)
         matchups = upcoming(study=study, expert=self.user, n=params["n"])
+        if not matchups and find_undrawn(study).filter(expert=self.user).exists():
+            if not is_being_drawn(study):
+                send_pictures(study.pk)
+            raise BeingDrawn
         return Response([as_shown(matchup) for matchup in matchups])
 
 

@@ -242,7 +242,7 @@ async function fetchPairs(n) {
   const { status, body } = await ask(`${urls.matchups}&n=${n}`);
   if (outbox.isHalted) return null;
   if ([401, 403, 410].includes(status)) stopped(status);
-  if (status !== 200) return null;
+  if (status !== 200) return status === 409 ? [] : null; // the page says that they are drawn
   page.unblock();
   return caughtUp(body);
 }

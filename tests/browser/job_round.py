@@ -82,7 +82,7 @@ def _retry(page: Page) -> None:
     expect(page.get_by_text("What failed is queued again.")).to_be_visible()
     _ends_in_part(page)
     expect(page.locator("a.cell img").first).to_be_visible()
-    page.locator("a.cell[title=Failed]").first.click()
+    page.locator("a.cell", has_text="Failed").first.click()
     expect(page.get_by_text("Attempt 2.")).to_be_visible()
     page.go_back()
 

@@ -17,6 +17,7 @@ from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.scenarios import camera_key
 from tests import opening
+from tests.api.asking import error_of
 from tests.scenes import vehicle
 from tests.study_rows import cast_of, expert
 from tests.web.cast import signed_in
@@ -40,8 +41,13 @@ def test_pairs_wait_until_they_are_drawn_each_in_its_own_window(study: Study) ->
     eva = study.experts.get()
     assert upcoming(study=study, expert=eva, n=5) == []
     page = reverse("vote", args=[study.code])
-    assert "being drawn" in signed_in(eva).get(page).content.decode()
+    client, pairs = signed_in(eva), f"/api/v1/matchups?study={study.code}"
+    assert "being drawn" in client.get(page).content.decode()
+    answer = client.get(pairs)
+    error_of(answer, 409, "being_drawn")
+    assert answer.headers["Retry-After"] == "2"
     assert draw_pictures(study, within_s=0.0)
+    assert len(client.get(pairs).json()) == 1
     assert len(upcoming(study=study, expert=eva, n=5)) == 1
     assert not draw_pictures(study)
     rows = upcoming(study=study, expert=eva, n=5)
