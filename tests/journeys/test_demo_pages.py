@@ -14,6 +14,9 @@ pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.m
 
 LONGEST_PX, MOST_CONTROLS = 2_500, 40
 
+CONTINUOUS = ("job", "job-grid")
+"""A table that goes on as one scrolls; each of its cells is a link."""
+
 
 def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -> None:
     home = demo_home.copy(tmp_path / "pages")
@@ -30,6 +33,6 @@ def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -
     wrong = {
         name: f"{high} px, {controls} controls"
         for name, (high, controls) in sizes.items()
-        if high > LONGEST_PX or controls > MOST_CONTROLS
+        if high > LONGEST_PX or (controls > MOST_CONTROLS and name not in CONTINUOUS)
     }
     assert wrong == {}
