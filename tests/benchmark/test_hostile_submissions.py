@@ -62,6 +62,7 @@ def check(path: Path, names: tuple[str, ...]) -> dict[str, SubmittedEntry]:
     return entries
 
 
+@pytest.mark.slow
 def test_hostile_files_in_a_zip_are_refused_and_the_rest_is_read(tmp_path: Path) -> None:
     packed = shutil.make_archive(str(tmp_path / "mine"), "zip", submission(tmp_path, QUICK))
     found = check(Path(packed), QUICK)
@@ -74,6 +75,7 @@ def test_every_hostile_file_is_refused_and_the_rest_is_read(tmp_path: Path) -> N
     check(submission(tmp_path, tuple(HOSTILE)), tuple(HOSTILE))
 
 
+@pytest.mark.slow
 def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: Path) -> None:
     made = submission(tmp_path, ())
     agent = json.dumps(GOOD["add"][0])
@@ -104,6 +106,7 @@ def test_too_many_agents_numbers_that_are_none_and_links_are_refused(tmp_path: P
     assert found["link"].reason.endswith("link.json: is a link")
 
 
+@pytest.mark.slow
 def test_a_zip_with_links_or_of_too_much_is_refused_as_a_whole(tmp_path: Path) -> None:
     link = zipfile.ZipInfo("near.json")
     link.external_attr = 0o120777 << 16

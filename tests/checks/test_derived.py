@@ -114,6 +114,7 @@ def _answers(drawn: TrafficAgent, placed: TrafficAgent) -> bool:
     return near and is_turned and drawn.type is placed.type
 
 
+@pytest.mark.slow
 def test_what_is_drawn_in_the_catalogue_is_placed_again_by_its_own_sentence() -> None:
     problems = [
         problem

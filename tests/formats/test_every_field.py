@@ -183,6 +183,7 @@ def variants(name: str, path: Path) -> Variants:
             yield from database_variants(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GOOD)
 def test_no_field_of_a_wrong_type_is_passed_over_in_silence(name: str, tmp_path: Path) -> None:
     path, item = GOOD[name](tmp_path), nuplan_files.token(100).hex() if name == "nuplan" else None

@@ -92,6 +92,7 @@ def settle_others(**scores: float) -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
     sweep = planned()
     assert Simulation.objects.count() == 8 * len(list_options(STRAIGHT)) == 32
@@ -239,6 +240,7 @@ def said(command: str, *arguments: str, **options: Any) -> str:
     return out.getvalue()
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_values_and_where_the_planner_fails(tmp_path: Path) -> None:
     document = modification_to_document(parked(0.0))
     rows.add_scenario("parked", reference=document, intent=None, intent_origin="")

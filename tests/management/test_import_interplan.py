@@ -111,6 +111,7 @@ def test_what_is_not_used_stands_in_the_lines_and_the_token_with_the_scene(folde
     assert any(f"{HERE}-s2" in line and "starts at iteration 12" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
     root = write_folder(tmp_path / "given")
     (given,) = root.rglob("interPlan_modifications.yaml")
@@ -146,6 +147,7 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
     assert len({line.split(":")[0] for line in lost}) <= 10, "of those with cones alone"
 
 
+@pytest.mark.slow
 def test_what_was_imported_before_keeps_its_rules_and_its_export_says_so(folder: Path) -> None:
     run(folder)
     row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
@@ -289,6 +291,7 @@ def test_scenarios_are_what_interplans_own_code_builds_and_score_as_in_nuplan(
         assert ratio == pytest.approx(progress or 1.0, abs=0.01), name
 
 
+@pytest.mark.slow
 @pytest.mark.realdata
 def test_everybody_is_where_interplans_drive_has_them(worlds: dict[str, World]) -> None:
     for world in worlds.values():
@@ -299,6 +302,7 @@ def test_everybody_is_where_interplans_drive_has_them(worlds: dict[str, World]) 
             assert_everybody_is_at_one_place(setting)
 
 
+@pytest.mark.slow
 def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None:
     root = write_folder(tmp_path / "given")
     (given,) = root.rglob("interPlan_modifications.yaml")

@@ -69,6 +69,7 @@ def test_on_authored_lanes_the_tool_and_the_text_are_on_the_lane(scene: Scene) -
     assert_on_the_lanes(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.realdata
 @pytest.mark.parametrize("number", range(len(FILES)))
 def test_on_recorded_lanes_the_tool_and_the_text_are_on_the_lane(
