@@ -47,7 +47,7 @@ READS_SETTINGS = (
     *("augment.services", "augment.tasks", "augment.apps", "augment.management"),
 )
 MOST_LINES = {
-    **dict.fromkeys(("arena", "augment", "bench", "fixtures", "tests"), ("*.py", 500)),
+    **dict.fromkeys(("arena", "augment", "bench", "tests"), ("*.py", 500)),
     "static": ("*.js", 400),
 }
 """Of a file, by the folder that it lies in."""

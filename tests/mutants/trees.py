@@ -32,7 +32,7 @@ LIBRARIES = (
 """Loaded once for all runs: else that is most of what a run takes."""
 FRESH = multiprocessing.get_context("forkserver")
 FRESH.set_forkserver_preload(list(LIBRARIES))
-OURS = ("arena", "augment", "fixtures", "tests")
+OURS = ("arena", "augment", "tests")
 NOTICED = re.compile(r"^(?:FAILED|ERROR) (tests/\S+?::\w+)", re.MULTILINE)
 
 
