@@ -11,13 +11,15 @@ from augment.services.inputs import (
     read_values,
     to_inputs,
 )
-from augment.services.slugs import SLUG_LENGTH, free_slug, make_slug
 from augment.services.terminal import TerminalCommand, at_least
 from augment.services.texts import (
+    SLUG_LENGTH,
     check_picture_name,
     check_prose,
+    free_slug,
     is_readable_line,
     is_stored_name,
+    make_slug,
     make_storable,
     motion_in_words,
     one_line,

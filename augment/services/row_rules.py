@@ -22,8 +22,13 @@ from augment.scene.codec import (
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
 from augment.services.scenarios import scenes
 from augment.services.scenarios.scene_imports import note_sentences
-from augment.services.slugs import check_slug
-from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
+from augment.services.texts import (
+    check_picture_name,
+    check_prose,
+    check_slug,
+    check_stored_name,
+    one_line,
+)
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import MOST_SAMPLES, options_from_document
 from augment.variants.respondents import ModelRole

@@ -15,7 +15,7 @@ import uuid
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from enum import StrEnum
 from functools import partial
@@ -26,7 +26,14 @@ from django.conf import settings
 from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q, QuerySet
 
-from augment.errors import AugmentError, BudgetSpent, DatabaseLocked, LeaseLost, WorkerStopping
+from augment.errors import (
+    AugmentError,
+    BudgetSpent,
+    DatabaseLocked,
+    JobCancelled,
+    LeaseLost,
+    WorkerStopping,
+)
 from augment.llm.messages import shorten
 from augment.models import FAILED, Work
 from augment.services.clock import DATABASE_TIME, Moment, repeating
@@ -42,6 +49,9 @@ FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
 
 PATIENCE_S = 600.0
 """How long a database that takes nothing is waited for."""
+
+CANCELLED = "cancelled"
+"""The state of work that nobody needs any more, of the kinds that have it."""
 
 FREE: Mapping[str, Any] = {"claim": None, "heartbeat_at": None}
 
@@ -183,6 +193,7 @@ class WorkKind(ABC, Generic[Row]):
 
         Raises:
             AugmentError: Why the row fails.
+            JobCancelled: Nobody needs it any more; it is cancelled.
             LeaseLost: Another worker has the row now.
             WorkerStopping, BudgetSpent: Nothing more is done now; the row waits again.
         """
@@ -194,6 +205,10 @@ class WorkKind(ABC, Generic[Row]):
     def sendable(self) -> QuerySet[Row]:
         """Return the waiting rows for which messages are sent."""
         return self.waiting()
+
+    def columns(self, row: Row) -> Mapping[str, Any]:
+        """Return what is written with every outcome."""
+        return {}
 
     def on_start(self, pk: int, worker: str, now: Moment) -> object:
         """Note that a worker has taken a row, in the same transaction; returns the note."""
@@ -276,7 +291,7 @@ class WorkKind(ABC, Generic[Row]):
         settled = None
         try:
             with held.keep_alive():
-                outcome = self.run(row, held)
+                outcome = self._try(row, held)
                 if outcome is not None and wait_out(partial(held.settle, outcome)):
                     settled = outcome
         except LeaseLost as error:
@@ -286,8 +301,6 @@ class WorkKind(ABC, Generic[Row]):
             held.release(reason=str(error))
         except BudgetSpent as error:
             held.release(end=TryEnd.STOPPED, reason=str(error))
-        except AugmentError as error:
-            held.settle(Settlement(state=FAILED, reason=str(error)))
         except Exception as error:
             if is_passing(error):
                 logger.warning("Gave %s back: %s", held, error)
@@ -302,6 +315,17 @@ class WorkKind(ABC, Generic[Row]):
         finally:
             wait_out(partial(self.after_commit, row, settled))
         return True
+
+    def _try(self, row: Row, held: Lease[Row]) -> Settlement | None:
+        """Run; what went wrong with a sentence is an outcome as well."""
+        try:
+            outcome = self.run(row, held)
+        except (LeaseLost, WorkerStopping, BudgetSpent):
+            raise
+        except AugmentError as error:
+            state = CANCELLED if isinstance(error, JobCancelled) else FAILED
+            outcome = Settlement(state=state, reason=reason_sentence(error))
+        return outcome and replace(outcome, columns={**self.columns(row), **outcome.columns})
 
     def take_back_lost(self, *, now: Moment = DATABASE_TIME) -> list[int]:
         """Take back every lease that has gone silent; returns the rows that wait again."""
@@ -347,6 +371,12 @@ KINDS: dict[str, WorkKind[Any]] = {}
 def register(*kinds: WorkKind[Any]) -> None:
     """Let workers take these kinds, and recover what is lost of them."""
     KINDS.update({kind.name: kind for kind in kinds})
+
+
+def reason_sentence(error: AugmentError) -> str:
+    """Return the reason of a failure, with the HTTP status if there was one."""
+    text, status = str(error), getattr(error, "status", None)
+    return text if status is None or str(status) in text else f"HTTP {status}: {text}"
 
 
 def is_passing(error: Exception) -> bool:

@@ -12,9 +12,8 @@ from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
-from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.contestants import ContestantRequest, read_options
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.treatments import read_options
 from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
 from augment.services.running.jobs import JobRequest

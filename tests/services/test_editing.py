@@ -22,7 +22,7 @@ from augment.scene.intent import Intent
 from augment.scene.planned_motion import LanePath, PlannedMotion
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation, check_edit
-from augment.services.running import by_hand, runner
+from augment.services.running import follow_ups, runner
 from augment.services.scenarios.editing import editor_document
 from augment.services.scenarios.pictures import (
     SceneView,
@@ -221,9 +221,9 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     ada, first = User.objects.create_user("ada"), original()
     before = Augmentation.objects.filter(pk=first.pk).values().get()
     walker = pedestrian("Added1", 24.0, -3.0, (24.0, 3.0))
-    start = by_hand.starting_document(first)
+    start = follow_ups.starting_document(first)
     wanted = {**start, "add": [start["add"][0], document(walker)["add"][0]]}  # type: ignore[index]
-    made = by_hand.keep_correction(first, wanted, notes="the second cone is wrong", actor=ada)
+    made = follow_ups.keep_correction(first, wanted, notes="the second cone is wrong", actor=ada)
     assert made.state == Augmentation.State.QUEUED
     assert runner.AUGMENTATIONS.perform(made.pk, worker="here")
     made.refresh_from_db()

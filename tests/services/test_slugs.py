@@ -3,7 +3,7 @@
 import pytest
 
 from augment.models import Contestant
-from augment.services.slugs import check_slug, free_slug
+from augment.services.texts import check_slug, free_slug
 
 pytestmark = pytest.mark.django_db
 

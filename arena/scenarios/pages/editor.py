@@ -19,7 +19,7 @@ from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services import SLUG_LENGTH, free_slug, make_slug
 from augment.services.judging import check_edit
-from augment.services.running import by_hand
+from augment.services.running import follow_ups
 from augment.services.scenarios import (
     SceneView,
     editing,
@@ -183,12 +183,12 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Correct an augmentation; the result is an augmentation of its own."""
     rows = Augmentation.objects.select_related("contestant", "job", "scenario__base_scene")
     original = get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
-    slug = request.POST.get("contestant", "").strip() or by_hand.BY_HAND
+    slug = request.POST.get("contestant", "").strip() or follow_ups.BY_HAND
     notes = request.POST.get("notes", "")
-    text = request.POST.get("modification", _text(by_hand.starting_document(original)))
+    text = request.POST.get("modification", _text(follow_ups.starting_document(original)))
     if request.method == "POST":
         with refusals_told(request):
-            made = by_hand.keep_correction(
+            made = follow_ups.keep_correction(
                 original, _document(text), slug=slug, notes=notes, actor=get_user(request)
             )
             send_later(request, enqueue_job, made.job_id)

@@ -10,9 +10,9 @@ from augment.services.endpoints.contestants import (
     ContestantRequest,
     add_contestant,
     ensure_builtin,
+    list_unsent_options,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.treatments import list_unsent_options
 from augment.services.inputs import add_options, read_request, read_values, to_inputs
 from augment.services.terminal import TerminalCommand
 from augment.variants.respondents import ModelRole

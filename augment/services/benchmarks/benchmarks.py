@@ -31,8 +31,7 @@ from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios import scenes
 from augment.services.scenarios.choosing import resolve_scenarios
-from augment.services.slugs import SLUG_LENGTH, check_slug, free_slug
-from augment.services.texts import one_line
+from augment.services.texts import SLUG_LENGTH, check_slug, free_slug, one_line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,10 @@ from augment.services.endpoints.contestants import (
     ContestantRequest,
     add_contestant,
     ensure_builtin,
+    list_unsent_options,
     paper_variants,
+    read_options,
+    read_respondents,
 )
 from augment.services.endpoints.known_endpoints import (
     MODEL_FACTS,
@@ -19,8 +22,3 @@ from augment.services.endpoints.known_endpoints import (
 )
 from augment.services.endpoints.known_models import Spending, sum_spending, vendor_family
 from augment.services.endpoints.probing import add_model, ensure_model, list_models, plan_probe
-from augment.services.endpoints.treatments import (
-    list_unsent_options,
-    read_options,
-    read_respondents,
-)

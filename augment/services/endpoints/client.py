@@ -20,14 +20,14 @@ from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q
 
 from augment.errors import EndpointBusy, ParameterRefused
-from augment.llm.client import ModelProfile, Sending, watch_nothing
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
 from augment.models import CallLease, Endpoint
 from augment.services.clock import DATABASE_TIME, Moment, database_now, repeating
+from augment.services.endpoints.contestants import Treatment
 from augment.services.endpoints.known_endpoints import read_key
-from augment.services.endpoints.known_models import read_profile, remember_refusal
-from augment.services.endpoints.treatments import Treatment
+from augment.services.endpoints.known_models import read_facts, read_profile, remember_refusal
 
 logger = logging.getLogger(__name__)
 
@@ -54,7 +54,7 @@ class Queue:
         renew_every_s: How often the lease of a long call is renewed.
     """
 
-    longest_s: float
+    longest_s: float = field(default_factory=lambda: float(settings.LLM_QUEUE_S))
     still_wanted: Callable[[], None] = lambda: None
     clock: Callable[[], Moment] = lambda: DATABASE_TIME
     sleep: Callable[[float], None] = time.sleep
@@ -78,12 +78,12 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         self,
         wire: OpenAIWire,
         endpoint: Endpoint,
-        queue: Queue,
+        queue: Queue | None = None,
         treatment: Treatment | None = None,
     ) -> None:
         self._wire = wire
         self._endpoint = endpoint
-        self._queue = queue
+        self._queue = queue or Queue()
         self._treatment = treatment
         self._profiles = {} if treatment is None else treatment.at(endpoint)
 
@@ -94,8 +94,8 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
             ModelFault: It can't do without something that the model lacks.
         """
         if request.model not in self._profiles:
-            profile: ModelProfile = read_profile(endpoint=self._endpoint, model=request.model)
-            self._profiles[request.model] = profile
+            facts = read_facts(endpoint=self._endpoint, model=request.model)
+            self._profiles[request.model] = read_profile(facts)
         return self._profiles[request.model].fit(request)
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:

@@ -28,7 +28,7 @@ from augment.llm.wire_transport import host_and_port
 from augment.models import Endpoint, EndpointModel, KeyBinding
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.slugs import check_slug, free_slug
+from augment.services.texts import check_slug, free_slug
 
 OPENAI, OPENAI_URL, OPENAI_KEY = "openai", "https://api.openai.com/v1", "OPENAI_API_KEY"
 

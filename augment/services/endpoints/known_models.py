@@ -72,18 +72,13 @@ def read_facts(*, endpoint: Endpoint, model: str) -> EndpointModel:
     return row or EndpointModel(endpoint=endpoint, model=model)
 
 
-def read_profile(*, endpoint: Endpoint, model: str) -> ModelProfile:
-    """Return the parameters that the model takes, as far as known."""
-    return _profile(read_facts(endpoint=endpoint, model=model))
-
-
 @transaction.atomic
 def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> ModelProfile:
     """Note that the model does not take this parameter; returns what it takes now."""
     model_at(endpoint=endpoint, model=model)
     rows = EndpointModel.objects.select_for_update(no_key=True)
     row = rows.get(endpoint=endpoint, model=model)
-    if parameter not in _profile(row).refused:
+    if parameter not in read_profile(row).refused:
         if parameter == TEMPERATURE:
             row.temperature = False
         else:
@@ -92,7 +87,7 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
         log_change(
             row, "learn", after={"endpoint": endpoint.label, "model": model, "refuses": parameter}
         )
-    return _profile(row)
+    return read_profile(row)
 
 
 def find_price(row: EndpointModel) -> Price | None:
@@ -194,7 +189,8 @@ def vendor_family(model: str) -> str:
         return word[0] if word else name
 
 
-def _profile(row: EndpointModel) -> ModelProfile:
+def read_profile(row: EndpointModel) -> ModelProfile:
+    """Return the parameters that a model takes, as far as known."""
     refused = {TEMPERATURE} if row.temperature is False else set[str]()
     return ModelProfile(
         native_tools=row.native_tools,

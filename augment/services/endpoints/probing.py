@@ -10,7 +10,6 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 from django.utils import timezone
@@ -22,9 +21,9 @@ from augment.llm.messages import LengthName, Reply, Request, SchemaForm, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
+from augment.services.endpoints.contestants import SAMPLING
 from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, check_facts
 from augment.services.endpoints.known_models import TEMPERATURE, find_price, model_at
-from augment.services.endpoints.treatments import SAMPLING
 from augment.services.events import log_change
 from augment.services.texts import make_document_storable, one_line
 from augment.services.work import Lease, Settlement, WorkKind
@@ -270,7 +269,7 @@ class _Prober:
         while True:
             request = self.profile.fit(question.request)
             try:
-                with place_at(self._row.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
+                with place_at(self._row.endpoint, Queue()):
                     self.calls += 1
                     return request, self._client.complete(request)
             except ParameterRefused as refused:

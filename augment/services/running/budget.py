@@ -21,7 +21,7 @@ from augment.llm.costs import Price, WorstCase, to_nano_usd
 from augment.llm.messages import Reply
 from augment.models import CappedWork, Contestant, GenerationJob, JudgeRun, ModelCall
 from augment.services.clock import Moment
-from augment.services.endpoints.treatments import list_unpriced_models
+from augment.services.endpoints.contestants import list_unpriced_models
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 

@@ -8,8 +8,7 @@ that is in flight for another row is not paid twice: its answer is waited for.
 
 import logging
 import time
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import timedelta
 from functools import partial
@@ -23,13 +22,19 @@ from django.utils import timezone
 from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
-from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services.endpoints.known_models import find_price, read_facts
-from augment.services.endpoints.treatments import Respondent
+from augment.models import Augmentation, GenerationJob, ModelCall, TranscriptNote
+from augment.services.endpoints.contestants import Respondent
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
-from augment.services.work import FIRST_WAIT_S, LONGEST_WAIT_S, Lease, wait_out
+from augment.services.work import (
+    CANCELLED,
+    FIRST_WAIT_S,
+    LONGEST_WAIT_S,
+    Lease,
+    reason_sentence,
+    wait_out,
+)
 from augment.variants.respondents import ModelRole, NoteKind
 
 logger = logging.getLogger(__name__)
@@ -60,76 +65,68 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
     row = rows.only("pk").annotate(job_state=F("job__state")).first()
     if row is None:
         raise errors.LeaseLost
-    if row.job_state == GenerationJob.State.CANCELLED:
+    if row.job_state == CANCELLED:
         raise errors.JobCancelled
 
 
-def reason_sentence(fault: errors.ModelFault) -> str:
-    """Return the reason of a failure, with the HTTP status if there was one."""
-    text = str(fault)
-    if fault.status is None or str(fault.status) in text:
-        return text
-    return f"HTTP {fault.status}: {text}"
-
-
-class CallTranscript(ABC):
+class CallTranscript:
     """A transcript that writes calls as rows, one after the other.
 
     Args:
+        held: The lease on the row that they are made for; once it is lost, nothing more is asked.
         owner: The column that says whose calls they are, with its value.
-        endpoint: Who is asked.
-        others: Who is asked in the roles that have an endpoint of their own.
+        respondents: Who is asked, by role.
+        budgets: The one row whose caps count; None where the class has its own.
         key: What keeps its answers apart from those of other options and samples.
         numbers: How many calls the owner has already.
-        sleep: Waits for that many seconds.
     """
 
     def __init__(
         self,
+        held: Lease[Any],
         owner: Mapping[str, object],
-        endpoint: Endpoint,
+        respondents: Mapping[ModelRole, Respondent],
+        budgets: budget.Budgets | None = None,
         *,
-        others: Mapping[ModelRole, Endpoint] | None = None,
         key: Mapping[str, object] | None = None,
         numbers: int = 0,
-        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
+        self._held = held
         self._owner = owner
-        self._endpoint = endpoint
-        self._others = others or {}
+        self._respondents = respondents
+        self._budgets = budgets
         self._key = key
         self._numbers = numbers
-        self._sleep = sleep
         self._in_flight: dict[int, _CallInFlight] = {}
 
-    @abstractmethod
     def insist(self) -> None:
-        """Return while the calls are wanted; the row is locked until the transaction ends.
+        """Return while the calls are wanted; in a transaction the row is locked until its end.
 
         Raises:
             LeaseLost: Another worker has the row now.
             JobCancelled: Its job is cancelled.
         """
+        if not self._held.is_held(lock=connection.in_atomic_block):
+            raise errors.LeaseLost
+        if self._budgets is not None and self._budgets.filter(state=CANCELLED).exists():
+            raise errors.JobCancelled
 
-    def price(self, role: ModelRole, model: str) -> Price | None:
-        """Return the price of a role's model, None if unknown."""
-        return find_price(read_facts(endpoint=self._endpoint_of(role), model=model))
-
-    @abstractmethod
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         """Take room for a call.
 
         Raises:
             Conflict: There is a cap in USD and the price is unknown.
         """
+        assert self._budgets is not None
+        return budget.reserve(jobs=self._budgets, worst=worst, price=price)
 
-    @abstractmethod
     def limit(self) -> str:
         """Return the cap that leaves no room, as a person reads it."""
+        assert self._budgets is not None
+        return budget.describe_caps(self._budgets.get())
 
-    @abstractmethod
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
-        """Store what happened since the last call."""
+        """Readings and judges have no rounds, tools or reviews to note."""
 
     def calls_with(self, request_hash: str) -> QuerySet[ModelCall]:
         """Return the calls whose answer may serve that request again, once they have one."""
@@ -154,7 +151,7 @@ class CallTranscript(ABC):
             workers.insist_on_going_on()
             with transaction.atomic():
                 self.insist()
-            self._sleep(wait_s)
+            time.sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
         if earlier is None:
             return None
@@ -191,7 +188,7 @@ class CallTranscript(ABC):
         for message in request.messages:
             for png in message.images:
                 store(png, folder=IMAGES)
-        worst, price = worst_case(request), self.price(role, request.model)
+        worst, price = worst_case(request), self._respondents[role].price
         wait_s = FIRST_WAIT_S
         while True:
             workers.insist_on_going_on()
@@ -202,7 +199,7 @@ class CallTranscript(ABC):
                 return self._numbers
             if room == budget.Room.SPENT:
                 raise errors.BudgetSpent(self.limit())
-            self._sleep(wait_s)
+            time.sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
     def sending(self, number: int) -> None:
@@ -245,7 +242,7 @@ class CallTranscript(ABC):
     def _settle(self, call: ModelCall, used: budget.Usage, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out."""
         settle = partial(budget.settle, call=call, used=used, now=timezone.now(), answer=answer)
-        wait_out(settle, sleep=self._sleep)
+        wait_out(settle)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
         """Return the columns of a call's row that describe the request."""
@@ -255,7 +252,7 @@ class CallTranscript(ABC):
             "role": role,
             "request": document,
             "request_hash": request_hash(
-                base_url=self._endpoint_of(role).base_url,
+                base_url=self._respondents[role].endpoint.base_url,
                 document=document,
                 prompt_version=version,
                 options=self._key,
@@ -284,9 +281,6 @@ class CallTranscript(ABC):
         )
         return room, call
 
-    def _endpoint_of(self, role: ModelRole) -> Endpoint:
-        return self._others.get(role, self._endpoint)
-
 
 class RowTranscript(CallTranscript):
     """The calls of one attempt at an augmentation, within the budget of its job.
@@ -305,18 +299,11 @@ class RowTranscript(CallTranscript):
         *,
         key: Mapping[str, object] | None = None,
     ) -> None:
-        self._held = held
+        jobs = GenerationJob.objects.filter(pk=row.job_id)
+        super().__init__(held, {"attempt": held.attempt}, respondents, jobs, key=key)
         self._row = row
-        self._jobs = GenerationJob.objects.filter(pk=row.job_id)
         self._attempt = held.attempt
         self._notes = 0
-        self._respondents = respondents
-        others = {role: respondent.endpoint for role, respondent in respondents.items()}
-        endpoint = others[ModelRole.MODIFIER]
-        super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key)
-
-    def price(self, role: ModelRole, model: str) -> Price | None:
-        return find_price(self._respondents[role].facts)
 
     def insist(self) -> None:
         insist_wanted(self._held, lock=True)
@@ -328,12 +315,6 @@ class RowTranscript(CallTranscript):
             own = calls.filter(attempt__augmentation=self._row)
             calls = own.exclude(attempt=self._attempt).exclude(copies__attempt=self._attempt)
         return calls
-
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
-        return budget.reserve(jobs=self._jobs, worst=worst, price=price)
-
-    def limit(self) -> str:
-        return budget.describe_caps(self._jobs.get())
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         self._notes += 1

@@ -11,13 +11,13 @@ from augment.errors import AugmentError, Conflict, UnknownName, check_names
 from augment.llm.messages import SchemaForm
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.benchmarks.submissions import refuse_unanswered
-from augment.services.endpoints.known_endpoints import find_key_obstacle
-from augment.services.endpoints.treatments import (
+from augment.services.endpoints.contestants import (
     Respondent,
     other_prompts,
     read_options,
     read_respondents,
 )
+from augment.services.endpoints.known_endpoints import find_key_obstacle
 from augment.services.scenarios.choosing import ALL
 from augment.variants.options import ContestantOptions, ToolProtocol
 from augment.variants.respondents import ModelRole

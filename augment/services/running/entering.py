@@ -12,8 +12,7 @@ from augment.services.endpoints.contestants import LONGEST_NAME
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running.jobs import JobRequest, launch
-from augment.services.slugs import SLUG_RULE, check_slug, free_slug
-from augment.services.texts import one_line
+from augment.services.texts import SLUG_RULE, check_slug, free_slug, one_line
 from augment.variants.options import MOST_SAMPLES
 
 

@@ -8,8 +8,8 @@ from django.db.models import Count, Q, Sum
 
 from augment.llm.costs import to_usd
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
+from augment.services.endpoints.contestants import read_options, read_respondents
 from augment.services.endpoints.known_models import find_price
-from augment.services.endpoints.treatments import read_options, read_respondents
 from augment.services.running.jobs import JobScope, with_followed
 from augment.variants.options import recipe_with
 from augment.variants.recipes import find_recipe

@@ -1,7 +1,9 @@
-"""Follow-ups: what a language model is told next about its own answer, step by step.
+"""What follows an answer, which stays as it is: a follow-up, or a correction by hand.
 
-A step is an augmentation of a scenario that follows another one; `follows` leads to the step
-before, which stays as it is. Going back is going on from an earlier step.
+A follow-up is what a language model is told next about its own answer. Each step is an
+augmentation of a scenario that follows another one; `follows` leads to the step before. Going back
+is going on from an earlier step. A correction is an augmentation of a contestant of kind human:
+written with its modification, it waits for a worker that draws and settles it.
 """
 
 from contextlib import suppress
@@ -10,17 +12,32 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import Q
 from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.llm.messages import Message, message_from_document
-from augment.models import Augmentation, ModelCall, Scenario, TranscriptNote
+from augment.models import (
+    Augmentation,
+    Contestant,
+    GenerationJob,
+    ModelCall,
+    Scenario,
+    TranscriptNote,
+)
 from augment.prompts.fill import model_message
+from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.entities import Modification
+from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest, launch
+from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, NewScenario, add_scenario
+from augment.services.texts import LONGEST_NOTES, check_prose, free_slug, one_line
 from augment.variants.respondents import ModelRole, NoteKind
+
+BY_HAND = "by-hand"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,3 +146,84 @@ def steps_to(row: Augmentation) -> list[Augmentation]:
         steps.insert(0, before)
         before = before.follows
     return steps
+
+
+# --- Corrections by hand -----------------------------------------------------------------------
+
+
+@transaction.atomic
+def keep_correction(
+    original: Augmentation,
+    document: object,
+    *,
+    slug: str = BY_HAND,
+    notes: str = "",
+    actor: User | None = None,
+) -> Augmentation:
+    """Create a waiting row of a job of its own; the caller sends its message.
+
+    Args:
+        original: What is corrected; it stays as it is.
+        document: The modification as it should be.
+        slug: Of the contestant that it counts for, or a person's name; made if there is none.
+        notes: Why it was corrected, or nothing.
+        actor: Whose hand it was.
+
+    Raises:
+        InvalidDocument: The document, the name or the notes break their format.
+        InvalidModification: The modification does not fit the scene.
+        Conflict: Nothing was changed, nothing is left, or the slug is that of somebody who is no
+            person or retired.
+    """
+    modification = read_edit(original.scenario, document)
+    if modification.is_empty:
+        raise Conflict("Nothing is added, moved or removed: there is nothing to keep.")
+    before = original.modification
+    if before is not None and modification == read_edit(original.scenario, before):
+        raise Conflict("Nothing was corrected: it is as it was.")
+    if notes:
+        check_prose("notes", notes, what="correction", longest=LONGEST_NOTES)
+    contestant = _find_or_add_person(slug)
+    name = f"By hand: {original.scenario.slug}"
+    job = GenerationJob.objects.create(name=name, launched_by=actor)
+    job.contestants.set([contestant])
+    job.scenarios.set([original.scenario])
+    row = Augmentation.objects.create(
+        job=job,
+        scenario=original.scenario,
+        contestant=contestant,
+        modification=modification_to_document(modification),
+        notes=notes.strip(),
+        corrects=original,
+        made_by=actor,
+    )
+    made = {
+        "augmentation": str(row.code),
+        "contestant": contestant.slug,
+        "modification": row.modification,
+    }
+    log_change(original, "correct", actor, before={"modification": before}, after=made)
+    return row
+
+
+def starting_document(original: Augmentation) -> dict[str, object]:
+    """Return the modification that a correction begins with."""
+    stored = original.modification
+    return modification_to_document(
+        modification_from_document(stored) if stored else Modification()
+    )
+
+
+def _find_or_add_person(name: str) -> Contestant:
+    human = Contestant.Kind.HUMAN
+    is_meant = Q(slug=name) | Q(name=name, kind=human)
+    row = Contestant.objects.filter(is_meant).order_by("pk").first()
+    if row is None:
+        title = (
+            "Corrected by hand" if name == BY_HAND else one_line("name", name, what="contestant")
+        )
+        slug = free_slug(Contestant.objects, name, otherwise="person")
+        row = Contestant.objects.create(slug=slug, name=title, kind=human)
+    if row.kind != human or row.retired_at:
+        raise Conflict(f"“{row.name}” is no person or is retired; choose another name.")
+    return row

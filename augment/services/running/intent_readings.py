@@ -2,25 +2,25 @@
 
 from contextlib import AbstractContextManager
 
-from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.errors import BudgetSpent, LeaseLost, ModelFault, ReplyUnreadable
+from augment.errors import BudgetSpent
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
-from augment.models import Endpoint, IntentReading, Scenario
+from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
-from augment.services.endpoints.client import EndpointClient, Queue, wire_to
+from augment.services.endpoints.client import EndpointClient, wire_to
+from augment.services.endpoints.contestants import Respondent
 from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.events import log_change
 from augment.services.running.budget import Room
-from augment.services.running.calls import CallTranscript, reason_sentence
+from augment.services.running.calls import CallTranscript
 from augment.services.scenarios.scenes import scenario_named
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
-from augment.variants.respondents import NoteKind
+from augment.variants.respondents import ModelRole
 
 State = IntentReading.State
 MOST_CALLS = 6
@@ -88,18 +88,19 @@ class Readings(WorkKind[IntentReading]):
 
     def run(self, row: IntentReading, held: Lease[IntentReading]) -> Settlement:
         """Ask the model; every foreseen fault is a failed reading with a sentence."""
-        queue = Queue(longest_s=settings.LLM_QUEUE_S)
-        client = self._client or EndpointClient(wire_to(row.endpoint), row.endpoint, queue)
-        transcript = ReadingTranscript(held, row)
+        client = self._client or EndpointClient(wire_to(row.endpoint), row.endpoint)
+        # A worker that was told to stop may have asked already.
+        transcript = ReadingTranscript(
+            held,
+            {"reading": row},
+            {ModelRole.READER: Respondent(endpoint=row.endpoint, model=row.model)},
+            numbers=row.calls.count(),
+        )
         try:
             with client as opened:
                 intent = ask_for_intent(
                     row.scenario.instruction, client=opened, model=row.model, transcript=transcript
                 )
-        except ModelFault as fault:
-            return Settlement(state=State.FAILED, reason=reason_sentence(fault))
-        except ReplyUnreadable as unreadable:
-            return Settlement(state=State.FAILED, reason=str(unreadable))
         except BudgetSpent as spent:
             return Settlement(state=State.FAILED, reason=f"The cap is reached: {spent.limit}")
         return Settlement(state=State.READ, columns={"document": intent_to_document(intent)})
@@ -121,23 +122,9 @@ READINGS = Readings()
 class ReadingTranscript(CallTranscript):
     """The calls of one reading, within its own number of calls."""
 
-    def __init__(self, held: Lease[IntentReading], reading: IntentReading) -> None:
-        self._held = held
-        self._reading = reading
-        # A worker that was told to stop may have asked already.
-        numbers = reading.calls.count()
-        super().__init__({"reading": reading}, reading.endpoint, numbers=numbers)
-
-    def insist(self) -> None:
-        if not self._held.is_held(lock=True):
-            raise LeaseLost
-
     def reserve(self, worst: WorstCase, price: Price | None) -> Room:
-        made = self._reading.calls.exclude(sent_at=None).count()
+        made = ModelCall.objects.filter(**self._owner).exclude(sent_at=None).count()
         return Room.TAKEN if made < MOST_CALLS else Room.SPENT
 
     def limit(self) -> str:
         return f"{MOST_CALLS} calls"
-
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
-        """A reading has no rounds, tools or reviews to note."""

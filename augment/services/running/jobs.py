@@ -12,7 +12,7 @@ from django.utils import timezone
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment
-from augment.services.endpoints.treatments import loosen_unanswered
+from augment.services.endpoints.contestants import loosen_unanswered
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.running.budget import NO_CAPS, Caps, check_caps, describe_caps, raise_caps
@@ -95,7 +95,7 @@ def launch(
     refuse_impossible(who, where, samples=request.samples)
     job = GenerationJob.objects.create(
         name=name,
-        launched_by_id=actor.pk if actor else None,
+        launched_by=actor,
         samples=request.samples,
         is_fresh=request.is_fresh,
         full_plan=request.full_plan,

@@ -10,28 +10,27 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
 
-from django.conf import settings
 from django.contrib.auth.models import User
 from django.core.files.storage import default_storage
-from django.db import connection, transaction
+from django.db import transaction
 from django.db.models import Avg, Exists, OuterRef, Q, QuerySet
 
 from augment import errors
 from augment.llm.client import ChatClient
-from augment.llm.costs import Price, WorstCase, to_usd
+from augment.llm.costs import to_usd
 from augment.llm.messages import shorten
 from augment.models import JudgeRun, ModelCall, PairJudgement
 from augment.prompts.fill import JudgeQuestion, Shown
 from augment.render.film import FRAMES_S, draw_frames
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
+from augment.services.endpoints.contestants import Respondent
 from augment.services.endpoints.known_endpoints import find_endpoint
-from augment.services.endpoints.known_models import find_price, read_facts
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.running import budget
-from augment.services.running.budget import Caps, Room
-from augment.services.running.calls import CallTranscript, reason_sentence
+from augment.services.running.budget import Caps
+from augment.services.running.calls import CallTranscript
 from augment.services.scenarios.pictures import film_document
 from augment.services.texts import make_storable
 from augment.services.work import Lease, Settlement, WorkKind, change_all
@@ -39,7 +38,7 @@ from augment.variants.judge import UNREADABLE, ask_judge, most_nano_usd
 from augment.variants.judge import Exchange as Exchange
 from augment.variants.judge import combine_answers as combine_answers
 from augment.variants.judge import exchange as exchange
-from augment.variants.respondents import NoteKind
+from augment.variants.respondents import ModelRole
 
 State = PairJudgement.State
 RunState = JudgeRun.State
@@ -94,19 +93,13 @@ def estimate_judge(request: JudgeRequest, pairs: int, longest: str) -> JudgeEsti
         UnknownName: No such endpoint.
         Conflict: The model can't see pictures.
     """
-    endpoint = find_endpoint(request.endpoint)
-    facts = read_facts(endpoint=endpoint, model=request.model)
-    if facts.vision is False:
-        raise errors.Conflict(
-            f"{request.model} at {endpoint.label} can’t see pictures, so it can’t judge them. "
-            "Choose another model; where this is wrong, probe the model again."
-        )
-    calls, price = ORDERS * pairs, find_price(facts)
+    judge = _find_judge(request)
+    calls, price = ORDERS * pairs, judge.price
     usd = most = None
     if price is not None:
         most = to_usd(calls * most_nano_usd(longest, price))
         used = ModelCall.objects.filter(
-            **{"judgement__run__endpoint": endpoint, "judgement__run__model": request.model},
+            **{"judgement__run__endpoint": judge.endpoint, "judgement__run__model": judge.model},
             served_from=None,
         ).aggregate(prompt=Avg("prompt_tokens"), completion=Avg("completion_tokens"))
         if None not in used.values():
@@ -126,24 +119,22 @@ def plan_judge(
         InvalidDocument: A cap can't be.
         Conflict: There is no pair, the model can't see, or a cap in USD lacks a price.
     """
-    estimate_judge(request, len(pairs), "")
+    judge = _find_judge(request)
     if not pairs:
         raise errors.Conflict(
             "No pair was judged by experts yet, so there is nothing to compare with."
         )
-    endpoint = find_endpoint(request.endpoint)
-    is_priced = find_price(read_facts(endpoint=endpoint, model=request.model)) is not None
-    unpriced = [] if is_priced else [f"{request.model} at {endpoint.label}"]
+    unpriced = [] if judge.price else [str(judge)]
     run = JudgeRun.objects.create(
-        endpoint=endpoint,
-        model=request.model,
+        endpoint=judge.endpoint,
+        model=judge.model,
         question=request.question,
         frames=len(FRAMES_S),
         asked_by=actor,
         **budget.cap_columns(request, unpriced),
     )
     PairJudgement.objects.bulk_create(PairJudgement(run=run, **pair._asdict()) for pair in pairs)
-    facts = {"model": run.model, "endpoint": endpoint.label, "pairs": len(pairs)}
+    facts = {"model": run.model, "endpoint": judge.endpoint.label, "pairs": len(pairs)}
     log_change(run, "start", actor, after=facts | {"cap": budget.describe_caps(run)})
     return run
 
@@ -196,20 +187,21 @@ class Judgements(WorkKind[PairJudgement]):
 
     def run(self, row: PairJudgement, held: Lease[PairJudgement]) -> Settlement:
         """Ask in both orders; an answer that was stored before is not paid for again."""
-        transcript = JudgeTranscript(held, row)
-        queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=transcript.insist)
         endpoint = row.run.endpoint
+        transcript = CallTranscript(
+            held,
+            {"judgement": row},
+            {ModelRole.JUDGE: Respondent(endpoint=endpoint, model=row.run.model)},
+            JudgeRun.objects.filter(pk=row.run_id),
+            numbers=row.calls.count(),  # a worker that was lost may have asked already
+        )
+        queue = Queue(still_wanted=transcript.insist)
         pictures = _read_shown(row.run, row.left_image), _read_shown(row.run, row.right_image)
         columns: dict[str, str] = {}
-        try:
-            with self._client or EndpointClient(wire_to(endpoint), endpoint, queue) as client:
-                for order, shown in (("first", pictures), ("second", pictures[::-1])):
-                    better, reason = _ask(row, shown, client, transcript)
-                    columns |= {order: better, f"{order}_reason": reason}
-        except errors.JobCancelled as cancelled:
-            return Settlement(state=State.CANCELLED, reason=str(cancelled))
-        except errors.ModelFault as fault:
-            return Settlement(state=State.FAILED, reason=reason_sentence(fault))
+        with self._client or EndpointClient(wire_to(endpoint), endpoint, queue) as client:
+            for order, shown in (("first", pictures), ("second", pictures[::-1])):
+                better, reason = _ask(row, shown, client, transcript)
+                columns |= {order: better, f"{order}_reason": reason}
         return Settlement(state=State.DONE, columns=columns)
 
     def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
@@ -228,32 +220,18 @@ class Judgements(WorkKind[PairJudgement]):
 JUDGEMENTS = Judgements()
 
 
-class JudgeTranscript(CallTranscript):
-    """The calls about one pair, within the caps of its run."""
-
-    def __init__(self, held: Lease[PairJudgement], row: PairJudgement) -> None:
-        self._held = held
-        self._runs = JudgeRun.objects.filter(pk=row.run_id)
-        # A worker that was lost may have asked already.
-        super().__init__({"judgement": row}, row.run.endpoint, numbers=row.calls.count())
-
-    def insist(self) -> None:
-        if not self._held.is_held(lock=connection.in_atomic_block):
-            raise errors.LeaseLost
-        if self._runs.filter(state=RunState.CANCELLED).exists():
-            raise errors.JobCancelled
-
-    def reserve(self, worst: WorstCase, price: Price | None) -> Room:
-        return budget.reserve(jobs=self._runs, worst=worst, price=price)
-
-    def limit(self) -> str:
-        return budget.describe_caps(self._runs.get())
-
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
-        """A judge has no rounds, tools or reviews to note."""
-
-
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _find_judge(request: JudgeRequest) -> Respondent:
+    """Return who is asked for; a model that can't see is refused."""
+    judge = Respondent(endpoint=find_endpoint(request.endpoint), model=request.model)
+    if judge.facts.vision is False:
+        raise errors.Conflict(
+            f"{request.model} at {judge.endpoint.label} can’t see pictures, so it can’t judge "
+            "them. Choose another model; where this is wrong, probe the model again."
+        )
+    return judge
 
 
 def _read_shown(run: JudgeRun, name: str) -> Shown:
@@ -280,7 +258,7 @@ def _ask(
     row: PairJudgement,
     pictures: tuple[Shown, Shown],
     client: ChatClient,
-    transcript: JudgeTranscript,
+    transcript: CallTranscript,
 ) -> tuple[str, str]:
     """Return the answer in one order and its reason; a refusal is as unreadable as babble."""
     try:

@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from django.conf import settings
 from django.db import Error
 from django.db.models import Max, Q, QuerySet, Subquery
 from django.db.models.functions import Coalesce
@@ -29,9 +28,9 @@ from augment.scene.entities import Scene
 from augment.services.benchmarks.submissions import find_entry
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
-from augment.services.endpoints.treatments import Treatment, read_respondents, read_treatment
+from augment.services.endpoints.contestants import Treatment, read_respondents, read_treatment
 from augment.services.running import budget, jobs, workers
-from augment.services.running.calls import RowTranscript, insist_wanted, reason_sentence
+from augment.services.running.calls import RowTranscript, insist_wanted
 from augment.services.running.follow_ups import read_conversation_until
 from augment.services.scenarios.pictures import draw_picture, load_camera, original_picture, redraw
 from augment.services.scenarios.scenes import (
@@ -94,55 +93,43 @@ class Augmentations(WorkKind[Augmentation]):
         """Return the follow-ups that have waited for this row."""
         return list(self.waiting().filter(follows=pk, sent_at=None).values_list("pk", flat=True))
 
+    def columns(self, row: Augmentation) -> dict[str, Any]:
+        """Return the options with which its model was asked."""
+        return {"options": row.options}
+
     def run(self, row: Augmentation, held: Held) -> Settlement:
-        """Ask, keep, draw. Every foreseen fault is a failed outcome with a sentence."""
-        outcome = self._make(row, held)
-        return replace(outcome, columns={"options": row.options, **outcome.columns})
+        """Ask, keep, draw."""
+        try:
+            return self._make(row, held)
+        except errors.InvalidModification as error:
+            raise errors.Conflict(f"The modification does not fit the scene: {error}") from error
 
     def _make(self, row: Augmentation, held: Held) -> Settlement:
-        try:
-            scene = load_scene(row.scenario)
-            if row.modification is not None:  # of an earlier attempt that could not draw it
-                outcome = Outcome(
-                    status=OutcomeStatus.DONE,
-                    modification=modification_from_document(row.modification),
-                    notes=row.notes,
-                )
-            else:
-                outcome = _ask(row, scene, held, self._connect)
-            if outcome.modification is None:
-                columns: dict[str, Any] = {"image": original_picture(row.scenario)}
-                return Settlement(
-                    state=outcome.status.value, reason=outcome.reason, columns=columns
-                )
-            modification = fit_boxes(scene, outcome.modification)
-            document = modification_to_document(modification)
-            columns = {"modification": make_document_storable(document)}
-            if outcome.notes:
-                columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
-            try:
-                camera = load_camera(row.scenario, {row.pk: columns["modification"]})
-                image = draw_picture(row.scenario, modification, camera)
-            except Exception:
-                is_done = outcome.status is OutcomeStatus.DONE
-                held.note(**(columns if is_done else {}))  # a second try only has to draw
-                raise
-            return Settlement(
-                state=outcome.status.value,
-                reason=outcome.reason,
-                columns=columns | {"image": image},
+        scene = load_scene(row.scenario)
+        if row.modification is not None:  # of an earlier attempt that could not draw it
+            outcome = Outcome(
+                status=OutcomeStatus.DONE,
+                modification=modification_from_document(row.modification),
+                notes=row.notes,
             )
-        except errors.JobCancelled as cancelled:
-            return Settlement(state=State.CANCELLED, reason=str(cancelled))
-        except (errors.NotNeeded, errors.BudgetSpent):
+        else:
+            outcome = _ask(row, scene, held, self._connect)
+        settle = partial(Settlement, state=outcome.status.value, reason=outcome.reason)
+        if outcome.modification is None:
+            return settle(columns={"image": original_picture(row.scenario)})
+        modification = fit_boxes(scene, outcome.modification)
+        document = make_document_storable(modification_to_document(modification))
+        columns: dict[str, Any] = {"modification": document}
+        if outcome.notes:
+            columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
+        try:
+            camera = load_camera(row.scenario, {row.pk: document})
+            image = draw_picture(row.scenario, modification, camera)
+        except Exception:
+            is_done = outcome.status is OutcomeStatus.DONE
+            held.note(**(columns if is_done else {}))  # a second try only has to draw
             raise
-        except errors.ModelFault as fault:
-            reason = reason_sentence(fault)
-        except errors.InvalidModification as error:
-            reason = f"The modification does not fit the scene: {error}"
-        except errors.AugmentError as error:
-            reason = str(error)
-        return Settlement(state=State.FAILED, reason=reason)
+        return settle(columns=columns | {"image": image})
 
     def on_start(self, pk: int, worker: str, now: Moment) -> Attempt:
         """Open the next attempt."""
@@ -209,7 +196,7 @@ def open_wire(
         except Error as error:
             logger.warning("Nobody could say whether a call is still wanted: %s", error)
 
-    queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=insist_before_sending)
+    queue = Queue(still_wanted=insist_before_sending)
     wire = wire_to(endpoint, still_wanted=insist_in_flight)
     return EndpointClient(wire, endpoint, queue, treatment)
 

@@ -21,7 +21,7 @@ from django.db.models import Prefetch
 
 from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, Contestant, ModelCall, TranscriptNote
-from augment.services.endpoints.treatments import list_unsent_options
+from augment.services.endpoints.contestants import list_unsent_options
 from augment.services.running.calls import IMAGES
 
 FORMAT, VERSION = "scenario-arena/transcript", 3

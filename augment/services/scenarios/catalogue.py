@@ -24,7 +24,7 @@ from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_change, retire
 from augment.services.scenarios import scenes as scene_rows
-from augment.services.slugs import check_slug
+from augment.services.texts import check_slug
 
 SOURCE = "authored"
 _SHARED = {

@@ -14,7 +14,7 @@ from augment.models import BaseScene
 from augment.scene.codec import recording_to_document, scene_to_document
 from augment.services.events import log_change
 from augment.services.scenarios.scenes import content_hash
-from augment.services.slugs import check_slug, free_slug
+from augment.services.texts import check_slug, free_slug
 
 
 def import_scene(

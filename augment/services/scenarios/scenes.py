@@ -31,8 +31,7 @@ from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
-from augment.services.slugs import SLUG_LENGTH, check_slug, free_slug
-from augment.services.texts import check_prose
+from augment.services.texts import SLUG_LENGTH, check_prose, check_slug, free_slug
 from augment.simulation.expected import expect_recording
 
 LONGEST_TYPE = 40

@@ -29,7 +29,7 @@ from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import draw_scene, store_as
 from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.slugs import check_slug
+from augment.services.texts import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
 
 State = SceneUpload.State
