@@ -42,8 +42,9 @@ AT_ONCE = 500
 
 
 def list_migrations() -> list[str]:
-    """The migrations of this release, as app.name."""
-    return sorted(f"{app}.{name}" for app, name in MigrationLoader(connection).disk_migrations)
+    """The migrations of this release but for squashed ones, as app.name."""
+    migrations = MigrationLoader(connection).disk_migrations.items()
+    return sorted(f"{app}.{name}" for (app, name), each in migrations if not each.replaces)
 
 
 def find_tables() -> list[type[models.Model]]:
