@@ -97,13 +97,13 @@ def _measure(row: Any) -> tuple[Any, float, float | None, int]:
     from augment.render.pair_window import film_states
     from augment.services.scenarios.pair_pictures import frame_pair
 
-    ground, sides, camera = frame_pair(row.left, row.right)
+    loaded, sides, camera = frame_pair(row.left, row.right)
     shifts = find_shifts(*sides)
     scale = camera.inset.camera.px_per_m if camera.inset else camera.px_per_m
     differs_px = max((one.metres for one in shifts), default=0.0) * scale if shifts else None
     outside = 0
     for side in sides if camera.is_filmed else ():
-        motion = ground.motion_after(side, of_all=False)
+        motion = loaded.ground.motion_after(side, of_all=False)
         changed = {agent.id for agent in side.changed}
         for movement in (motion.ego, *motion.others):
             if movement is not motion.ego and movement.agent.id not in changed:

@@ -13,6 +13,7 @@ from augment.services.scenarios.pictures import (
     original_picture,
     picture_view,
 )
+from augment.services.scenarios.scenes import LoadedScenario
 from tests import study_rows
 from tests.scenes import vehicle
 
@@ -39,7 +40,7 @@ def a_moving_study(*, scenarios: int, votes: int) -> Study:
         camera = load_camera(row.scenario)
         original_picture(row.scenario)
         change = Modification(added=(cars[row.contestant.slug],))
-        study_rows.hang(row, draw_picture(row.scenario, change, camera))
+        study_rows.hang(row, draw_picture(LoadedScenario(row.scenario), change, camera))
         row.scenario.matchups.update(
             original_image=row.scenario.original_image, view=picture_view(camera)
         )

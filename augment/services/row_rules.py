@@ -56,7 +56,8 @@ def _check_scenario(row: models.Scenario) -> None:
     check_picture_name("original_image", row.original_image)
     _check_document(intent_from_document, row.intent)
     if row.reference is not None:
-        scenes.check_reference(scenes.load_scene(row), modification_from_document(row.reference))
+        scene = scenes.LoadedScenario(row).scene
+        scenes.check_reference(scene, modification_from_document(row.reference))
 
 
 def _check_benchmark(row: models.Benchmark) -> None:

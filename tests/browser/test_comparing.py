@@ -9,6 +9,7 @@ from pytest_django.live_server_helper import LiveServer
 from augment.models import Augmentation
 from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_picture, load_camera
+from augment.services.scenarios.scenes import LoadedScenario
 from tests.browser.booth import Booth, all_sent, press
 from tests.scenes import vehicle
 from tests.study_rows import a_study, hang
@@ -37,8 +38,9 @@ def drawn(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
     for row in Augmentation.objects.select_related("scenario", "contestant"):
         car = vehicle("New1", places[row.contestant.slug], 0.0)
         camera = load_camera(row.scenario)
-        hang(row, draw_picture(row.scenario, Modification(added=(car,)), camera))
-        unchanged = draw_picture(row.scenario, Modification(), camera)
+        loaded = LoadedScenario(row.scenario)
+        hang(row, draw_picture(loaded, Modification(added=(car,)), camera))
+        unchanged = draw_picture(loaded, Modification(), camera)
         row.scenario.matchups.update(original_image=unchanged)
     made = Booth(address=live_server.url, browser=browser, study=study)
     yield made

@@ -12,7 +12,7 @@ from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent
 from augment.services.scenarios.pictures import store
-from augment.services.scenarios.scenes import load_reference
+from augment.services.scenarios.scenes import LoadedScenario
 from tests.jobs import rows
 from tests.web.cast import png
 
@@ -54,7 +54,7 @@ def answer(
 ) -> None:
     document = None
     if off_m is not None:
-        reference = load_reference(scenario)
+        reference = LoadedScenario(scenario).reference
         assert reference is not None
         moved = tuple(replace(one, x_m=one.x_m + off_m) for one in reference.added)
         document = modification_to_document(Modification(added=moved))

@@ -32,10 +32,10 @@ from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios.prompts import find_stored_tasks
 from augment.services.scenarios.scenes import (
+    LoadedScenario,
     NewScenario,
     add_scenario,
     change_surroundings,
-    load_scene,
 )
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
@@ -68,7 +68,7 @@ def two_steps(*, intents: bool = False) -> tuple[Scenario, Scenario]:
         for ahead_m, body in ((20.0, Body.CAR), (24.0, Body.BUS))
     ]
     first = rows.add_scenario("street", instruction=WISH, intent=intent_to_document(asked[0]))
-    made = [place(load_scene(first), intent).modification for intent in asked]
+    made = [place(LoadedScenario(first).scene, intent).modification for intent in asked]
     Scenario.objects.filter(pk=first.pk).update(reference=modification_to_document(made[0]))
     follow_up = add_scenario(
         NewScenario(
@@ -247,7 +247,7 @@ def test_only_a_language_models_finished_answer_on_record_can_go_on(server: Scri
 
 def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
     first, follow_up = two_steps()
-    assert load_scene(first) == load_scene(follow_up)
+    assert LoadedScenario(first).scene == LoadedScenario(follow_up).scene
     with pytest.raises(Conflict, match="It follows “street”"):
         change_surroundings(follow_up, keep_traffic=True, density="", goal="")
     rows.add_scenario("elsewhere")

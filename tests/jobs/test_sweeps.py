@@ -27,7 +27,7 @@ from augment.services.driving.sweeps import (
 )
 from augment.services.driving.thresholds import conclude, sweep_result
 from augment.services.scenarios.editing import enter_intent
-from augment.services.scenarios.scenes import load_intent, load_reference
+from augment.services.scenarios.scenes import LoadedScenario
 from augment.simulation.drive import find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
@@ -119,7 +119,7 @@ def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> Non
     kept = sweep.hardest
     assert kept is not None
     assert sweep.concluded_at is not None
-    reference = load_reference(kept)
+    reference = LoadedScenario(kept).reference
     assert reference is not None
     assert (kept.slug, reference.added[0].y_m) == ("parked-1", 1.0)
     assert kept.instruction.endswith("(add[0].y_m: 1)")
@@ -175,7 +175,7 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
     drive_tested()
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert load_intent(sweep.hardest) == cones(20.0, 1, Shape.LINE)
+    assert LoadedScenario(sweep.hardest).intent == cones(20.0, 1, Shape.LINE)
 
 
 @pytest.mark.parametrize("now", [cones(60.0, 1, Shape.LINE), parked_car(20.0)])
@@ -191,7 +191,7 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
     drive_tested()
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert load_intent(sweep.hardest) is None
+    assert LoadedScenario(sweep.hardest).intent is None
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -
     assert (len(made) + len(refused), bool(made), bool(refused)) == (10, True, True)
     assert [row.slug for row in made] == [f"cones-{n}" for n in range(1, len(made) + 1)]
     for row in made:
-        intent, reference = load_intent(row), load_reference(row)
+        intent, reference = LoadedScenario(row).intent, LoadedScenario(row).reference
         assert intent is not None
         assert reference is not None
         distance = intent.requests[0].spot.distance

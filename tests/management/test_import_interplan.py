@@ -32,12 +32,7 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.recording import Recording
-from augment.services.scenarios.scenes import (
-    change_surroundings,
-    load_intent,
-    load_reference,
-    load_scene,
-)
+from augment.services.scenarios.scenes import LoadedScenario, change_surroundings
 from augment.simulation.drive import STEPS, find_expert
 from augment.simulation.drive import run as drive_setting
 from augment.simulation.planners import planner_named
@@ -82,20 +77,20 @@ def test_one_command_makes_scenarios_with_their_human_references(folder: Path) -
     assert lines[-1] == "3 scenarios imported, 0 were there already, 2 skipped."
     nudge = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
     assert nudge.type == "nudge_around_parked_vehicle"
-    assert load_scene(nudge).agents == (), "interPlan clears the recorded traffic"
-    reference = load_reference(nudge)
+    assert LoadedScenario(nudge).scene.agents == (), "interPlan clears the recorded traffic"
+    reference = LoadedScenario(nudge).reference
     assert reference is not None
     (car,) = reference.added
     assert (car.x_m, car.y_m) == pytest.approx((17.5, -0.8), abs=1e-3)
     assert car.heading_rad == pytest.approx(0.05)
-    assert car.lane_id == load_scene(nudge).ego.lane_id
+    assert car.lane_id == LoadedScenario(nudge).scene.ego.lane_id
     assert nudge.instruction == (
         "Have the ego nudge around what stands at the side of its lane: a parked vehicle "
         "17.5 m ahead of the ego along its lane, in the ego's lane, 0.8 m right of its centre, "
         "in the lane's direction."
     )
     assert nudge.instruction_is_generated
-    zone = load_reference(Scenario.objects.get(slug=f"interplan-{HERE}-s1"))
+    zone = LoadedScenario(Scenario.objects.get(slug=f"interplan-{HERE}-s1")).reference
     assert zone is not None
     assert [one.type for one in zone.added] == [
         *[AgentType.TRAFFIC_CONE] * 3,
@@ -151,15 +146,16 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
 def test_what_was_imported_before_keeps_its_rules_and_its_export_says_so(folder: Path) -> None:
     run(folder)
     row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
-    new = load_scene(row)
+    new = LoadedScenario(row).scene
     assert row.interplan is not None
     del row.interplan["built"]
     row.save()
-    assert load_scene(row).options.interplan is None
+    loaded = LoadedScenario(row)
+    assert loaded.scene.options.interplan is None
     source = InterplanSource(token=HERE, **row.interplan)
-    reference = load_reference(row)
+    reference = loaded.reference
     assert reference is not None
-    given = Cell(name="r", scene=load_scene(row), type=None, modification=reference, source=source)
+    given = Cell(name="r", scene=loaded.scene, type=None, modification=reference, source=source)
     cell = replace(given, type=ScenarioType(row.type))
     texts = [loss.text for loss in write([cell]).losses]
     assert [text.partition(", ")[0] for text in texts] == [
@@ -177,11 +173,11 @@ def test_what_was_imported_before_keeps_its_rules_and_its_export_says_so(folder:
 def test_other_traffic_takes_other_boxes(folder: Path) -> None:
     run(folder)
     row = Scenario.objects.get(slug=f"interplan-{HERE}-s0")
-    assert "New agents of type VEHICLE are in their order" in scene_text(load_scene(row))
-    assert "follows it at the speed limit" in scene_text(load_scene(row))
+    assert "New agents of type VEHICLE are in their order" in scene_text(LoadedScenario(row).scene)
+    assert "follows it at the speed limit" in scene_text(LoadedScenario(row).scene)
     change_surroundings(row, keep_traffic=False, density="high", goal="")
-    assert load_scene(row).options.interplan == InterplanRules()
-    assert "New agents of type VEHICLE" not in scene_text(load_scene(row))
+    assert LoadedScenario(row).scene.options.interplan == InterplanRules()
+    assert "New agents of type VEHICLE" not in scene_text(LoadedScenario(row).scene)
 
 
 class World(NamedTuple):
@@ -232,8 +228,8 @@ def worlds(realdata: Path) -> dict[str, World]:
     run(root / "interPlan_modifications.yaml", "--nuplan", root)
     return {
         row.slug.removeprefix("interplan-"): World(
-            load_scene(row),
-            load_reference(row) or Modification(),
+            LoadedScenario(row).scene,
+            LoadedScenario(row).reference or Modification(),
             recording_from_document(row.base_scene.recording),
         )
         for row in Scenario.objects.select_related("base_scene")
@@ -311,15 +307,15 @@ def test_the_derived_intents_are_met_by_their_references(tmp_path: Path) -> None
     faults: dict[str, list[str]] = {}
     refused: dict[str, str] = {}
     for row in Scenario.objects.order_by("slug")[::5]:
-        intent, reference = load_intent(row), load_reference(row)
+        intent, reference = LoadedScenario(row).intent, LoadedScenario(row).reference
         assert intent is not None
         assert reference is not None
         assert row.intent_origin == "derived"
-        found = check_against_intent(Ground.of(load_scene(row)), reference, intent)
+        found = check_against_intent(Ground.of(LoadedScenario(row).scene), reference, intent)
         asked = [str(one.kind) for one in found if one.is_fault and one.kind.startswith("asked")]
         faults |= {row.slug: asked} if asked else {}
         try:
-            place(load_scene(row), intent)
+            place(LoadedScenario(row).scene, intent)
         except CannotPlace as fault:
             refused[row.slug] = str(fault)
     assert faults == {}

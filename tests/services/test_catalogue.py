@@ -29,7 +29,7 @@ from augment.services.benchmarks.benchmarks import load_standard
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import NewScenario, add_scenario, load_reference
+from augment.services.scenarios.scenes import LoadedScenario, NewScenario, add_scenario
 from tests.fixtures.shelf import FOLDER, HARD, MOVING, OPEN
 from tests.intents import parked
 from tests.scenes import scene, vehicle
@@ -88,7 +88,7 @@ def test_a_folder_becomes_rows_and_lines_in_the_log(folder: Path) -> None:
     assert (scenario.slug, scenario.type) == ("parked-car", "nudge_around_parked_vehicle")
     assert scenario.in_catalogue
     assert scenario.base_scene.source == "authored"
-    assert load_reference(scenario) == PARKED.reference
+    assert LoadedScenario(scenario).reference == PARKED.reference
     assert set(Event.objects.values_list("actor", "object_kind")) == {
         (ada.pk, "scene"),
         (ada.pk, "scenario"),
@@ -166,7 +166,7 @@ def test_an_open_wish_has_an_example_that_nobody_is_measured_by(folder: Path) ->
     load_catalogue(folder=folder, sets=["open"])
     scenario = Scenario.objects.get()
     assert (scenario.is_open, scenario.get_type_display()) == (True, "Leave one narrow way past")
-    assert load_reference(scenario) is not None
+    assert LoadedScenario(scenario).reference is not None
     assert load_standard(scenario) is None
 
 
@@ -206,7 +206,7 @@ def test_what_is_in_use_stays_and_its_file_becomes_a_new_version(
         assert load_catalogue(folder=folder).scenarios == {CatalogueStep.UNCHANGED: 2}
         newest = Scenario.objects.get(slug=f"parked-car{version}")
         assert (newest.origin, newest.catalogue_set) == (first.origin, "paper")
-        reference = load_reference(newest)
+        reference = LoadedScenario(newest).reference
         assert reference is not None
         assert reference.added[0].x_m == at_m
         assert Scenario.objects.get(slug=f"then{version}").follows == newest

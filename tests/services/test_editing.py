@@ -31,7 +31,7 @@ from augment.services.scenarios.pictures import (
     reference_picture,
     scene_picture,
 )
-from augment.services.scenarios.scenes import ScenarioContent, load_reference
+from augment.services.scenarios.scenes import LoadedScenario, ScenarioContent
 from tests.jobs.rows import add_scenario, launch
 from tests.render.pictures import at_camera_size
 from tests.scenes import EGO, curve, pedestrian, scene, vehicle
@@ -163,7 +163,7 @@ def test_a_drawn_reference_is_kept_drawn_and_told() -> None:
     here = add_scenario("street", reference=None)
     set_reference(here, document(CAR), actor=ada)
     here.refresh_from_db()
-    kept = load_reference(here)
+    kept = LoadedScenario(here).reference
     assert kept is not None
     assert kept.added == (replace(CAR, lane_id="Lane1"),)
     event = Event.objects.get()

@@ -16,7 +16,7 @@ from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import NewScenario, add_scenario, load_reference
+from augment.services.scenarios.scenes import LoadedScenario, NewScenario, add_scenario
 from tests.formats.av2_logs import write_log
 from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
@@ -82,8 +82,8 @@ def test_a_reference_comes_back_as_it_went_in() -> None:
     change = Modification(added=(cone("Agent2", 9.0, 0.5),))
     row = scenario(reference=modification_to_document(change))
     row.refresh_from_db()
-    assert load_reference(row) == change
-    assert load_reference(scenario()) is None
+    assert LoadedScenario(row).reference == change
+    assert LoadedScenario(scenario()).reference is None
 
 
 @pytest.mark.usefixtures("street")

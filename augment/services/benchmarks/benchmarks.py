@@ -96,7 +96,10 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
                 f"“{row.slug}” says how to change an answer to “{row.follows.slug}”: alone it is "
                 "no task of a benchmark."
             )
-    sizes = {row.slug: measure_task(scenes.load_intent(row), load_standard(row)) for row in rows}
+    sizes = {
+        row.slug: measure_task(scenes.LoadedScenario(row).intent, load_standard(row))
+        for row in rows
+    }
     strata = choose_strata(sizes)
     past = BenchmarkItem.objects.order_by("split")  # the test last
     earlier = {key: Split(split) for key, split in past.values_list("scenario__origin", "split")}
@@ -115,7 +118,7 @@ def plan_benchmark(request: BenchmarkRequest) -> list[BenchmarkItem]:
 
 def load_standard(row: Scenario) -> Modification | None:
     """Return the reference that answers are measured by, None where the wish is open."""
-    return None if row.is_open else scenes.load_reference(row)
+    return None if row.is_open else scenes.LoadedScenario(row).reference
 
 
 def public_origins() -> QuerySet[Scenario, Any]:
@@ -283,7 +286,7 @@ def _make_task(item: BenchmarkItem) -> BenchmarkTask:
         language=row.language,
         split=Split(item.split),
         stratum=Stratum(item.stratum),
-        scene=scenes.load_scene(row),
+        scene=scenes.LoadedScenario(row).scene,
         recording=None if recording is None else recording_from_document(recording),
         keeps_traffic=row.keep_traffic,
         paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,

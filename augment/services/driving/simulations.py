@@ -17,7 +17,7 @@ from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.driving.thresholds import conclude, conclude_all
-from augment.services.scenarios.scenes import find_type, load_recording, load_reference, load_scene
+from augment.services.scenarios.scenes import LoadedScenario, find_type
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
@@ -230,15 +230,15 @@ def _plan(
 
 def _load_setting(row: Simulation) -> DriveSetting:
     """Return the scene that a row drives; unchanged without a modification."""
-    scenario, modification, scene = row.scenario, None, load_scene(row.scenario)
+    loaded, modification = LoadedScenario(row.scenario), None
     changed = row.augmentation or row.swept
     if row.subject == Subject.REFERENCE:
-        modification = load_reference(scenario)
+        modification = loaded.reference
     elif changed is not None and changed.modification is not None:
         modification = modification_from_document(changed.modification)
     return DriveSetting(
-        scene=scene,
-        modification=fit_boxes(scene, modification or Modification()),
-        recording=load_recording(scenario),
+        scene=loaded.scene,
+        modification=fit_boxes(loaded.scene, modification or Modification()),
+        recording=loaded.recording,
         reactive=row.is_reactive,
     )

@@ -21,14 +21,7 @@ from augment.services.driving.thresholds import tell_difference
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
 from augment.services.scenarios.editing import read_edit
-from augment.services.scenarios.scenes import (
-    add_variant,
-    find_type,
-    load_intent,
-    load_recording,
-    load_scene,
-    scenario_seed,
-)
+from augment.services.scenarios.scenes import LoadedScenario, add_variant, find_type, scenario_seed
 from augment.simulation.planners import IDM, OFFSETS_M, PDM_CLOSED
 
 LARGEST_FAMILY = 100
@@ -128,8 +121,8 @@ def map_changes(
         InvalidDocument: The bounds make no values.
         Conflict: No value fits.
     """
-    numbers, scene, number = swept_numbers(scenario), load_scene(scenario), request.number
-    check_names("number", [number], numbers)
+    scene, number = LoadedScenario(scenario).scene, request.number
+    check_names("number", [number], swept_numbers(scenario))
     document, changes = _document(scenario, number), dict[float, Modification | AugmentError]()
     for value in request.values:
         try:
@@ -144,15 +137,16 @@ def map_changes(
 
 def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
     """Return the values that fit as scenarios in the own JSON, files by name; as `map_changes`."""
+    loaded = LoadedScenario(scenario)
     cells = [
         Cell(
             name=f"{scenario.slug} with {request.number} = {value:g}",
             stem=f"{scenario.slug}--{value:.10g}",
-            scene=load_scene(scenario),
+            scene=loaded.scene,
             type=find_type(scenario.type),
             modification=change,
             keeps_traffic=scenario.keep_traffic,
-            recording=load_recording(scenario),
+            recording=loaded.recording,
         )
         for value, change in map_changes(scenario, request).items()
         if isinstance(change, Modification)
@@ -192,10 +186,11 @@ def add_family(
         raise Conflict(f"A family has 1 to {LARGEST_FAMILY} members, not {count}.")
     if seed < 0:
         raise Conflict(f"A seed is 0 or more, not {seed}.")
-    intent = load_intent(scenario)
+    loaded = LoadedScenario(scenario)
+    intent = loaded.intent
     if intent is None:
         raise Conflict(f"“{scenario.slug}” has no intent whose ranges could be drawn from.")
-    members = sample_family(load_scene(scenario), intent, count=count, seed=seed)
+    members = sample_family(loaded.scene, intent, count=count, seed=seed)
     with transaction.atomic():
         rows = [
             add_variant(

@@ -18,7 +18,7 @@ from augment.scene.entities import Modification
 from augment.scene.intent import Intent
 from augment.scene.intent_statements import list_statements
 from augment.scene.numbers import list_numbers, set_number
-from augment.services.scenarios.scenes import add_variant, load_scene, scenario_seed
+from augment.services.scenarios.scenes import LoadedScenario, add_variant, scenario_seed
 from augment.simulation.score import ScoreKind
 from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
 
@@ -187,7 +187,8 @@ def _intent_with(sweep: Sweep, value: float, reference: Modification) -> Intent 
     # Somebody may have given the scenario another intent since.
     try:
         intent = codec.intent_from_document(changed)
-        made = place(load_scene(scenario), intent, seed=scenario_seed(scenario.slug)).modification
+        scene = LoadedScenario(scenario).scene
+        made = place(scene, intent, seed=scenario_seed(scenario.slug)).modification
     except AugmentError:
         return None
     stored = codec.modification_to_document(made)

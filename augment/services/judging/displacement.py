@@ -1,17 +1,15 @@
 """Distance of stored augmentations to their wishes, and displacement from their references."""
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from functools import cached_property
 from itertools import combinations
 from typing import Any
 
 from django.db.models import QuerySet
 
-from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import ALIKE as ALIKE
 from augment.metrics.displacement import CLASS_OF, are_alike, displacement, displacement_from_wish
@@ -21,12 +19,12 @@ from augment.metrics.displacement import Summary as Summary
 from augment.metrics.displacement import summarise as summarise
 from augment.metrics.kept import KeptObject, find_kept_objects, summarise_kept
 from augment.metrics.kept import KeptSummary as KeptSummary
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
 from augment.services.judging.measures import Measure, rows_by_scenario
-from augment.services.scenarios.scenes import load_ground, load_intent
+from augment.services.scenarios.scenes import LoadedScenario
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State
@@ -264,18 +262,15 @@ def _join_measures(
 
 
 def _compute(ids: Collection[int]) -> dict[int, Distance]:
-    standards: dict[int, _Standard] = {}
+    loaded: dict[int, LoadedScenario] = {}
+    return {
+        row.pk: _measure_row(row, loaded.setdefault(row.scenario_id, LoadedScenario(row.scenario)))
+        for row in _rows().filter(pk__in=ids)
+    }
 
-    def standard_of(row: Augmentation) -> _Standard:
-        return standards.setdefault(row.scenario_id, _Standard(row.scenario))
 
-    return {row.pk: _measure_row(row, standard_of) for row in _rows().filter(pk__in=ids)}
-
-
-def _measure_row(
-    row: Augmentation, standard_of: Callable[[Augmentation], "_Standard"]
-) -> Distance:
-    reference, answer, before = standard_of(row).reference, _read_answer(row), row.follows
+def _measure_row(row: Augmentation, loaded: LoadedScenario) -> Distance:
+    reference, answer, before = _read(row.scenario.reference), _read_answer(row), row.follows
     if row.scenario.is_open:
         return Distance(why_not=MissingReason.OPEN_WISH)
     if reference is None:
@@ -284,11 +279,11 @@ def _measure_row(
         return Distance(why_not=MissingReason.UNREADABLE_ROW)
     moves = answer is not None and (answer.has_motion or reference.has_motion)
     try:
-        distance = displacement(answer, reference, standard_of(row).ground if moves else None)
+        distance = displacement(answer, reference, loaded.ground if moves else None)
     except (InvalidDocument, InvalidModification):
         return Distance(why_not=MissingReason.UNFIT_MOTION)
     own = _read_shown(before) if before is not None else None
-    earlier = None if before is None else standard_of(before).reference
+    earlier = None if before is None else _read(before.scenario.reference)
     kept_objects: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
         shown = _read_shown(row)
@@ -304,7 +299,8 @@ def _compute_wishes(ids: Collection[int]) -> dict[int, Displacement]:
     wished = Augmentation.objects.filter(pk__in=ids, scenario__intent__isnull=False)
     for scenario, rows in rows_by_scenario(wished):
         with suppress(InvalidDocument):
-            ground, intent = load_ground(scenario), load_intent(scenario)
+            loaded = LoadedScenario(scenario)
+            ground, intent = loaded.ground, loaded.intent
             for row in rows:
                 answer = _read_answer(row)
                 if intent is None or (answer is None and row.state == State.DONE):
@@ -318,21 +314,6 @@ def _compute_wishes(ids: Collection[int]) -> dict[int, Displacement]:
 DISTANCES = Measure("displacement", Distance, _compute)
 WISHES = Measure("wish distance", Displacement, _compute_wishes)
 _FIELDS = fields(Distance)
-
-
-class _Standard:
-    """Reference values of one scenario's answers, read when first needed."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
-
-    @cached_property
-    def reference(self) -> Modification | None:
-        return _read(self._scenario.reference)
-
-    @cached_property
-    def ground(self) -> Ground:
-        return load_ground(self._scenario)
 
 
 def _read_answer(row: Augmentation) -> Modification | None:

@@ -28,7 +28,7 @@ from augment.scene.codec import (
 from augment.scene.intent import Intent
 from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios import editing
-from augment.services.scenarios.scenes import load_ground, load_intent
+from augment.services.scenarios.scenes import LoadedScenario
 from augment.simulation.planners import NAMED
 
 _WAY_STEPS = 10
@@ -72,7 +72,8 @@ def _compute(ids: Collection[int]) -> dict[int, tuple[Finding, ...]]:
     changed = Augmentation.objects.filter(pk__in=ids).exclude(modification=None)
     for scenario, rows in rows_by_scenario(changed):
         try:
-            ground, intent = load_ground(scenario), load_intent(scenario)
+            loaded = LoadedScenario(scenario)
+            ground, intent = loaded.ground, loaded.intent
         except InvalidDocument:
             continue
         for row in rows:
@@ -96,7 +97,8 @@ def check_augmentation(row: Augmentation) -> CheckedRow | None:
     if row.modification is None:
         return None
     try:
-        findings = _check(row, load_ground(row.scenario), load_intent(row.scenario))
+        loaded = LoadedScenario(row.scenario)
+        findings = _check(row, loaded.ground, loaded.intent)
         findings = _worst_first((*findings, *_check_drives([row.pk]).get(row.pk, ())))
     except (InvalidDocument, InvalidModification) as error:
         return CheckedRow(problem=str(error))
@@ -120,7 +122,7 @@ def check_edit(
             modification = editing.snap(scenario, modification, snapped)
         if preset is not None:
             modification = editing.give_preset(scenario, modification, preset)
-        ground, intent = editing.editable_ground(scenario), load_intent(scenario)
+        ground, intent = editing.editable_ground(scenario), LoadedScenario(scenario).intent
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification, CannotPlace, UnknownName) as error:
         return CheckedRow(problem=str(error))

@@ -20,7 +20,7 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, S
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification
 from augment.services.judging.measures import Measure, rows_by_scenario
-from augment.services.scenarios.scenes import load_reference, load_scene, scenario_seed
+from augment.services.scenarios.scenes import LoadedScenario, scenario_seed
 
 MOST_SCENES = 40
 """So many scenes are learned from; of more, those whose digests come first: a fixed sample."""
@@ -159,7 +159,7 @@ class _ScenarioRealism:
 
     def __init__(self, scenario: Scenario, learned: _LearnedScenes) -> None:
         self._scenario = scenario
-        self._ground = Ground.of(load_scene(scenario))
+        self._ground = Ground.of(LoadedScenario(scenario).scene)
         self._recorded = learned.without(scenario.base_scene)
 
     def of(self, change: Modification | None) -> metric.Realism | None:
@@ -214,7 +214,7 @@ def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
     learned = _LearnedScenes()
     surroundings: dict[int, Surroundings] = {}
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged, reference = _ScenarioRealism(scenario, learned), load_reference(scenario)
+        judged, reference = _ScenarioRealism(scenario, learned), LoadedScenario(scenario).reference
         for row in rows:
             pattern = reference or _read_change(row) or Modification()
             surroundings[row.pk] = {

@@ -12,7 +12,7 @@ from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.codec import modification_from_document
-from augment.services.scenarios.scenes import find_type, load_recording, load_scene
+from augment.services.scenarios.scenes import LoadedScenario, find_type
 
 FORMATS = tuple(WRITERS)
 
@@ -159,18 +159,19 @@ def export_rows(
 
 def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
     scenario, scene = row.scenario, row.scenario.base_scene
+    loaded = LoadedScenario(scenario)
     source = None
     if scene.source == NuPlan.name and scene.source_item:
         source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
     return Cell(
         name=name,
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
-        scene=load_scene(scenario),
+        scene=loaded.scene,
         type=find_type(scenario.type),
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
-        recording=load_recording(scenario),
+        recording=loaded.recording,
         augmentation=str(row.code),
         contestant=row.contestant.slug,
         source=source,

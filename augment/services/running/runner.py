@@ -24,7 +24,6 @@ from augment.models import Attempt, Augmentation, Contestant, Endpoint, Generati
 from augment.prompts.fill import Messages, follow_up_messages
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.density import fit_boxes
-from augment.scene.entities import Scene
 from augment.services.benchmarks.submissions import find_entry
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
@@ -33,12 +32,7 @@ from augment.services.running import budget, jobs, workers
 from augment.services.running.calls import RowTranscript, insist_wanted
 from augment.services.running.follow_ups import read_conversation_until
 from augment.services.scenarios.pictures import draw_picture, load_camera, original_picture, redraw
-from augment.services.scenarios.scenes import (
-    load_intent,
-    load_reference,
-    load_scene,
-    scenario_seed,
-)
+from augment.services.scenarios.scenes import LoadedScenario, scenario_seed
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline
@@ -105,7 +99,7 @@ class Augmentations(WorkKind[Augmentation]):
             raise errors.Conflict(f"The modification does not fit the scene: {error}") from error
 
     def _make(self, row: Augmentation, held: Held) -> Settlement:
-        scene = load_scene(row.scenario)
+        loaded = LoadedScenario(row.scenario)
         if row.modification is not None:  # of an earlier attempt that could not draw it
             outcome = Outcome(
                 status=OutcomeStatus.DONE,
@@ -113,18 +107,18 @@ class Augmentations(WorkKind[Augmentation]):
                 notes=row.notes,
             )
         else:
-            outcome = _ask(row, scene, held, self._connect)
+            outcome = _ask(row, loaded, held, self._connect)
         settle = partial(Settlement, state=outcome.status.value, reason=outcome.reason)
         if outcome.modification is None:
             return settle(columns={"image": original_picture(row.scenario)})
-        modification = fit_boxes(scene, outcome.modification)
+        modification = fit_boxes(loaded.scene, outcome.modification)
         document = make_document_storable(modification_to_document(modification))
         columns: dict[str, Any] = {"modification": document}
         if outcome.notes:
             columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
         try:
             camera = load_camera(row.scenario, {row.pk: document})
-            image = draw_picture(row.scenario, modification, camera)
+            image = draw_picture(loaded, modification, camera)
         except Exception:
             is_done = outcome.status is OutcomeStatus.DONE
             held.note(**(columns if is_done else {}))  # a second try only has to draw
@@ -204,13 +198,14 @@ def open_wire(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
+def _ask(
+    row: Augmentation, loaded: LoadedScenario, held: Held, connect: Connect | None
+) -> Outcome:
     contestant = row.contestant
     if contestant.kind == Kind.REFERENCE:
-        reference = load_reference(row.scenario)
-        if reference is None:
+        if loaded.reference is None:
             raise errors.Conflict("The scenario has no reference modification.")
-        return Outcome(status=OutcomeStatus.DONE, modification=reference)
+        return Outcome(status=OutcomeStatus.DONE, modification=loaded.reference)
     if contestant.kind == Kind.SUBMISSION:
         entry = find_entry(contestant, row.scenario.slug, row.sample)
         status, notes = SUBMITTED[entry.status], "\n".join(entry.notes)
@@ -223,7 +218,7 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
         if before is not None and before.state in ends and not before.is_answer:
             reason = f"It would go on from an answer that is none: {before.reason}"
             return Outcome(status=OutcomeStatus(before.state), reason=reason)
-        outcome = _ask_model(row, scene, held, connect)
+        outcome = _ask_model(row, loaded, held, connect)
         if before is None or outcome.status is not OutcomeStatus.REFUSED:
             return outcome
         # A refused wish changes nothing: the answer before stays.
@@ -235,13 +230,15 @@ def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -
     # Each sample has a seed of its own; the first keeps that of jobs without samples.
     seed = scenario_seed(slug if row.sample == 1 else f"{slug}#{row.sample}")
     try:
-        placed = PLACERS[placer].place(scene, load_intent(row.scenario), seed=seed)
+        placed = PLACERS[placer].place(loaded.scene, loaded.intent, seed=seed)
     except errors.CannotPlace as refusal:
         return Outcome(status=OutcomeStatus.REFUSED, reason=refusal.reason)
     return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
 
 
-def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
+def _ask_model(
+    row: Augmentation, loaded: LoadedScenario, held: Held, connect: Connect | None
+) -> Outcome:
     begun: Messages = ()
     if row.scenario.follows_id is not None:
         begun = follow_up_messages(read_conversation_until(row.follows), row.scenario.instruction)
@@ -269,9 +266,9 @@ def _ask_model(row: Augmentation, scene: Scene, held: Held, connect: Connect | N
         return pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
             pipeline.EditTask(
-                scene=scene,
+                scene=loaded.scene,
                 instruction=row.scenario.wording,
-                intent=load_intent(row.scenario),
+                intent=loaded.intent,
                 begun=begun,
             ),
             modifier=modifier,

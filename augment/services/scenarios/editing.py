@@ -142,7 +142,7 @@ def reference_document(scenario: Scenario, document: object) -> dict[str, Any] |
     """
     if document is None:
         return None
-    modification, intent = read_edit(scenario, document), scenes.load_intent(scenario)
+    modification, intent = read_edit(scenario, document), scenes.LoadedScenario(scenario).intent
     if modification.is_empty and not (intent and intent.unmet):
         return None
     return codec.modification_to_document(modification)
@@ -221,7 +221,7 @@ class _ScenarioByKey:
 
 @lru_cache(maxsize=8)
 def _read_ground(keyed: _ScenarioByKey) -> Ground:
-    return scenes.load_ground(keyed.scenario)
+    return scenes.LoadedScenario(keyed.scenario).ground
 
 
 def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-from augment.checks import Ground
 from augment.metrics.displacement import find_shifts
 from augment.models import Augmentation
 from augment.render.camera import Camera
@@ -12,7 +11,7 @@ from augment.render.pair_window import covered_boxes, pair_camera
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, Length
 from augment.services.scenarios.pictures import draw_picture, find_modification, picture_view
-from augment.services.scenarios.scenes import load_ground, load_intent, load_reference
+from augment.services.scenarios.scenes import LoadedScenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,38 +49,36 @@ def draw_pair(
         InvalidDocument: What is stored can't be read.
         InvalidModification: A change does not fit the scene.
     """
-    scenario = first.scenario
-    ground, sides, camera = frame_pair(first, other, has_ticks=has_ticks)
-    view = picture_view(camera)
-    covered = [[round(edge) for edge in box] for box in covered_boxes(ground.scene, camera)]
+    loaded, sides, camera = frame_pair(first, other, has_ticks=has_ticks)
+    view, scene = picture_view(camera), loaded.scene
+    covered = [[round(edge) for edge in box] for box in covered_boxes(scene, camera)]
     rows = zip((first, other), sides, strict=True)
     return PairPictures(
-        names={row.pk: draw_picture(scenario, side, camera) for row, side in rows},
-        original=draw_picture(scenario, Modification(), camera),
+        names={row.pk: draw_picture(loaded, side, camera) for row, side in rows},
+        original=draw_picture(loaded, Modification(), camera),
         view=view | {"covered_px": covered},
-        scene_legend=sorted(scene_keys(ground.scene, view)),
+        scene_legend=sorted(scene_keys(scene, view)),
         pair_legend=sorted(set().union(*(change_keys(side, view) for side in sides))),
     )
 
 
 def frame_pair(
     first: Augmentation, other: Augmentation, *, has_ticks: bool = False
-) -> tuple[Ground, tuple[Modification, Modification], Camera]:
-    """Return the ground of a pair, both changes and their window; as `draw_pair`."""
-    scenario = first.scenario
-    ground, intent = load_ground(scenario), load_intent(scenario)
+) -> tuple[LoadedScenario, tuple[Modification, Modification], Camera]:
+    """Return the scenario of a pair, both changes and their window; as `draw_pair`."""
+    loaded = LoadedScenario(first.scenario)
     sides = find_modification(first), find_modification(other)
-    shown = [change for change in (load_reference(scenario), *sides) if change is not None]
+    shown = [change for change in (loaded.reference, *sides) if change is not None]
     shifts = find_shifts(*sides) or ()
     camera = pair_camera(
-        ground,
+        loaded.ground,
         sides,
-        intent=intent,
+        intent=loaded.intent,
         is_filmed=any(change.has_motion for change in shown),
         differing=tuple((shift.one, shift.other, shift.metres) for shift in shifts),
-        ticks_m=_list_distances(intent) if has_ticks else (),
+        ticks_m=_list_distances(loaded.intent) if has_ticks else (),
     )
-    return ground, sides, camera
+    return loaded, sides, camera
 
 
 def _list_distances(intent: Intent | None) -> tuple[float, ...]:

@@ -5,7 +5,6 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,13 +23,7 @@ from augment.render.legend import change_keys
 from augment.scene import codec
 from augment.scene.entities import Modification, without_traffic
 from augment.services.events import log_change
-from augment.services.scenarios.scenes import (
-    content_hash,
-    load_expected,
-    load_reference,
-    load_scene,
-    scene_key,
-)
+from augment.services.scenarios.scenes import LoadedScenario, content_hash, scene_key
 from augment.services.texts import is_stored_name
 
 FOLDER = "bev"
@@ -60,7 +53,7 @@ def original_picture(scenario: Scenario, camera: Camera | None = None) -> str:
     stored, camera = scenario.original_image, camera or load_camera(scenario)
     if stored and camera_key(stored) == camera.key and default_storage.exists(stored):
         return stored
-    scenario.original_image = name = draw_picture(scenario, Modification(), camera)
+    scenario.original_image = name = draw_picture(LoadedScenario(scenario), Modification(), camera)
     scenario.save(update_fields=["original_image"])
     return name
 
@@ -77,16 +70,15 @@ def load_camera(scenario: Scenario, unsaved: Mapping[int, dict[str, Any]] | None
     """
     answered = scenario.augmentations.exclude(modification=None).order_by("pk")
     stored = dict(answered.values_list("pk", "modification")) | dict(unsaved or {})
-    return _window_around(scenario, [stored[pk] for pk in sorted(stored)])
+    return _window_around(LoadedScenario(scenario), [stored[pk] for pk in sorted(stored)])
 
 
-def _window_around(scenario: Scenario, documents: Iterable[dict[str, Any] | None]) -> Camera:
+def _window_around(loaded: LoadedScenario, documents: Iterable[dict[str, Any] | None]) -> Camera:
     """Return the window around the reference and these modifications."""
     changes = tuple(
         codec.modification_from_document(document) for document in documents if document
     )
-    reference = load_reference(scenario)
-    return camera_for(load_scene(scenario), reference, changes, partial(load_expected, scenario))
+    return camera_for(loaded.scene, loaded.reference, changes, loaded.expect)
 
 
 def picture_view(camera: Camera) -> dict[str, Any]:
@@ -120,13 +112,13 @@ def list_marks(document: Any, view: Mapping[str, Any]) -> list[list[Any]]:
     return sorted(seen, key=lambda mark: mark[1:])
 
 
-def draw_picture(scenario: Scenario, modification: Modification, camera: Camera) -> str:
+def draw_picture(loaded: LoadedScenario, modification: Modification, camera: Camera) -> str:
     """Draw a scenario's scene after a change, with its film, and return the picture's name.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    png, film = _draw(scenario, modification, camera)
+    png, film = _draw(loaded, modification, camera)
     # Pictures that look the same may move differently.
     name = f"{FOLDER}/{camera.key}/{hashlib.sha256(png + film).hexdigest()}.png"
     _keep(name, png, film)
@@ -183,18 +175,18 @@ def redraw(scenario: Scenario) -> int:
         InvalidDocument: What is stored can't be read.
         InvalidModification: A modification does not fit the scene.
     """
-    redrawn = 0
+    redrawn, loaded = 0, LoadedScenario(scenario)
     # Another worker may store a change that widens the window while this one draws.
     while True:
         rows = scenario.augmentations.order_by("pk").only(
             "scenario", "image", "earlier_images", "state", "modification"
         )
-        camera = _window_around(scenario, [row.modification for row in rows])
+        camera = _window_around(loaded, [row.modification for row in rows])
         outdated = [row for row in rows if row.image and camera_key(row.image) != camera.key]
         if not outdated:
             original_picture(scenario, camera)
             return redrawn
-        drawn = [(row, draw_picture(scenario, find_modification(row), camera)) for row in outdated]
+        drawn = [(row, draw_picture(loaded, find_modification(row), camera)) for row in outdated]
         with transaction.atomic():
             Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
             original_picture(scenario, camera)
@@ -213,19 +205,21 @@ def draw_with_ids(row: Augmentation) -> bytes:
         InvalidDocument: What is stored can't be read.
         InvalidModification: The modification does not fit the scene.
     """
-    scenario = row.scenario
-    return draw_for_review(load_scene(scenario), find_modification(row), load_camera(scenario))[0]
+    scene, camera = LoadedScenario(row.scenario).scene, load_camera(row.scenario)
+    return draw_for_review(scene, find_modification(row), camera)[0]
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _draw(scenario: Scenario, modification: Modification, camera: Camera) -> tuple[bytes, bytes]:
+def _draw(
+    loaded: LoadedScenario, modification: Modification, camera: Camera
+) -> tuple[bytes, bytes]:
     """A picture and its film, which names the picture that it plays over; no bytes for none."""
-    scene = load_scene(scenario)
+    scene = loaded.scene
     if not camera.is_filmed:
         return draw(scene, modification, camera), b""
-    recording = load_expected(scenario, scene, modification)
+    recording = loaded.expect(scene, modification)
     film = make_film(scene, modification, camera, recording)
     ground = store(draw_empty(scene, camera), folder=f"{FOLDER}/{camera.key}")
     document = {"ground": ground} | json.loads(film)
@@ -270,8 +264,7 @@ def reference_picture(scenario: Scenario) -> str:
         return ""
     shown = [LOOK, scene_key(scenario), scenario.reference]
     digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-    reference = load_reference(scenario)
-    moves = reference is not None and reference.has_motion
+    moves = codec.modification_from_document(scenario.reference).has_motion
     folder = f"references/{LOOK}-film" if moves else "references"
     return f"{folder}/{digest}.png"
 
@@ -309,11 +302,11 @@ def draw_scenario(scenario_pk: int) -> None:
     row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
     draw_scene(row.base_scene_id)
     redraw(row)
-    name, reference = reference_picture(row), load_reference(row)
-    if reference is None or is_drawn(name):
+    loaded, name = LoadedScenario(row), reference_picture(row)
+    if loaded.reference is None or is_drawn(name):
         return
-    camera = camera_for(load_scene(row), reference, expect=partial(load_expected, row))
-    _keep(name, *_draw(row, reference, camera))
+    camera = camera_for(loaded.scene, loaded.reference, expect=loaded.expect)
+    _keep(name, *_draw(loaded, loaded.reference, camera))
 
 
 def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[str]]:
@@ -359,14 +352,14 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
     """
     drawn = []
     for row in Scenario.objects.filter(slug__in=scenarios).select_related("base_scene"):
-        reference = load_reference(row)
-        change = None if reference is None else break_reference(reference)
+        loaded = LoadedScenario(row)
+        change = loaded.reference and break_reference(loaded.reference)
         if change is None:
             continue
         document = codec.modification_to_document(change)
         checks = row.augmentations.filter(contestant__kind=Contestant.Kind.CHECK, state=State.DONE)
         if not checks.filter(modification=document).exists():
-            image = draw_picture(row, change, load_camera(row))
+            image = draw_picture(loaded, change, load_camera(row))
             drawn.append(Augmentation(scenario=row, modification=document, image=image))
     made_checks = _keep_checks(drawn, actor) if drawn else []
     for made in made_checks:

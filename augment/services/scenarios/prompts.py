@@ -7,10 +7,9 @@ from augment.fake_llm.sight import same_text
 from augment.models import Scenario
 from augment.prompts.calls import Tools
 from augment.prompts.fill import prompt_version as prompt_version
-from augment.scene.codec import intent_from_document
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.services.scenarios.scenes import load_reference, load_scene
+from augment.services.scenarios.scenes import LoadedScenario
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Recipe, find_recipe
 from augment.variants.respondents import ModelRole
@@ -51,12 +50,13 @@ def preview_prompt(
         raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")
     if native_tools and (role != ModelRole.MODIFIER or recipe.tools is Tools.NONE):
         raise Conflict(f"The {role} of {recipe.slug} calls no function, natively or otherwise.")
+    loaded = LoadedScenario(scenario)
     return build_prompt(
         recipe,
         ModelRole(role),
-        load_scene(scenario),
+        loaded.scene,
         scenario.instruction,
-        load_reference(scenario) or Modification(),
+        loaded.reference or Modification(),
         native_tools=native_tools,
     )
 
@@ -70,7 +70,7 @@ def find_stored_tasks(instruction: str) -> list[tuple[Scene, Intent]]:
         rows = Scenario.objects.exclude(intent=None).order_by("-pk")
         texts = rows.values_list("pk", "instruction")
         pks = [pk for pk, text in texts if same_text(text) == same_text(instruction)]
-        alike = rows.filter(pk__in=pks).select_related("base_scene")
-        return [(load_scene(row), intent_from_document(row.intent)) for row in alike]
+        alike = map(LoadedScenario, rows.filter(pk__in=pks).select_related("base_scene"))
+        return [(loaded.scene, loaded.intent) for loaded in alike if loaded.intent]
     finally:
         connection.close()

@@ -6,7 +6,7 @@ import random
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -273,7 +273,8 @@ def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str,
     Returns:
         Type and instruction, both filled in.
     """
-    reference, scene = load_reference(scenario), load_scene(scenario)
+    loaded = LoadedScenario(scenario)
+    reference, scene = loaded.reference, loaded.scene
     if reference is None or reference.is_empty:
         if scenario.intent_origin == IntentOrigin.DERIVED:
             scenario.intent, scenario.intent_origin = None, ""
@@ -363,7 +364,7 @@ def _set_surroundings(
             entities.Modification(added=tuple(traffic))
         )
     if change is not None:
-        check_reference(load_scene(scenario), change)
+        check_reference(LoadedScenario(scenario).scene, change)
         scenario.reference = codec.modification_to_document(change)
 
 
@@ -379,44 +380,68 @@ def scenario_named(slug: str) -> Scenario:
     return row
 
 
-def load_scene(scenario: Scenario) -> entities.Scene:
-    """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
-    scene = codec.scene_from_document(scenario.base_scene.document)
-    scene = follow_rules(scene, scenario.interplan)
-    if not scenario.keep_traffic:
-        scene = entities.without_traffic(scene)
-    if scenario.spawned is not None:
-        scene = entities.apply(scene, codec.modification_from_document(scenario.spawned))
-    options = scene.options
-    if not scenario.keep_traffic:
-        options = replace(options, density=entities.TrafficDensity(scenario.traffic_density))
-    if scenario.goal:
-        place_m = goal_place(scenario.interplan, scenario.goal, scene)
-        options = replace(options, goal=entities.TurnType(scenario.goal), goal_m=place_m)
-    return replace(scene, options=options)
+class LoadedScenario:
+    """Documents of a stored scenario as values, each read once, when it is first asked for.
 
+    Args:
+        row: With its scene; it must not change meanwhile.
 
-def load_recording(scenario: Scenario) -> Recording | None:
-    """Return the recording after t0, None for none; the ego's alone if traffic is cleared."""
-    document = scenario.base_scene.recording
-    recording = None if document is None else codec.recording_from_document(document)
-    return recording.ego_alone if recording and not scenario.keep_traffic else recording
+    Raises:
+        InvalidDocument: By each of the values, where what is stored can't be read.
+    """
 
+    def __init__(self, row: Scenario) -> None:
+        self.row = row
 
-def load_expected(
-    scenario: Scenario, scene: entities.Scene, modification: entities.Modification
-) -> Recording | None:
-    """Return `expect_recording` of a scenario's scene."""
-    return expect_recording(scene, modification, load_recording(scenario))
+    @cached_property
+    def scene(self) -> entities.Scene:
+        """Scene that contestants are asked to change, with the scenario's own traffic and goal."""
+        row, scene = self.row, codec.scene_from_document(self.row.base_scene.document)
+        scene = follow_rules(scene, row.interplan)
+        if not row.keep_traffic:
+            scene = entities.without_traffic(scene)
+        if row.spawned is not None:
+            scene = entities.apply(scene, codec.modification_from_document(row.spawned))
+        options = scene.options
+        if not row.keep_traffic:
+            options = replace(options, density=entities.TrafficDensity(row.traffic_density))
+        if row.goal:
+            place_m = goal_place(row.interplan, row.goal, scene)
+            options = replace(options, goal=entities.TurnType(row.goal), goal_m=place_m)
+        return replace(scene, options=options)
 
+    @cached_property
+    def recording(self) -> Recording | None:
+        """Recording after t0, None for none; the ego's alone if traffic is cleared."""
+        document = self.row.base_scene.recording
+        recording = None if document is None else codec.recording_from_document(document)
+        return recording.ego_alone if recording and not self.row.keep_traffic else recording
 
-def load_ground(scenario: Scenario) -> Ground:
-    """Return the ground of a scenario, whose recording is read where something moves."""
-    return Ground.of(load_scene(scenario), partial(load_expected, scenario))
+    @cached_property
+    def ground(self) -> Ground:
+        """Ground of the scene, whose recording is read where something moves."""
+        return Ground.of(self.scene, self.expect)
+
+    @cached_property
+    def reference(self) -> entities.Modification | None:
+        """Human modification, None for a scenario without one."""
+        document = self.row.reference
+        return None if document is None else codec.modification_from_document(document)
+
+    @cached_property
+    def intent(self) -> Intent | None:
+        """Intent of the instruction, None if nobody has written it down."""
+        return None if self.row.intent is None else codec.intent_from_document(self.row.intent)
+
+    def expect(
+        self, scene: entities.Scene, modification: entities.Modification
+    ) -> Recording | None:
+        """Return `expect_recording` of the scenario's scene."""
+        return expect_recording(scene, modification, self.recording)
 
 
 def scene_key(scenario: Scenario) -> str:
-    """A digest of all that `load_scene` reads; two scenarios of one key have the same scene."""
+    """A digest of all that a scene is read from; two scenarios of one key have the same scene."""
     scene = scenario.base_scene
     parts = [
         scene.content_hash or content_hash(scene.document),
@@ -427,17 +452,6 @@ def scene_key(scenario: Scenario) -> str:
         scenario.interplan if scenario.goal else None,
     ]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def load_reference(scenario: Scenario) -> entities.Modification | None:
-    """The human modification, None for a scenario without one."""
-    document = scenario.reference
-    return None if document is None else codec.modification_from_document(document)
-
-
-def load_intent(scenario: Scenario) -> Intent | None:
-    """Return the intent of the instruction, None if nobody has written it down."""
-    return None if scenario.intent is None else codec.intent_from_document(scenario.intent)
 
 
 def content_hash(document: dict[str, Any]) -> str:

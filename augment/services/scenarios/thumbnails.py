@@ -9,7 +9,7 @@ from augment.render.canvas import Box, shrink_png
 from augment.scene import codec
 from augment.scene.entities import TrafficAgent
 from augment.services.scenarios.pictures import camera_key, load_camera, store_as
-from augment.services.scenarios.scenes import load_scene
+from augment.services.scenarios.scenes import LoadedScenario
 
 THUMBNAILS = "thumbnails"
 WIDTHS_PX = (400, 800)
@@ -68,6 +68,6 @@ def _find_change(row: Augmentation) -> Box | None:
     if camera.key != camera_key(row.image) or not row.modification:
         return None
     change = codec.modification_from_document(row.modification)
-    before = load_scene(row.scenario).agents if change.removed else ()
+    before = LoadedScenario(row.scenario).scene.agents if change.removed else ()
     agents = [*change.changed, *(agent for agent in before if agent.id in change.removed)]
     return find_box(agents, camera) if agents else None
