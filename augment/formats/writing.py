@@ -5,7 +5,7 @@ Frame of a cell: the ego frame of its scene.
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from functools import cached_property
 
@@ -36,6 +36,8 @@ class Cell:
         stem: The name of its files, without an ending.
         made_on: When the change was made, for formats that ask for a date.
         recording: What was recorded after t0, None where nothing was.
+        expected: Tracks of all who move by interPlan's rules, and the ego's, where drives follow
+            those; None elsewhere.
         augmentation, contestant: The code of its row and the slug of who made it, where known.
         source: Where the scenario comes from in nuPlan and interPlan, None where it does not.
     """
@@ -48,6 +50,7 @@ class Cell:
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
     recording: Recording | None = None
+    expected: Recording | None = None
     augmentation: str = ""
     contestant: str = "nobody"
     source: InterplanSource | None = None
@@ -63,9 +66,13 @@ class Cell:
 
     @cached_property
     def motion(self) -> Motion:
-        """Everybody's motion after t0."""
+        """Everybody's motion after t0; by interPlan's rules some are never there."""
         recording = self.recording and self.recording.without(self.modification.replaced)
-        return find_motion(self.after, recording=recording, with_later=self.keeps_traffic)
+        motion = find_motion(
+            self.after, recording=self.expected or recording, with_later=self.keeps_traffic
+        )
+        there = tuple(other for other in motion.others if other.is_present.any())
+        return replace(motion, others=there)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,7 +203,21 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
             )
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
-    own = [other for other in motion.others if other.agent.walk_to_m or other.agent.motion]
+    if cell.expected is not None:
+        report.lose_of(
+            [other.agent.id for other in motion.others if other.source is MotionSource.RECORDED],
+            "goes as interPlan's rules move it beside this ego, for whom nobody brakes",
+        )
+        there = {other.agent.id for other in motion.others}
+        text = "is left out: by interPlan's rules it is never there"
+        absent = [agent.id for agent in cell.after.agents if agent.id not in there]
+        report.lose_of(absent, text, changes_scene=True)
+    own = [
+        other
+        for other in motion.others
+        if other.source is not MotionSource.RECORDED
+        and (other.agent.walk_to_m or other.agent.motion)
+    ]
     waiting = [
         participant.agent.id
         for participant in own

@@ -10,10 +10,12 @@ from augment.scene.entities import (
     AgentType,
     Area,
     AreaKind,
+    InterplanRules,
     Modification,
     Origin,
     ScenarioType,
     Scene,
+    SceneOptions,
     TrafficSide,
 )
 from augment.scene.planned_motion import (
@@ -25,6 +27,7 @@ from augment.scene.planned_motion import (
     PointPath,
 )
 from augment.scene.recording import Recording, Track
+from augment.simulation.expected import expect_recording
 from tests.scene.test_planned_motion import two_lanes
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
@@ -86,6 +89,20 @@ def moving() -> Cell:
         for agent, (speed_mps, path, speeds, start) in motions.items()
     )
     return cell(two_lanes(), added=added, stem="moving", name="moving")
+
+
+def ruled() -> Cell:
+    """By interPlan's rules: a car that speeds up, one inside the ego, a walk at t0, a late one."""
+    before = replace(scene(), options=SceneOptions(interplan=InterplanRules()))
+    added = (
+        replace(vehicle("Agent2", 30.0, 0.3), speed_mps=5.0, lane_id="Lane1"),
+        replace(vehicle("Agent3", 2.0, 0.0), speed_mps=5.0, lane_id="Lane1"),
+        pedestrian("Agent4", 40.0, -4.0, (40.0, 8.0)),
+        pedestrian("Agent5", 80.0, -4.0, (80.0, 8.0)),
+    )
+    change = Modification(added=added)
+    expected = expect_recording(before, change)
+    return cell(before, modification=change, expected=expected, stem="ruled")
 
 
 def crossing() -> Scene:

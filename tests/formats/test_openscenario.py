@@ -16,7 +16,7 @@ from augment.formats.reading import Reading
 from augment.formats.writing import Cell
 from augment.scene.entities import AgentType, Modification, TrafficLight
 from augment.scene.motion import Motion, find_motion
-from tests.formats.cells import cell, recorded_street
+from tests.formats.cells import cell, recorded_street, ruled
 from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 from tests.formats.openscenario_files import (
     BOX,
@@ -437,7 +437,7 @@ def recorded_cell() -> Cell:
     return cell(before, recording=recording, keeps_traffic=True, added=())
 
 
-@pytest.mark.parametrize("make", [cell, scene_of_motions, recorded_cell])
+@pytest.mark.parametrize("make", [cell, scene_of_motions, recorded_cell, ruled])
 def test_our_own_files_come_back_whole(make: object, tmp_path: Path) -> None:
     given: Cell = make()  # type: ignore[operator]
     reading = write_and_read(given, tmp_path)

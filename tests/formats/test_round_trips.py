@@ -32,7 +32,7 @@ from augment.scene.entities import (
 from augment.scene.lane_graph import AnyLane
 from augment.scene.planned_motion import PlannedMotion
 from tests.fixtures.shelf import entry, whole_scene
-from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
+from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street, ruled
 from tests.formats.round_trips import Change, changes
 from tests.scenes import vehicle
 
@@ -256,6 +256,25 @@ def test_what_of_a_motion_is_lost_is_named() -> None:
         assert lines <= {loss.text for loss in losses}, name
         changed = {one.text for one in losses if one.changes_scene}
         assert all(("motion" in line or "left out" in line) == (line in changed) for line in lines)
+
+
+@pytest.mark.parametrize("name", list(WRITERS))
+def test_whom_interplans_rules_move_goes_out_so_and_who_is_never_there_is_named(
+    name: str, tmp_path: Path
+) -> None:
+    given = ruled()
+    reading, lines = there_and_back(name, given, tmp_path)
+    assert reading.recording is not None
+    assert given.expected is not None
+    x_m = given.expected.tracks[0].states[50, 0]
+    assert x_m > 30.0 + 5.0 * 5.0 + 5.0, "it speeds up to the limit"
+    cars = [one for one in reading.recording.tracks if one.type is AgentType.VEHICLE]
+    assert [car.states[50, 0] for car in cars] == pytest.approx([x_m], abs=0.01)
+    assert {
+        "Agent3: is left out: by interPlan's rules it is never there",
+        "Agent2, Agent4, Agent5: goes as interPlan's rules move it beside this ego, for whom "
+        "nobody brakes",
+    } <= set(lines)
 
 
 def test_a_recorded_agent_that_is_given_a_motion_is_lost_in_interplan_by_name() -> None:

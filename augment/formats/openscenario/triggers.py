@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import find_motion
+from augment.scene.motion import MotionSource, Movement, find_motion
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion
 from augment.scene.planned_mover import carry_out, walk_as_motion
 
@@ -42,8 +42,11 @@ class WrittenDistance:
     early_s: float
 
 
-def with_motion(agent: TrafficAgent) -> TrafficAgent | None:
+def with_motion(movement: Movement) -> TrafficAgent | None:
     """Return the agent with its motion, None without; a walk starts once the ego is near."""
+    agent = movement.agent
+    if movement.source is MotionSource.RECORDED:
+        return None
     goes_nowhere = agent.walk_to_m and math.dist((agent.x_m, agent.y_m), agent.walk_to_m) < 1e-6
     moving = walk_as_motion(agent)
     return None if goes_nowhere or moving.motion is None else moving

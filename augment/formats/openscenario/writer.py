@@ -135,7 +135,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
     """Yield an agent's events: come, follow a trajectory, go. Nothing if it stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
-    if (mover := triggers.with_motion(agent)) is not None:
+    if (mover := triggers.with_motion(movement)) is not None:
         yield from _own_events(xosc, cell, movement, mover)
         return
     if movement.stands:
@@ -257,7 +257,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
 def _report(cell: Cell, report: LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
     for participant in cell.motion.others:
-        if (agent := triggers.with_motion(participant.agent)) is not None:
+        if (agent := triggers.with_motion(participant)) is not None:
             _report_start(cell, report, participant, agent)
     names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")

@@ -159,7 +159,7 @@ def export_rows(
 
 def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
     scenario, scene = row.scenario, row.scenario.base_scene
-    loaded = LoadedScenario(scenario)
+    loaded, modification = LoadedScenario(scenario), modification_from_document(row.modification)
     source = None
     if scene.source == NuPlan.name and scene.source_item:
         source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
@@ -168,10 +168,11 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
         scene=loaded.scene,
         type=find_type(scenario.type),
-        modification=modification_from_document(row.modification),
+        modification=modification,
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
         recording=loaded.recording,
+        expected=loaded.expect_by_rules(modification),
         augmentation=str(row.code),
         contestant=row.contestant.slug,
         source=source,
