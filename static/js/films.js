@@ -107,15 +107,27 @@ function draw(canvas, film, step) {
     }
   }
   if (step * film.step_s >= 1) return;
-  Object.assign(pen, { strokeStyle: RING, lineWidth: 3 });
-  for (const mover of changes) {
-    const pose = poseOf(mover, step);
-    if (!pose) continue;
-    place(pen, pose, fine);
-    const ring = new Path2D();
-    ring.arc(0, 0, Math.max(LEAST_RING_PX, RING_FACTOR * Math.max(...marks[mover.mark].map(({ reach }) => reach))), 0, 2 * Math.PI);
-    pen.stroke(ring);
-  }
+  for (const mover of changes) drawRing(pen, film, mover, step, fine);
+}
+
+function drawRing(pen, { marks }, mover, step, fine) {
+  const pose = poseOf(mover, step);
+  if (!pose) return;
+  place(pen, pose, fine);
+  const ring = new Path2D();
+  ring.arc(0, 0, Math.max(LEAST_RING_PX, RING_FACTOR * Math.max(...marks[mover.mark].map(({ reach }) => reach))), 0, 2 * Math.PI);
+  Object.assign(pen, { strokeStyle: RING, lineWidth: 3 }).stroke(ring);
+}
+
+// Over the still of whoever wants less motion: rings round what is changed, and dashed ones where
+// the ego is when somebody sets out.
+function hint(film) {
+  const canvas = surface(2 * film.width, 2 * film.height, { className: "reel-hint" });
+  const pen = canvas.getContext("2d");
+  for (const mover of film.changes) drawRing(pen, film, mover, 0, 2);
+  pen.setLineDash([8, 6]);
+  for (const step of film.movers[film.ego] ? (film.ticks ?? []) : []) drawRing(pen, film, film.movers[film.ego], step, 2);
+  return canvas;
 }
 
 export class Player {
@@ -146,6 +158,8 @@ export class Player {
     this.films = films.map((film) => ({ ...film, changes: areNew && film.changed ? film.movers.slice(-film.changed) : [] }));
     this.canvases = films.map(() => surface(0, 0, { className: "reel", hidden: true }));
     this.canvases.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
+    this.hints = isCalm() ? this.films.map(hint) : [];
+    this.hints.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
     this.range.max = this.last = films[0].steps - 1;
     this.bar.hidden = false;
     this.#mark(areNew ? films.map(({ ticks }) => ticks) : [], frames);
@@ -169,7 +183,7 @@ export class Player {
 
   clear() {
     this.pause();
-    for (const canvas of this.canvases ?? []) canvas.remove();
+    for (const canvas of [...(this.canvases ?? []), ...(this.hints ?? [])]) canvas.remove();
     this.films = [];
     this.bar.hidden = true;
   }
@@ -231,6 +245,7 @@ export class Player {
   paint() {
     if (!this.films.length) return;
     const isStill = !this.isPlaying && this.step === 0;
+    for (const canvas of this.hints) canvas.hidden = !isStill;
     this.canvases.forEach((canvas, place) => {
       canvas.hidden = isStill;
       if (!isStill) draw(canvas, this.films[place], this.step);

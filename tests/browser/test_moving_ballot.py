@@ -31,6 +31,12 @@ EGO_X = """() => [...document.querySelectorAll("canvas.reel")].map((canvas) => {
 })"""
 """How far the ego has come on either side, in dots of the canvas."""
 
+RINGED = """() => [...document.querySelectorAll("canvas.reel-hint")].map((canvas) => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return data.filter((_, at) => at % 4 === 0 && data[at] === 181 && data[at + 3] === 255).length;
+})"""
+"""The dots of the rings over either still."""
+
 WINDOW_M = """() => JSON.parse(document.getElementById("given").textContent).pairs.map(
     ({ width, px_per_m: scale }) => width / scale)[0]"""
 
@@ -145,8 +151,17 @@ def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     expect(page.locator(".film-bar")).to_be_visible()
     vote_and_wait(page)
     assert page.locator(FILMS).count() == 0
+    hints = page.locator("canvas.reel-hint:not([hidden])")
+    expect(hints).to_have_count(2)
+    dots = page.evaluate(RINGED)
+    assert min(dots) > 300, "round what is changed"
+    pair = moving.study.matchups.get(position=2)
+    for row, ringed in zip((pair.left, pair.right), dots, strict=True):
+        if row.contestant.slug == "bob":  # whose car stands
+            assert ringed == min(dots) < max(dots), "of the other the ego as well, when it starts"
     page.keyboard.press(".")
     expect(page.locator(FILMS)).to_have_count(2)
+    expect(hints).to_have_count(0)
     assert page.inner_text(".film-bar output") == "0.1 s"
 
 
