@@ -11,7 +11,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from augment.metrics.planners import compare_planners, estimate_score
+from augment.metrics.paired import compare_planners, estimate_score
 from bench.report import table
 
 BETA = (8.0, 1.0)

@@ -25,8 +25,10 @@ from augment.checks.wish_places import Span, find_off, list_stations
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
 from augment.scene import intent as intents
+from augment.scene.codec import intent_from_document, intent_to_document
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent_parts import MotionWish
+from augment.scene.numbers import draw_ranges
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
@@ -123,6 +125,45 @@ def list_open(request: intents.Request) -> list[str]:
         for what, value in needs.items()
         if value is None or value is False
     ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FamilyMember:
+    """One of a family of an intent: the same wish with numbers drawn from its ranges.
+
+    Attributes:
+        intent: With exact numbers in the place of ranges.
+        modification: What the rule placer makes of it; None where nothing fits.
+        refusal: Why nothing fits.
+    """
+
+    intent: intents.Intent
+    modification: Modification | None = None
+    refusal: str = ""
+
+
+def sample_family(
+    scene: Scene, intent: intents.Intent, *, count: int, seed: int = 0
+) -> tuple[FamilyMember, ...]:
+    """Return so many members; the first ones are the same whatever the count.
+
+    Raises:
+        CannotPlace: No number of the intent is a range.
+    """
+    document = intent_to_document(intent)
+    if draw_ranges(document, np.random.default_rng(seed)) == document:
+        raise CannotPlace("No number of the intent is a range (low_m, high_m) to draw from.")
+    members = []
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        exact = intent_from_document(draw_ranges(document, rng))
+        try:
+            made = place(scene, exact, seed=int(rng.integers(2**32))).modification
+        except CannotPlace as refused:
+            members.append(FamilyMember(intent=exact, refusal=str(refused)))
+        else:
+            members.append(FamilyMember(intent=exact, modification=made))
+    return tuple(members)
 
 
 # Private

@@ -8,7 +8,7 @@ from string import ascii_lowercase as LETTERS
 from django.db.models import Q
 
 from augment.errors import Conflict, UnknownName
-from augment.metrics.planners import (
+from augment.metrics.paired import (
     ClusteredMean,
     PlannerDifference,
     Scores,

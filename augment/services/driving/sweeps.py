@@ -7,8 +7,7 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from augment.baselines.family import FamilyMember, sample_family
-from augment.baselines.rule_placer import place
+from augment.baselines.rule_placer import FamilyMember, place, sample_family
 from augment.errors import AugmentError, Conflict, check_names
 from augment.formats import own_json
 from augment.formats.writing import Cell
