@@ -409,39 +409,41 @@ def find_shifts(first: Modification, other: Modification) -> tuple[Shift, ...] |
 
 def _find_shift(one: TrafficAgent, other: TrafficAgent) -> Shift | None:
     """Return the difference of two objects, None where they are not of one kind."""
-    mine, theirs = (agent.motion and asdict(agent.motion) for agent in (one, other))
-    is_walk = [agent.walk_to_m is None for agent in (one, other)]
-    is_other = one.type is not other.type or is_walk[0] != is_walk[1]
-    if is_other or not _are_close(mine, theirs, ALIKE["seconds"]):
+    gaps_m = _list_arrow_gaps_m(one, other, ALIKE["seconds"])
+    if gaps_m is None:
         return None
-    is_upright = one.type in _UPRIGHT
-    turn_rad = 0.0 if is_upright else difference(one.heading_rad, other.heading_rad)
-    turned = replace(other, heading_rad=one.heading_rad) if is_upright else other
-    gaps_m = np.hypot(*(one.box.corners_m - turned.box.corners_m).T).tolist()
-    gaps_m.append(abs(one.speed_mps - other.speed_mps) * _ARROW_S)
-    if one.walk_to_m is not None and other.walk_to_m is not None:
-        gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
+    turned = replace(other, heading_rad=one.heading_rad) if one.type in _UPRIGHT else other
+    gaps_m += np.hypot(*(one.box.corners_m - turned.box.corners_m).T).tolist()
+    turn_rad = difference(one.heading_rad, turned.heading_rad)
     return Shift(one=one, other=other, metres=max(gaps_m), degrees=abs(math.degrees(turn_rad)))
 
 
 def look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     """Return whether two objects look the same, whatever their ids."""
-    if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
+    gaps_m = _list_arrow_gaps_m(one, other, _SAME_M)
+    if gaps_m is None:
         return False
-    # As documents, whose numbers alone may differ a little.
-    mine, theirs = (agent.motion and asdict(agent.motion) for agent in (one, other))
-    if not _are_close(mine, theirs, _SAME_M):
-        return False
-    gaps_m = [
-        math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),
-        abs(one.length_m - other.length_m),
-        abs(one.width_m - other.width_m),
-        abs(one.speed_mps - other.speed_mps) * _ARROW_S,
-    ]
-    if one.walk_to_m is not None and other.walk_to_m is not None:
-        gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
+    gaps_m.append(math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)))
+    gaps_m += [abs(one.length_m - other.length_m), abs(one.width_m - other.width_m)]
     turn_rad = 0.0 if one.type in _UPRIGHT else difference(one.heading_rad, other.heading_rad)
     return max(gaps_m) <= _SAME_M + 1e-9 and abs(turn_rad) <= _SAME_RAD + 1e-9
+
+
+def _list_arrow_gaps_m(
+    one: TrafficAgent, other: TrafficAgent, within: float
+) -> list[float] | None:
+    """Return how far the arrows of two objects differ: of their speeds, and of their walks.
+
+    None unless they are of one kind and move alike, but for numbers that differ so little.
+    """
+    # As documents, whose numbers alone may differ a little.
+    mine, theirs = (agent.motion and asdict(agent.motion) for agent in (one, other))
+    if one.type is not other.type or not _are_close(mine, theirs, within):
+        return None
+    gaps_m = [abs(one.speed_mps - other.speed_mps) * _ARROW_S]
+    if one.walk_to_m is not None and other.walk_to_m is not None:
+        gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
+    return gaps_m if (one.walk_to_m is None) == (other.walk_to_m is None) else None
 
 
 def _are_close(value: Any, other: Any, within: float) -> bool:

@@ -250,11 +250,5 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
     width_m = float(max(high[0] - low[0], (high[1] - low[1]) * _CLOSER_RATIO, _LEAST_WIDTH_M))
     if (camera.x_max_m - camera.x_min_m) / width_m < _LEAST_GAIN:
         return None
-    x_m, y_m = ((low + high) / 2.0).tolist()
-    return Camera(
-        x_min_m=x_m - width_m / 2.0,
-        x_max_m=x_m + width_m / 2.0,
-        y_min_m=y_m - width_m / _CLOSER_RATIO / 2.0,
-        y_max_m=y_m + width_m / _CLOSER_RATIO / 2.0,
-        px_per_m=camera.width_px / width_m,
-    )
+    middle, half = (low + high) / 2.0, np.array([width_m, width_m / _CLOSER_RATIO]) / 2.0
+    return Camera.over(middle - half, middle + half, camera.width_px / width_m)

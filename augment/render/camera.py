@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
@@ -66,6 +67,14 @@ class Camera:
     is_filmed: bool = False
     ticks_m: tuple[float, ...] = ()
     inset: Inset | None = None
+
+    @classmethod
+    def over(cls, low_m: ArrayLike, high_m: ArrayLike, px_per_m: float) -> Camera:
+        """Return the plain window from its lower left corner (2,) to its upper right one (2,)."""
+        (x_min_m, y_min_m), (x_max_m, y_max_m) = np.array([low_m, high_m], dtype=float).tolist()
+        return cls(
+            x_min_m=x_min_m, x_max_m=x_max_m, y_min_m=y_min_m, y_max_m=y_max_m, px_per_m=px_per_m
+        )
 
     @property
     def width_px(self) -> int:
@@ -124,7 +133,7 @@ class Inset:
     box_px: tuple[float, float, float, float]
 
 
-AROUND_THE_EGO = Camera(x_min_m=-60.0, x_max_m=100.0, y_min_m=-60.0, y_max_m=60.0, px_per_m=10.0)
+AROUND_THE_EGO = Camera.over((-60.0, -60.0), (100.0, 60.0), 10.0)
 """The same for every scene, and wide: on it objects are placed by hand."""
 
 
@@ -257,13 +266,7 @@ def _best(need: FloatArray, scene: Scene) -> Camera:
     order = np.lexsort((usual.ravel(), -np.round(share.ravel() * 200.0)))
     row, column = divmod(int(order[0]), len(x_min))
     x_m, y_m = float(x_min[column]), float(y_min[row])
-    return Camera(
-        x_min_m=x_m,
-        x_max_m=x_m + width,
-        y_min_m=y_m,
-        y_max_m=y_m + height,
-        px_per_m=WIDTH_PX / width,
-    )
+    return Camera.over((x_m, y_m), (x_m + width, y_m + height), WIDTH_PX / width)
 
 
 def _footprint(agent: TrafficAgent) -> FloatArray:

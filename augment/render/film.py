@@ -149,7 +149,7 @@ class _Sketch(Canvas):
     """Notes the shapes of a mark instead of drawing them."""
 
     def __init__(self, px_per_m: float) -> None:
-        self.camera = Camera(x_min_m=0.0, x_max_m=0.0, y_min_m=0.0, y_max_m=0.0, px_per_m=px_per_m)
+        self.camera = Camera.over((0.0, 0.0), (0.0, 0.0), px_per_m)
         self.shapes: list[dict[str, Any]] = []
 
     def fill(self, points: FloatArray, colour: Colour) -> None:

@@ -115,19 +115,14 @@ def draw_labels(
     """
     _write_metres(ground)
     everyone = sorted(scene.everyone, key=lambda agent: agent.id not in first)
-    boxes = [mark_box(ground, agent) for agent in everyone]
-    writer = _Writer(ground, list(taken), boxes)
+    boxes = {agent.id: mark_box(ground, agent) for agent in everyone}
+    writer = _Writer(ground, list(taken), list(boxes.values()))
     spots_of = {agent.id: ground.at(agent.x_m, agent.y_m) for agent in everyone}
-    for agent, box in zip(everyone, boxes, strict=True):
-        x, y = spots_of[agent.id]
-        is_seen = 0.0 <= x <= ground.width_px and 0.0 <= y <= ground.height_px
-        if agent.id in first and is_seen:
-            _label_at_a_line(ground, writer, agent.id, box)
+    for name in (name for name in boxes if name in first and ground.shows(spots_of[name])):
+        _label_at_a_line(ground, writer, name, boxes[name])
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     by_id = {lane.id: lane for lane in lanes}
-    centres = [
-        _middle(box) for agent, box in zip(everyone, boxes, strict=True) if agent.id in first
-    ]
+    centres = [_middle(box) for name, box in boxes.items() if name in first]
     for lane_id in named:
         spots = sorted(
             _lane_spots(ground, by_id[lane_id], 20.0),
@@ -137,15 +132,13 @@ def draw_labels(
         beside = [(x + dx, y + dy) for dx, dy in asides for x, y in spots]
         if not writer.write(lane_id, palette.LANE_TEXT, spots):
             writer.write(lane_id, palette.LANE_TEXT, beside, over_marks=True)
-    for agent, (left, top, right, bottom) in zip(everyone, boxes, strict=True):
-        if agent.id in first:
-            continue
-        x, y = spots_of[agent.id]
-        aside = text_width_px(agent.id, _TEXT_PX) / 2.0 + 8.0
+    for name in (name for name in boxes if name not in first):
+        (left, top, right, bottom), (x, y) = boxes[name], spots_of[name]
+        aside = text_width_px(name, _TEXT_PX) / 2.0 + 8.0
         spots = [(x, top - 12.0), (x, bottom + 12.0), (right + aside, y), (left - aside, y)]
         spots += [(right + aside, top - 12.0), (left - aside, bottom + 12.0), (x, top - 30.0)]
-        if not writer.write(agent.id, palette.INK, spots):
-            writer.write(agent.id, palette.INK, [*spots, (x, y)], over_marks=True)
+        if not writer.write(name, palette.INK, spots):
+            writer.write(name, palette.INK, [*spots, (x, y)], over_marks=True)
     for lane in lanes:
         if lane.id not in named:
             writer.write(lane.id, palette.LANE_TEXT, _lane_spots(ground, lane, 40.0))

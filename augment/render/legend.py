@@ -1,6 +1,7 @@
 """The legend of a picture: drawn for reviewers, and the names of its entries for the web."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,13 +72,8 @@ def draw_legend(scene: Scene, modification: Modification, width_px: int) -> Canv
             x_px, y_px = _MARGIN_PX, y_px + _ROW_PX
         places.append((sample, words, (x_px, y_px)))
         x_px += wide
-    camera = Camera(
-        x_min_m=0.0,
-        x_max_m=width_px / _PX_PER_M,
-        y_min_m=0.0,
-        y_max_m=(y_px + _ROW_PX / 2.0 + _MARGIN_PX) / _PX_PER_M,
-        px_per_m=_PX_PER_M,
-    )
+    height_m = (y_px + _ROW_PX / 2.0 + _MARGIN_PX) / _PX_PER_M
+    camera = Camera.over((0.0, 0.0), (width_px / _PX_PER_M, height_m), _PX_PER_M)
     canvas = Canvas(camera, palette.PAPER)
     for sample, words, (left, middle) in places:
         x_m, y_m = (left + _SAMPLE_PX / 2.0) / _PX_PER_M, camera.y_max_m - middle / _PX_PER_M
@@ -171,21 +167,7 @@ def _map_entries(scene: Scene) -> Iterator[tuple[_Sample, str]]:
 
 
 def _agent(kind: AgentType, style: MarkStyle) -> _Sample:
-    length_m, width_m = LENGTH_WIDTH_M[kind]
-
-    def draw(canvas: Canvas, at_m: Spot) -> None:
-        sample = TrafficAgent(
-            id="",
-            type=kind,
-            x_m=at_m[0],
-            y_m=at_m[1],
-            heading_rad=0.0,
-            width_m=width_m,
-            length_m=length_m,
-        )
-        draw_mark(canvas, sample, style)
-
-    return draw
+    return lambda canvas, at_m: draw_mark(canvas, _sample(kind, at_m), style)
 
 
 def _walk(canvas: Canvas, at_m: Spot) -> None:
@@ -197,16 +179,14 @@ def _motion(canvas: Canvas, at_m: Spot) -> None:
 
 
 def _mover(at_m: Spot, walk_to_m: Point | None = None) -> TrafficAgent:
+    person = _sample(AgentType.PEDESTRIAN, (at_m[0] - 2.5, at_m[1]))
+    return replace(person, speed_mps=4.0, walk_to_m=walk_to_m)
+
+
+def _sample(kind: AgentType, at_m: Spot) -> TrafficAgent:
+    (x_m, y_m), (length_m, width_m) = at_m, LENGTH_WIDTH_M[kind]
     return TrafficAgent(
-        id="",
-        type=AgentType.PEDESTRIAN,
-        x_m=at_m[0] - 2.5,
-        y_m=at_m[1],
-        heading_rad=0.0,
-        width_m=0.8,
-        length_m=0.9,
-        speed_mps=4.0,
-        walk_to_m=walk_to_m,
+        id="", type=kind, x_m=x_m, y_m=y_m, heading_rad=0.0, length_m=length_m, width_m=width_m
     )
 
 

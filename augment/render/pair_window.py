@@ -77,16 +77,8 @@ def pair_camera(
         more = _around([need + np.array([[AROUND_M], [-AROUND_M]]), place])
         if (more[1] - more[0]).max() <= MAX_WIDTH_M:
             need = more
-    (x_min, y_min), (x_max, y_max) = need.tolist()
-    camera = Camera(
-        x_min_m=x_min,
-        x_max_m=x_max,
-        y_min_m=y_min,
-        y_max_m=y_max,
-        px_per_m=find_scale(x_max - x_min, y_max - y_min),
-        is_filmed=is_filmed,
-        ticks_m=ticks_m,
-    )
+    plain = Camera.over(*need, find_scale(*(need[1] - need[0]).tolist()))
+    camera = replace(plain, is_filmed=is_filmed, ticks_m=ticks_m)
     return _with_inset(camera, scene, sides, differing)
 
 
@@ -206,7 +198,4 @@ def _with_inset(
         return sum(weight for weight, at in pairs if overlap(box, at, _INSET_GAP_PX))
 
     box = min(boxes_px, key=count_hidden)
-    window = Camera(
-        x_min_m=low[0], x_max_m=high[0], y_min_m=low[1], y_max_m=high[1], px_per_m=scale
-    )
-    return replace(camera, inset=window.at(box[0], box[1]))
+    return replace(camera, inset=Camera.over(low, high, scale).at(box[0], box[1]))

@@ -208,7 +208,7 @@ def _line(
     cell: list[Simulation], before: Mapping[int, float], score: str, kinds: Iterable[str]
 ) -> DrivingLine:
     paired = [row for row in cell if row.state == State.DONE and row.scenario_id in before]
-    values = {row: float(getattr(row, SCORES[score])) for row in paired}
+    scored = [(row.scenario.type, float(getattr(row, SCORES[score]))) for row in paired]
     clearances = [distance for row in paired if (distance := least_clearance_m(row)) is not None]
     collisions = [_document(row).get("collisions", ()) for row in paired]
     first = cell[0]
@@ -219,12 +219,9 @@ def _line(
         contestant=who,
         drives=len(paired),
         failed=sum(row.state == State.FAILED for row in cell),
-        mean=_mean(list(values.values())),
-        before=_mean([before[row.scenario_id] for row in paired]),
-        by_type={
-            kind: _mean([value for row, value in values.items() if row.scenario.type == kind])
-            for kind in kinds
-        },
+        mean=_mean(scored),
+        before=_mean([("", before[row.scenario_id]) for row in paired]),
+        by_type={kind: _mean(scored, kind) for kind in kinds},
         least_clearance_m=min(clearances, default=None),
         close=sum(distance < CLOSE_M for distance in clearances),
         collided=sum(any(contact["at_fault"] for contact in drive) for drive in collisions),
@@ -240,22 +237,20 @@ def _nuplan_lines(results: Iterable[NuplanResult], kinds: Iterable[str]) -> Iter
         cells[contestant.name.lower(), contestant.slug, row.planner].append(row)
     for (_, _, planner), cell in sorted(cells.items()):
         contestant = cell[0].augmentation.contestant
-        done = [(_scenario_type(row), row.score, row) for row in cell if row.score is not None]
+        done = [row for row in cell if row.score is not None]
+        scored = [(_scenario_type(row), row.score) for row in cell if row.score is not None]
         yield DrivingLine(
             subject=Subject.AUGMENTATION,
             name=f"{contestant.name}, driven in nuPlan by {planner}",
             contestant=contestant,
             drives=len(done),
             failed=len(cell) - len(done),
-            mean=_mean([score for _, score, _ in done]),
+            mean=_mean(scored),
             before=None,
-            by_type={
-                kind: _mean([score for kind_done, score, _ in done if kind_done == kind])
-                for kind in kinds
-            },
+            by_type={kind: _mean(scored, kind) for kind in kinds},
             least_clearance_m=None,
             close=None,
-            collided=sum(row.parts.get(_NO_COLLISION) not in (None, 1.0) for *_, row in done),
+            collided=sum(row.parts.get(_NO_COLLISION) not in (None, 1.0) for row in done),
             braked=None,
             driven_by=planner,
         )
@@ -275,5 +270,7 @@ def _place(line: DrivingLine) -> tuple[int, float, str]:
     return order.index(Subject(line.subject)), -lowered, line.name.lower()
 
 
-def _mean(values: Sequence[float]) -> float | None:
+def _mean(scored: Sequence[tuple[str, float]], kind: str | None = None) -> float | None:
+    """Return the mean of scores with their scenarios' types, of one type or of all."""
+    values = [score for own_kind, score in scored if kind in (None, own_kind)]
     return fmean(values) if values else None

@@ -223,10 +223,8 @@ def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
 def _store_scenario(
     entry: codec.CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
 ) -> CatalogueStep:
-    row, slug = _find_newest(entry.slug), entry.slug
-    follows = None
-    if entry.follows:
-        follows = _find_newest(entry.follows) or scene_rows.scenario_named(entry.follows)
+    row, slug, before = _find_newest(entry.slug), entry.slug, entry.follows
+    follows = (_find_newest(before) or scene_rows.scenario_named(before)) if before else None
     intent = None if entry.intent is None else codec.intent_to_document(entry.intent)
     columns: dict[str, Any] = {
         "type": entry.type.value,
@@ -239,16 +237,16 @@ def _store_scenario(
         "catalogue_set": which.value,
         "language": entry.language,
         "paraphrase_of": original,
+        "type_label": scene_rows.label_for(entry.type),
     }
-    own["type_label"] = scene_rows.label_for(entry.type)
     if original is not None:
         own["origin"] = original.origin
     if row is not None:
         if row == follows:
             raise Conflict(f"{row.slug!r} can't follow itself.")
-        wanted = own | columns | {"base_scene": BaseScene.objects.get(slug=entry.scene)}
-        wanted["follows"] = follows
-        wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
+        links = {"base_scene": BaseScene.objects.get(slug=entry.scene), "follows": follows}
+        wanted_origin = "" if intent is None else IntentOrigin.AUTHORED.value
+        wanted = own | columns | links | {"intent_origin": wanted_origin}
         step = _update_scenario(row, wanted, actor)
         if step is not CatalogueStep.RENEWED:
             return step

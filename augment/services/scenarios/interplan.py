@@ -74,13 +74,9 @@ def import_interplan(
     )
     by_token = file.modification_details_dictionary
     wanted = {token: entry_of for token, entry_of in by_token.items() if entry_of.special_scenario}
-    left_out = [
-        f"base token {token}, without a special scenario"
-        for token in by_token
-        if token not in wanted
-    ]
-    for text in left_out:
-        yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
+    for token in (token for token in by_token if token not in wanted):
+        text = f"Left out: base token {token}, without a special scenario."
+        yield ImportStep(StepKind.LEFT_OUT, text)
     logs: dict[str, tuple[Path, _Sizes]] = {}
     paths = sorted((data or folder).rglob("*.db"))
     for number, path in enumerate(paths, start=1):
@@ -173,15 +169,15 @@ def _keep_entry(
     vehicles_m: _Sizes,
     actor: User | None,
 ) -> ImportStep:
-    token, slug = row.source_item, f"{row.slug}-s{verbatim['index']}"
-    name = f"{token}-s{verbatim['index']}"
+    token, index = row.source_item, verbatim["index"]
+    slug, name = f"{row.slug}-s{index}", f"{token}-s{index}"
     details = interplan_file.Details.model_validate(verbatim["details"])
     spawned, built = interplan_file.surround(
         entry, details, scene, token=token, vehicles_m=vehicles_m
     )
     verbatim["built"] = built.model_dump(mode="json", exclude_none=True)
     scene = interplan_file.follow_rules(scene, verbatim)
-    reference, losses = interplan_file.read_entry(token, verbatim["index"], entry, scene)
+    reference, losses = interplan_file.read_entry(token, index, entry, scene)
     if built.boxes_m is None:
         losses.append("the boxes of vehicles, since a recorded one has no size")
     left_out = f"; left out: {', '.join(losses)}" if losses else ""
