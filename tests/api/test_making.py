@@ -14,7 +14,6 @@ from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification
 from augment.services.endpoints.probing import ABILITIES
 from augment.services.scenarios import uploads
-from augment.services.scenarios import uploads as upload_moments
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
 from tests.jobs.rows import add_scenario
@@ -89,7 +88,7 @@ def test_a_recording_becomes_a_scene(reader: Client, sent: list[tuple[str, int]]
     error_of(send(reader, path + "/moments", **asked, slug="No Slug"), 400, "refused")
     kept = send(reader, path + "/moments", **asked, slug="main-street")
     assert (kept.status_code, kept.json()["code"]) == (202, moment["code"])
-    upload_moments.MOMENTS.perform(sent.pop()[1])
+    uploads.MOMENTS.perform(sent.pop()[1])
     assert reader.get(API + here).json()["scene"] == "main-street"
     assert BaseScene.objects.get().slug == "main-street"
 

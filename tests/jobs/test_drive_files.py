@@ -12,14 +12,16 @@ from django.core.management.base import CommandError
 from augment.formats.own_json import write
 from augment.formats.writing import Cell
 from augment.scene.entities import Modification
+from augment.simulation.drive import STEPS
 from tests.scenes import cone, scene
 
 PLANNER = "tests.jobs.test_simulations.Straight"
 
 
 @pytest.fixture
-def scenarios(tmp_path: Path) -> Path:
+def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Five streets, each with a cone further to the left; the last two are passed."""
+    monkeypatch.setitem(STEPS, False, 40)
     cells = [
         Cell(
             name=f"cone {n}",

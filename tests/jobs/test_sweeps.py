@@ -28,7 +28,7 @@ from augment.services.driving.sweeps import (
 from augment.services.driving.thresholds import conclude, sweep_result
 from augment.services.scenarios.editing import enter_intent
 from augment.services.scenarios.scenes import LoadedScenario
-from augment.simulation.drive import find_expert, run
+from augment.simulation.drive import STEPS, find_expert, run
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.traffic import DriveSetting
@@ -47,8 +47,9 @@ ACROSS = "add[0].y_m"
 
 
 @pytest.fixture(autouse=True)
-def allowed(settings: Settings) -> None:
+def allowed(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     settings.PLANNERS = (STRAIGHT.planner,)
+    monkeypatch.setitem(STEPS, False, 60)  # enough to come to whatever stands there
 
 
 def parked(y_m: float) -> Modification:

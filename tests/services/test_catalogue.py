@@ -59,6 +59,13 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
+def bring(folder: Path, file: Path) -> None:
+    """Copy a file of the project's catalogue to its place in the folder."""
+    place = folder / file.relative_to(FOLDER)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy(file, place)
+
+
 def edit(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
     document = json.loads(file.read_text())
     change(document)
@@ -104,8 +111,7 @@ def test_loading_again_changes_nothing(folder: Path) -> None:
 
 def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(folder: Path) -> None:
     for name in ("scenes/hairpin-hill.json", "scenarios/hairpin-hill-van.json"):
-        (folder / "hard" / name).parent.mkdir(parents=True)
-        shutil.copy(HARD / name, folder / "hard" / name)
+        bring(folder, HARD / name)
     out = StringIO()
     call_command("load_catalogue", "--folder", str(folder), stdout=out)
     assert resolve_scenarios(["catalogue"]) == ["parked-car"]
@@ -136,13 +142,8 @@ def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(fol
 
 
 def test_the_moving_set_brings_those_scenes_of_the_others_that_it_is_on(folder: Path) -> None:
-    for shelf, name in (
-        (FOLDER, "scenes/mill-junction.json"),
-        (MOVING, "scenarios/hard-braking-mill-junction.json"),
-    ):
-        place = folder / shelf.relative_to(FOLDER) / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(shelf / name, place)
+    bring(folder, FOLDER / "scenes/mill-junction.json")
+    bring(folder, MOVING / "scenarios/hard-braking-mill-junction.json")
     loaded = load_catalogue(folder=folder, sets=["moving"])
     assert loaded == report(scenes=(1, 0, 0), scenarios=(1, 0, 0))
     scenario = Scenario.objects.get()
@@ -156,13 +157,8 @@ def test_the_moving_set_brings_those_scenes_of_the_others_that_it_is_on(folder: 
 
 
 def test_an_open_wish_has_an_example_that_nobody_is_measured_by(folder: Path) -> None:
-    for shelf, name in (
-        (FOLDER, "scenes/ferry-road.json"),
-        (OPEN, "scenarios/way-ferry-road.json"),
-    ):
-        place = folder / shelf.relative_to(FOLDER) / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(shelf / name, place)
+    bring(folder, FOLDER / "scenes/ferry-road.json")
+    bring(folder, OPEN / "scenarios/way-ferry-road.json")
     load_catalogue(folder=folder, sets=["open"])
     scenario = Scenario.objects.get()
     assert (scenario.is_open, scenario.get_type_display()) == (True, "Leave one narrow way past")

@@ -12,7 +12,6 @@ from django.core.files.storage import default_storage
 from augment.errors import InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
-from augment.services.scenarios import uploads as upload_moments
 from augment.services.scenarios.scene_imports import note_sentences
 from tests.formats.av2_logs import write_log
 from tests.formats.openscenario_files import CAR, ROADS, catalog, scenario
@@ -40,8 +39,8 @@ def read(row: SceneUpload) -> SceneUpload:
 
 
 def looked_at(row: SceneUpload, frame: int) -> UploadMoment:
-    moment = upload_moments.ask_for_moment(row, item="", frame=frame)
-    upload_moments.MOMENTS.perform(moment.pk)
+    moment = uploads.ask_for_moment(row, item="", frame=frame)
+    uploads.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     return moment
 
@@ -60,8 +59,8 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert moment.report is not None
     assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
     assert any("limit" in note for note in note_sentences(moment.report["notes"]))
-    upload_moments.ask_for_moment(row, item="", frame=2, slug="by-the-page", actor=ada)
-    upload_moments.MOMENTS.perform(moment.pk)
+    uploads.ask_for_moment(row, item="", frame=2, slug="by-the-page", actor=ada)
+    uploads.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     kept = BaseScene.objects.get(slug="by-the-page")
     assert (moment.state, moment.scene) == ("kept", kept)
@@ -91,9 +90,9 @@ def test_of_a_long_recording_the_first_moments_are_offered(
 def test_a_second_message_finds_nothing_to_do(log: bytes) -> None:
     row = read(sent(log))
     moment = looked_at(row, 0)
-    assert not upload_moments.MOMENTS.perform(moment.pk)
+    assert not uploads.MOMENTS.perform(moment.pk)
     assert not uploads.UPLOADS.perform(row.pk)
-    assert upload_moments.ask_for_moment(row, item="", frame=0) == moment
+    assert uploads.ask_for_moment(row, item="", frame=0) == moment
 
 
 @pytest.mark.parametrize(
@@ -118,18 +117,18 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
     BaseScene.objects.create(slug="taken", document={}, source="json", provenance="here")
     row = read(sent(log))
     moment = looked_at(row, 0)
-    upload_moments.ask_for_moment(row, item="", frame=0, slug="taken")
-    upload_moments.MOMENTS.perform(moment.pk)
+    uploads.ask_for_moment(row, item="", frame=0, slug="taken")
+    uploads.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     assert moment.state == "drawn"
     assert "called 'taken' already" in moment.reason
     with pytest.raises(InvalidDocument, match="slug"):
-        upload_moments.ask_for_moment(row, item="", frame=0, slug="Not A Slug")
+        uploads.ask_for_moment(row, item="", frame=0, slug="Not A Slug")
     for slug in ("first", "second"):
         moment.state = "drawn"
         moment.save()
-        upload_moments.ask_for_moment(row, item="", frame=0, slug=slug)
-        upload_moments.MOMENTS.perform(moment.pk)
+        uploads.ask_for_moment(row, item="", frame=0, slug=slug)
+        uploads.MOMENTS.perform(moment.pk)
         moment.refresh_from_db()
         assert moment.scene is not None
         assert moment.scene.slug == "first"
@@ -163,8 +162,8 @@ def test_a_zip_of_a_scenario_with_map_and_catalog_offers_each_ego() -> None:
     row = read(sent(packed.getvalue(), "scenario.zip"))
     assert (row.state, row.format, row.reason) == ("read", "openscenario", "")
     assert [track["name"] for track in row.tracks] == ["Ego", "Other"]
-    moment = upload_moments.ask_for_moment(row, item="Other", frame=0, slug="by-the-other")
-    upload_moments.MOMENTS.perform(moment.pk)
+    moment = uploads.ask_for_moment(row, item="Other", frame=0, slug="by-the-other")
+    uploads.MOMENTS.perform(moment.pk)
     scene = BaseScene.objects.get(slug="by-the-other")
     assert scene.source_item == "Other"
     assert [agent["speed_mps"] for agent in scene.document["agents"]] == [10.0]

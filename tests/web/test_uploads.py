@@ -12,7 +12,6 @@ from django.urls import reverse
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.scene.codec import scene_to_document
 from augment.services.scenarios import pictures, uploads
-from augment.services.scenarios import uploads as upload_moments
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in
@@ -30,9 +29,7 @@ def researcher() -> Client:
 def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks: object) -> None:
     """What is sent to a worker is done at once."""
     monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_upload", uploads.UPLOADS.perform)
-    monkeypatch.setattr(
-        "arena.scenarios.pages.uploads.enqueue_moment", upload_moments.MOMENTS.perform
-    )
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_moment", uploads.MOMENTS.perform)
     for page in ("uploads", "editor"):
         monkeypatch.setattr(f"arena.scenarios.pages.{page}.enqueue_scene", pictures.draw_scene)
     monkeypatch.setattr("arena.shell.acts.transaction.on_commit", lambda done: done())
