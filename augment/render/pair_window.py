@@ -77,7 +77,7 @@ def pair_camera(
         more = _around([need + np.array([[AROUND_M], [-AROUND_M]]), place])
         if (more[1] - more[0]).max() <= MAX_WIDTH_M:
             need = more
-    plain = Camera.over(*need, find_scale(*(need[1] - need[0]).tolist()))
+    plain = Camera.over(need[0], need[1], find_scale(*(need[1] - need[0]).tolist()))
     camera = replace(plain, is_filmed=is_filmed, ticks_m=ticks_m)
     return _with_inset(camera, scene, sides, differing)
 
