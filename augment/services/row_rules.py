@@ -21,6 +21,7 @@ from augment.scene.codec import (
 )
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
 from augment.services.scenarios import scenes
+from augment.services.scenarios.choosing import label_for
 from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.texts import (
     check_picture_name,
@@ -51,7 +52,7 @@ def _check_scene(row: models.BaseScene) -> None:
 
 def _check_scenario(row: models.Scenario) -> None:
     check_slug(row.slug, what="scenario")
-    scenes.label_for(row.type)
+    label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=scenes.INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
     _check_document(intent_from_document, row.intent)

@@ -21,12 +21,14 @@ from augment.services import SLUG_LENGTH, free_slug, make_slug
 from augment.services.judging import check_edit
 from augment.services.running import follow_ups
 from augment.services.scenarios import (
+    LONGEST_TYPE,
     SceneView,
     editing,
     is_drawn,
     note_sentences,
     scene_picture,
     scenes,
+    type_choices,
 )
 from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
@@ -48,7 +50,7 @@ class ScenarioForm(forms.Form):
     type = forms.ChoiceField(required=False)
     own_type = forms.CharField(
         required=False,
-        max_length=scenes.LONGEST_TYPE,
+        max_length=LONGEST_TYPE,
         label="A type of your own",
         help_text="It counts where no other is chosen.",
     )
@@ -81,7 +83,7 @@ class ScenarioForm(forms.Form):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        offer(self, "type", [("", "As the drawing looks"), *scenes.type_choices()])
+        offer(self, "type", [("", "As the drawing looks"), *type_choices()])
 
     def to_values(self) -> dict[str, Any]:
         """Return the scenario's fields from a valid form.

@@ -17,7 +17,8 @@ from augment.scene.density import fit_boxes
 from augment.scene.entities import Modification
 from augment.services.clock import Moment
 from augment.services.driving.thresholds import conclude, conclude_all
-from augment.services.scenarios.scenes import LoadedScenario, find_type
+from augment.services.scenarios.choosing import find_type
+from augment.services.scenarios.scenes import LoadedScenario
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named

@@ -19,8 +19,9 @@ from augment.services.driving.simulations import Options, load_planner
 from augment.services.driving.thresholds import tell_difference
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, input_field
+from augment.services.scenarios.choosing import find_type
 from augment.services.scenarios.editing import read_edit
-from augment.services.scenarios.scenes import LoadedScenario, add_variant, find_type, scenario_seed
+from augment.services.scenarios.scenes import LoadedScenario, add_variant, scenario_seed
 from augment.simulation.planners import IDM, OFFSETS_M, PDM_CLOSED
 
 LARGEST_FAMILY = 100

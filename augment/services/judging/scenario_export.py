@@ -12,7 +12,8 @@ from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.codec import modification_from_document
-from augment.services.scenarios.scenes import LoadedScenario, find_type
+from augment.services.scenarios.choosing import find_type
+from augment.services.scenarios.scenes import LoadedScenario
 
 FORMATS = tuple(WRITERS)
 

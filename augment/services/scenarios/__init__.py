@@ -1,7 +1,13 @@
 """Scenes, scenarios and the catalogue as rows, and their pictures."""
 
 from augment.services.scenarios.catalogue import load_catalogue
-from augment.services.scenarios.choosing import resolve_scenarios, types_named
+from augment.services.scenarios.choosing import (
+    LONGEST_TYPE,
+    resolve_scenarios,
+    type_choices,
+    type_label,
+    types_named,
+)
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
@@ -33,13 +39,10 @@ from augment.services.scenarios.prompts import (
 from augment.services.scenarios.scene_imports import note_sentences
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
-    LONGEST_TYPE,
     NewScenario,
     ScenarioType,
     add_scenario,
     in_type_order,
-    type_choices,
-    type_label,
 )
 from augment.services.scenarios.thumbnails import THUMBNAILS, WIDTHS_PX, shrink
 from augment.services.scenarios.uploads import most_megabytes

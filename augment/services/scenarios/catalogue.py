@@ -24,6 +24,7 @@ from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_change, retire
 from augment.services.scenarios import scenes as scene_rows
+from augment.services.scenarios.choosing import label_for
 from augment.services.texts import check_slug
 
 SOURCE = "authored"
@@ -237,7 +238,7 @@ def _store_scenario(
         "catalogue_set": which.value,
         "language": entry.language,
         "paraphrase_of": original,
-        "type_label": scene_rows.label_for(entry.type),
+        "type_label": label_for(entry.type),
     }
     if original is not None:
         own["origin"] = original.origin

@@ -1,16 +1,56 @@
 """Scenarios and types by the names that people use."""
 
 import fnmatch
+import re
 from collections.abc import Sequence
 
 from django.db.models import QuerySet
 
-from augment.errors import UnknownName
+from augment.errors import InvalidDocument, UnknownName
 from augment.models import Scenario
-from augment.scene.entities import CatalogueSet
-from augment.services.scenarios.scenes import type_choices
+from augment.scene.entities import CatalogueSet, ScenarioType
+from augment.scene.intent_parts import Aim
+from augment.scene.planned_motion import MotionPreset
 
 ALL, SET = "all", "set:"
+LONGEST_TYPE = 40
+
+
+def type_choices() -> list[tuple[str, str]]:
+    """Every type with its label: the five in their order, then one's own by their slugs."""
+    own = Scenario.objects.exclude(type_label="").order_by("type")
+    labels = dict(own.values_list("type", "type_label"))
+    return [*((kind.value, kind.label) for kind in ScenarioType), *labels.items()]
+
+
+def type_label(name: str) -> str:
+    """Return the label of a type; an unknown type is its own label."""
+    found_type = find_type(name)
+    return found_type.label if found_type else dict(type_choices()).get(name, name)
+
+
+def find_type(name: str) -> ScenarioType | None:
+    """The one of the five, None for a type of one's own."""
+    return ScenarioType(name) if name in list(ScenarioType) else None
+
+
+def label_for(name: str) -> str:
+    """Return the label that a scenario of this type is stored with: empty for one of the five.
+
+    Raises:
+        InvalidDocument: It is neither one of the five nor a slug.
+    """
+    if find_type(name) is not None:
+        return ""
+    for kind in (MotionPreset, Aim):
+        if name in list(kind):
+            return kind(name).label
+    if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
+        types = ", ".join(kind.value for kind in ScenarioType)
+        rule = f"one of {types}, or up to {LONGEST_TYPE} lower-case letters, digits, _ or -"
+        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
+    before = Scenario.objects.filter(type=name).values_list("type_label", flat=True)
+    return before.first() or re.sub(r"[_-]", " ", name).capitalize()
 
 
 def resolve_scenarios(words: Sequence[str]) -> list[str]:

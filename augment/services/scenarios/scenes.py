@@ -3,7 +3,6 @@
 import hashlib
 import json
 import random
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,54 +24,13 @@ from augment.scene.density import keep_clear, spawn_traffic
 from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
-from augment.scene.intent_parts import Aim
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.planned_motion import MotionPreset
 from augment.scene.planned_mover import check_motions
 from augment.scene.recording import Recording
 from augment.services.events import log_change
+from augment.services.scenarios.choosing import find_type, label_for
 from augment.services.texts import SLUG_LENGTH, check_prose, check_slug, free_slug
 from augment.simulation.expected import expect_recording
-
-LONGEST_TYPE = 40
-
-
-def type_choices() -> list[tuple[str, str]]:
-    """Every type with its label: the five in their order, then one's own by their slugs."""
-    own = Scenario.objects.exclude(type_label="").order_by("type")
-    labels = dict(own.values_list("type", "type_label"))
-    return [*((kind.value, kind.label) for kind in ScenarioType), *labels.items()]
-
-
-def type_label(name: str) -> str:
-    """Return the label of a type; an unknown type is its own label."""
-    found_type = find_type(name)
-    return found_type.label if found_type else dict(type_choices()).get(name, name)
-
-
-def find_type(name: str) -> ScenarioType | None:
-    """The one of the five, None for a type of one's own."""
-    return ScenarioType(name) if name in list(ScenarioType) else None
-
-
-def label_for(name: str) -> str:
-    """Return the label that a scenario of this type is stored with: empty for one of the five.
-
-    Raises:
-        InvalidDocument: It is neither one of the five nor a slug.
-    """
-    if find_type(name) is not None:
-        return ""
-    for kind in (MotionPreset, Aim):
-        if name in list(kind):
-            return kind(name).label
-    if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
-        types = ", ".join(kind.value for kind in ScenarioType)
-        rule = f"one of {types}, or up to {LONGEST_TYPE} lower-case letters, digits, _ or -"
-        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
-    before = Scenario.objects.filter(type=name).values_list("type_label", flat=True)
-    return before.first() or re.sub(r"[_-]", " ", name).capitalize()
-
 
 INSTRUCTION_LENGTH = 2_000
 """An instruction is read above the pictures, and by models: a few sentences."""
