@@ -18,7 +18,7 @@ LEFT_OUT = shutil.ignore_patterns(
 )
 PASSED, FAILED = 0, 1
 """What pytest returns; anything else says that the tests did not run."""
-LONGEST_S = 600
+LONGEST_S = 1_800
 OPTIONS = (
     *("-q", "--no-header", "--tb=no", "--timeout=60", "--reuse-db", "--hypothesis-seed=0"),
     *("-p", "no:cacheprovider", "--randomly-dont-reorganize"),
