@@ -48,7 +48,7 @@ def why_not_editable(scenario: Scenario) -> str:
     """Return why nothing of a scenario can be changed now, empty where its drawing can."""
     try:
         editing.refuse_catalogue(scenario)
-        refuse_handed_out(scenario)
+        refuse_handed_out(scenario.slug)
         _refuse_judged(scenario)
     except Conflict as conflict:
         return str(conflict)
@@ -88,7 +88,7 @@ def change_scenario(
     # Locked as an opening study locks it: none opens between the check and the change.
     row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
     editing.refuse_catalogue(row, "text")
-    refuse_handed_out(row)
+    refuse_handed_out(row.slug)
     before, drawn = _state(row), row.reference
     row.reference = content.reference if isinstance(content.reference, dict) else None
     scenes.change_surroundings(

@@ -29,8 +29,8 @@ Read = TypeVar("Read")
 
 WHAT = "benchmark"
 MANIFEST, LOSSES, README = "benchmark.json", "losses.json", "README.txt"
-SCENE, RECORDING, REFERENCE = "scene", "recording", "reference"
-OWN_PARTS = (SCENE, RECORDING, REFERENCE)
+SCENE, RECORDING, REFERENCE, INTENT = "scene", "recording", "reference", "intent"
+OWN_PARTS = (SCENE, RECORDING, REFERENCE, INTENT)
 """The kinds of our own documents: `scenes/NAME.json`, `recordings/...`, `references/...`."""
 
 FORMATS = tuple(name for name in WRITERS if name != "json")
@@ -96,7 +96,7 @@ _CODEC = Codec(WHAT, TypeAdapter(_Manifest), _manifest_problems)
 
 
 def checksum(benchmark: BenchmarkSet) -> str:
-    """Return the SHA-256 of what entrants get: all of `BenchmarkSet` but references of the test.
+    """Return the SHA-256 of what entrants get: not the references and intents of the test.
 
     Files of other tools' formats are made of that and count no further.
     """
@@ -169,9 +169,11 @@ def read_folder(folder: Path) -> BenchmarkSet:
 
 def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
     at = f"{MANIFEST}: tasks {line.name!r}"
-    needed = {SCENE} | ({REFERENCE} if line.split is Split.PRACTICE else set())
+    needed, possible = {SCENE}, {RECORDING}
+    if line.split is Split.PRACTICE:
+        needed, possible = needed | {REFERENCE}, possible | {INTENT}
     kinds = {kind for kind in OWN_PARTS if kind in line.files}
-    if kinds - {RECORDING} != needed:
+    if kinds - possible != needed:
         text = f"of a {line.split} task expected {', '.join(sorted(needed))}, and a recording"
         raise InvalidDocument(WHAT, [(f"{at}: files", f"{text} if there is one")])
     documents: dict[str, Any] = {}
@@ -190,6 +192,7 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         scene=documents[SCENE],
         recording=documents.get(RECORDING),
         reference=documents.get(REFERENCE),
+        intent=documents.get(INTENT),
         **_describe_task(line),
     )
 
@@ -198,6 +201,7 @@ _PARSERS: dict[str, Any] = {
     SCENE: codec.scene_from_document,
     RECORDING: codec.recording_from_document,
     REFERENCE: codec.modification_from_document,
+    INTENT: codec.intent_from_document,
 }
 
 
@@ -234,6 +238,8 @@ def _task_documents(task: BenchmarkTask) -> dict[str, Any]:
             problem = "is for practice and has no reference to hand out"
             raise InvalidDocument(WHAT, [(task.name, problem)])
         documents[REFERENCE] = codec.modification_to_document(task.reference)
+        if task.intent is not None:
+            documents[INTENT] = codec.intent_to_document(task.intent)
     return documents
 
 

@@ -4,6 +4,8 @@ In: a benchmark set and a path with `card.json` and one file a task and sample, 
 `<task>--<sample>.<ext>`: our modification JSON, the changed scene in any format that is read, or
 LCTGen's vehicles. Out: what became of each. Files are read in a process of its own
 (submitted_file.py); where it dies over one, that one is unreadable and the rest is read on.
+A format that can be written here is written and read back, so that its losses and its rounding are
+known for every agent of a source; of others the source itself is taken.
 """
 
 import tempfile
@@ -12,12 +14,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from augment.benchmark import submitted_file
-from augment.benchmark.difference import find_difference, number_added
+from augment.benchmark.difference import SourceView, find_difference, number_added
+from augment.benchmark.folder import task_cell
 from augment.benchmark.report import CARD
-from augment.benchmark.source_views import ShownSource, identify, show_source
 from augment.benchmark.submitted_file import CONTENT, FileContent
 from augment.benchmark.values import (
     BenchmarkSet,
@@ -30,9 +33,13 @@ from augment.benchmark.values import (
 from augment.checks import Ground
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats import lctgen, sandbox
+from augment.formats.commonroad.writer import names_in
 from augment.formats.documents import parse_json
+from augment.formats.readers import find_reader
 from augment.formats.reading import place_on_lanes
-from augment.metrics.displacement import displacement
+from augment.formats.roads import RADIUS_M
+from augment.formats.writers import writer_named
+from augment.metrics.displacement import displacement, displacement_from_wish
 from augment.scene.codec import SCENE
 from augment.scene.entities import Modification, apply
 from augment.scene.planned_mover import check_motions
@@ -45,9 +52,74 @@ MOST_CHANGED = 1_000
 MOST_TOGETHER = 300_000
 """Agents in all files together: they are held at once, and so is the report with them."""
 MOST_REMARKS = 100
+COMMONROAD, SCENARIONET = "commonroad", "scenarionet"
+_SUFFIXES = {COMMONROAD: ".xml", SCENARIONET: ".pkl"}
 _NAMES = TypeAdapter(tuple[str, ...])
 Key = tuple[str, int]
 """A task and a sample."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShownSource:
+    """A source in a format.
+
+    Attributes:
+        ids: Of the source's agents, by what the format's file calls them.
+        notes: What its reader says of it, which is no news of a submission.
+    """
+
+    view: SourceView
+    ids: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def show_source(task: BenchmarkTask, format_name: str) -> ShownSource:
+    """Return the source of a task as a format shows it."""
+    scene = task.scene
+    near = [agent for agent in scene.agents if np.hypot(agent.x_m, agent.y_m) <= RADIUS_M]
+    plain = SourceView(agents={agent.id: agent for agent in near}, origin=scene.origin)
+    suffix = _SUFFIXES.get(format_name)
+    if suffix is None:
+        return ShownSource(view=plain)
+    written = writer_named(format_name)([task_cell(task)]).files
+    blocks = [file for name, file in written.items() if name.endswith(f"{task.name}{suffix}")]
+    if not blocks:  # the scene can't be said in the format
+        return ShownSource(view=plain)
+    with tempfile.TemporaryDirectory(prefix="arena-source-") as folder:
+        file = Path(folder) / f"{task.name}{suffix}"
+        file.write_bytes(blocks[0])
+        reading = find_reader(format_name).read(file, item=None, frame=None, name=scene.name)
+    ids = {agent.id: agent.id for agent in scene.agents}
+    if format_name == COMMONROAD:
+        ids = names_in(blocks[0].decode())
+    names = file_names(format_name, reading.names)
+    shown = {
+        ids[names[agent.id]]: agent for agent in reading.scene.agents if names[agent.id] in ids
+    }
+    named_agents = {agent.id: shown[agent.id] for agent in scene.agents if agent.id in shown}
+    view = SourceView(agents=named_agents, origin=reading.scene.origin)
+    return ShownSource(view=view, ids=ids, notes=reading.notes)
+
+
+def file_names(format_name: str, names: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the file's own names of its agents."""
+    if format_name != COMMONROAD:
+        return names
+    return {agent: str(int(number)) for agent, number in names.items()}
+
+
+def identify(shown: ShownSource, content: FileContent) -> SourceView:
+    """Return the view with the identities that a submitted file gives.
+
+    ScenarioNet's tracks carry our ids; CommonRoad's numbers are ours where a comment of our writer
+    says so, else they count for boxes of one size alone.
+    """
+    ids = content.own_names or shown.ids
+    names = file_names(content.format, content.names or {})
+    named = {agent: ids[name] for agent, name in names.items() if name in ids}
+    known_names = {agent: name for agent, name in named.items() if name in shown.view.agents}
+    is_certain = bool(content.own_names) or (content.format == SCENARIONET and bool(known_names))
+    return replace(shown.view, names=known_names, is_certain=is_certain)
 
 
 def check_submission(benchmark: BenchmarkSet, path: Path, *, checksum: str) -> SubmissionReport:
@@ -169,13 +241,14 @@ class _Checker:
     sources: dict[tuple[str, str], ShownSource] = field(default_factory=dict)
 
     def check(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
-        """Return the result of a task and sample, with its displacement."""
+        """Return the result of a task and sample, with its distances."""
         entry = self._read(task, sample, files)
         if task.split is not Split.PRACTICE or task.reference is None:
             return entry
         ground = Ground.of(task.scene, lambda *change: expect_recording(*change, task.replayed))
         distance = displacement(entry.modification, task.reference, ground)
-        return replace(entry, displacement=distance)
+        wish = task.intent and displacement_from_wish(entry.modification, task.intent, ground)
+        return replace(entry, displacement=distance, wish=wish)
 
     def _read(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
         entry = SubmittedEntry(

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from augment.metrics.displacement import Displacement
 from augment.scene.entities import Modification, Scene
+from augment.scene.intent import Intent
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Real, Text, Whole, Yes
 
@@ -44,6 +45,8 @@ class BenchmarkTask:
         paraphrase_of: The task that asks for the same in other words, empty for none.
         reference: None where it is not known here: in a folder that was handed out, of all tasks
             of the test split. An empty one says that the wish can't be met.
+        intent: What the instruction asks for, known where the reference is; None where nobody has
+            said it.
     """
 
     name: str
@@ -57,6 +60,7 @@ class BenchmarkTask:
     keeps_traffic: bool = True
     paraphrase_of: str = ""
     reference: Modification | None = None
+    intent: Intent | None = None
 
     @property
     def replayed(self) -> Recording | None:
@@ -135,6 +139,7 @@ class SubmittedEntry:
         modification: In the frame of the task's scene.
         displacement: From the reference of a practice task; all of it is missing where nothing
             was read. None for tasks of the test split, also where their references are known.
+        wish: The distance to the wish of a practice task, None where it has no intent.
     """
 
     task: str
@@ -145,6 +150,7 @@ class SubmittedEntry:
     notes: tuple[str, ...] = ()
     modification: Modification | None = None
     displacement: Displacement | None = None
+    wish: Displacement | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

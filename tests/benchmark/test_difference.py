@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.benchmark.difference import SourceView, find_difference, number_added
-from augment.benchmark.source_views import identify, show_source
+from augment.benchmark.submission import identify, show_source
 from augment.benchmark.submitted_file import FileContent, read_file
 from augment.formats.writers import writer_named
 from augment.formats.writing import Cell

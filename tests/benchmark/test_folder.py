@@ -15,7 +15,9 @@ from augment.benchmark.folder import FORMATS, checksum, read_folder, write_folde
 from augment.benchmark.values import BenchmarkSet, Split, Stratum
 from augment.errors import InvalidDocument
 from augment.scene.entities import Modification
+from augment.scene.intent import Shape
 from tests.benchmark.sets import RECORDING, SECRET_M, handed_out, on_disk, small_set
+from tests.intents import cones
 from tests.scenes import scene, vehicle
 
 Break = Callable[[Path], object]
@@ -41,6 +43,7 @@ CHANGES: dict[str, Change] = {
     "scene": first(scene=scene(name="near-scene", agents=(vehicle("Agent2", 20.0, 1e-9),))),
     "recording": first(recording=RECORDING),
     "reference": first(reference=Modification(removed=("Agent2",))),
+    "intent": first(intent=cones(31.5, 1, Shape.LINE)),
 }
 
 
@@ -58,7 +61,7 @@ def test_a_checksum_stays_what_it_is() -> None:
 
 
 def test_what_is_read_again_is_what_was_handed_out(tmp_path: Path) -> None:
-    benchmark = small_set()
+    benchmark = CHANGES["intent"](small_set())
     found = read_folder(on_disk(tmp_path, benchmark))
     assert checksum(found) == checksum(benchmark)
     assert found.tasks[0] == benchmark.tasks[0]
@@ -159,6 +162,10 @@ BROKEN: dict[str, tuple[Break, str]] = {
     ),
     "secret": (
         edit(MANIFEST, "tasks", 1, "files", "reference", to=["references/far.json"]),
+        "tasks 'far': files: of a test task expected scene",
+    ),
+    "secret intent": (
+        edit(MANIFEST, "tasks", 1, "files", "intent", to=["intents/far.json"]),
         "tasks 'far': files: of a test task expected scene",
     ),
     "provenance": (edit(MANIFEST, "tasks", 0, "provenance", to="x"), "provenance: is not that"),

@@ -56,6 +56,15 @@ def test_a_report_comes_back_from_json_to_the_last_digit() -> None:
     assert lines[0] == "near    read        near.json  2.0275875100994067 m, 0 missing, 0 surplus"
     assert lines[1] == "far--2  missing     no file"
     assert "1 read, 0 refused, 0 unreadable, 1 missing" in lines
+    assert not any("wish" in line for line in lines)
+    read = report().entries[0]
+    wished = replace(
+        report(), entries=(replace(read, wish=replace(read.displacement, matches=())),)
+    )
+    assert report_from_document(report_to_document(wished)) == wished
+    lines = list(describe_report(wished))
+    assert lines[0].endswith("m, 0 missing, 0 surplus  wish 0 missing, 0 surplus")
+    assert "Distance to the wish on practice: nothing matched, 0 matched, 0 missing" in lines[-1]
 
 
 def test_what_moves_is_told_over_time_and_comes_back() -> None:

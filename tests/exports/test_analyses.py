@@ -81,6 +81,7 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
     assert float(pair["median_difference_m"]) == pytest.approx(-1.3, abs=0.001)
     assert float(pair["p_wilcoxon"]) == pytest.approx(2 / 2**7)
     (reworded,) = exported(job, "wordings", tmp_path)
+    assert float(pair["wish_median_difference_m"]) == pytest.approx(-1.3, abs=0.001)
     assert (reworded["contestant"], reworded["wordings"]) == ("ann", "2")
     assert float(reworded["within_m"]) == pytest.approx(2**0.5, abs=0.001)
     ann, ben = exported(job, "refusals", tmp_path)

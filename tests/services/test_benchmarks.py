@@ -1,6 +1,7 @@
 """Benchmarks as rows: made, found, handed out, and what stays while they are."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.scenarios import services
-from augment.benchmark.folder import read_folder
+from augment.benchmark.folder import checksum, read_folder
 from augment.benchmark.values import Split
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import BaseScene, Benchmark, BenchmarkItem, Event, Scenario
@@ -25,6 +26,7 @@ from augment.services.benchmarks.benchmarks import (
     list_remarks,
     make_benchmark,
     plan_benchmark,
+    refuse_handed_out,
 )
 from augment.services.events import retire
 from augment.services.scenarios.scenes import NewScenario, ScenarioContent, add_variant
@@ -243,6 +245,20 @@ def test_what_is_handed_out_stays_until_the_benchmark_is_retired(streets: list[S
     change(streets[0], modification_to_document(other))
     with pytest.raises(Conflict, match="can’t be deleted"):
         services.delete(streets[0])
+
+
+def test_intents_of_practice_tasks_are_handed_out_since_they_count(
+    streets: list[Scenario],
+) -> None:
+    row = make_benchmark(asked())
+    found = benchmark_set(row)
+    assert all(task.intent for task in found.tasks)
+    with pytest.raises(Conflict, match="is handed out in the benchmark streets@1"):
+        refuse_handed_out(row.items.filter(split="practice")[0].scenario.slug, [Split.PRACTICE])
+    refuse_handed_out(row.items.filter(split="test")[0].scenario.slug, [Split.PRACTICE])
+    bare = replace(found, tasks=tuple(replace(task, intent=None) for task in found.tasks))
+    row.checksum = checksum(bare)  # as benchmarks had it before
+    assert benchmark_set(row) == bare
 
 
 @pytest.mark.parametrize("split", Split)

@@ -58,6 +58,7 @@ def test_a_report_names_what_was_read_and_equals_the_offline_one(tmp_path: Path)
     assert report_to_document(offline) == row.report
     practice = [one for one in offline.entries if one.displacement is not None]
     assert [one.task for one in practice] == [benchmark.items.get(split="practice").scenario.slug]
+    assert [one for one in offline.entries if one.wish is not None] == practice
 
 
 @pytest.mark.parametrize("content", [b"no zip at all", b"PK\x05\x06" + bytes(18)])

@@ -83,6 +83,11 @@ REPEATS: Columns = {
         for part in ("mean", "sd", "values")
     },
     "displacement_within_scenario_sd_m": ("within_m", Dtype.NUMBER),
+    **{
+        f"wish_m_{part}": (f"wish_m_{part}", Dtype.TEXT if part == "values" else Dtype.NUMBER)
+        for part in ("mean", "sd", "values")
+    },
+    "wish_within_scenario_sd_m": ("wish_within_m", Dtype.NUMBER),
 }
 """`sd` is between samples, `values` has one number a sample; see `repeatability`."""
 
@@ -101,11 +106,18 @@ ANALYSIS_COLUMNS: dict[str, Columns] = {
         **Dtype.NUMBER.columns("low_m", "high_m"),
         "p_wilcoxon": ("p", Dtype.NUMBER),
         **Dtype.NUMBER.columns("p_holm"),
+        **Dtype.WHOLE.columns("wish_scenarios"),
+        "wish_median_difference_m": ("wish_median_m", Dtype.NUMBER),
+        **Dtype.NUMBER.columns("wish_low_m", "wish_high_m"),
+        "wish_p_wilcoxon": ("wish_p", Dtype.NUMBER),
+        **Dtype.NUMBER.columns("wish_p_holm"),
     },
     "wordings": {
         **_WHO,
         **Dtype.WHOLE.columns("scenarios", "wordings"),
         **Dtype.NUMBER.columns("within_m"),
+        **Dtype.WHOLE.columns("wish_scenarios", "wish_wordings"),
+        **Dtype.NUMBER.columns("wish_within_m"),
     },
     "refusals": {
         **_WHO,

@@ -207,7 +207,9 @@ def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("job-tab", code=code, tab="displacement")
     answers = read_answers(job)
     parts = {part: analyse(answers) for part, analyse in ANALYSES.items()}
-    context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), **parts}
+    has_wishes = any(entry.wish for measured in answers.values() for entry in measured)
+    context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), "has_wishes": has_wishes}
+    context |= parts
     return render(request, "jobs/analyses.html", context)
 
 

@@ -16,6 +16,7 @@ from arena.shell.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services import retire
+from augment.services.benchmarks import Split, refuse_handed_out
 from augment.services.endpoints import ensure_builtin
 from augment.services.running import plan_reading
 from augment.services.scenarios import (
@@ -144,6 +145,7 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def set_intent(request: HttpRequest, code: uuid.UUID) -> None:
     """Accept the last reading, or take the intent of the file that came along."""
     scenario = get_object_or_404(Scenario, code=code)
+    refuse_handed_out(scenario.slug, [Split.PRACTICE])
     if "accept" in request.POST:
         accept_reading(scenario=scenario.slug, actor=get_user(request))
     else:

@@ -9,6 +9,7 @@ from augment.formats.documents import read_json
 from augment.models import IntentReading
 from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
+from augment.services.benchmarks import Split, refuse_handed_out
 from augment.services.running.intent_readings import read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.terminal import TerminalCommand
@@ -51,6 +52,7 @@ class Command(TerminalCommand):
                 f"it:\n  manage.py read_intent {slug} --accept"
             )
         else:
+            refuse_handed_out(slug, [Split.PRACTICE])
             if options["accept"]:
                 row = accept_reading(scenario=slug)
             else:

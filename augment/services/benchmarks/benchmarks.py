@@ -5,7 +5,7 @@ of them stays; rows that changed nevertheless no longer fit its checksum, and wh
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -218,6 +218,9 @@ def benchmark_set(row: Benchmark) -> BenchmarkSet:
     """
     items = row.items.select_related("scenario__base_scene", "scenario__paraphrase_of")
     benchmark = _make_set(row, items)
+    if checksum(benchmark) != row.checksum:  # it may be of the time when no intent was handed out
+        tasks = tuple(replace(task, intent=None) for task in benchmark.tasks)
+        benchmark = replace(benchmark, tasks=tasks)
     if checksum(benchmark) != row.checksum:
         raise Conflict(
             f"Scenarios of the benchmark {row} have changed since it was made, so that its "
@@ -248,16 +251,17 @@ def find_benchmark(name_or_code: str) -> Benchmark:
     return row
 
 
-def refuse_handed_out(scenario: Scenario) -> None:
-    """Do nothing for a scenario that no benchmark hands out.
+def refuse_handed_out(scenario: str, splits: Collection[Split] = tuple(Split)) -> None:
+    """Do nothing for a scenario, by its slug, that no benchmark hands out in one of these splits.
 
     Raises:
         Conflict: One that is not retired does.
     """
-    row = Benchmark.objects.filter(items__scenario=scenario, retired_at=None).first()
+    items = BenchmarkItem.objects.filter(scenario__slug=scenario, split__in=splits)
+    row = Benchmark.objects.filter(items__in=items, retired_at=None).first()
     if row is not None:
         raise Conflict(
-            f"“{scenario.slug}” is handed out in the benchmark {row} and stays as it is: "
+            f"“{scenario}” is handed out in the benchmark {row} and stays as it is: "
             "add another scenario with what you want to change, or retire the benchmark first."
         )
 
@@ -291,4 +295,5 @@ def _make_task(item: BenchmarkItem) -> BenchmarkTask:
         keeps_traffic=row.keep_traffic,
         paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,
         reference=load_standard(row),
+        intent=scenes.load_intent(row),
     )

@@ -14,6 +14,7 @@ from django.core.files.storage import default_storage
 from django.db import transaction
 
 from augment.benchmark.report import (
+    DISTANCES,
     count_statuses,
     report_from_document,
     report_to_document,
@@ -88,13 +89,14 @@ class Submissions(WorkKind[Submission]):
         with open_file(row) as path:
             report = check_submission(tasks, path, checksum=row.benchmark.checksum)
         document = make_document_storable(report_to_document(report))
-        practice = summarise_practice(report).box
         summary = {
             "card": document["card"],
             "entries": {status.value: n for status, n in count_statuses(report).items()},
             "total": len(report.entries),
-            "displacement_m": None if practice is None else practice.mean_m,
         }
+        for distance in DISTANCES:
+            practice = summarise_practice(report, distance).box
+            summary[f"{distance}_m"] = None if practice is None else practice.mean_m
         return Settlement(state=State.CHECKED, columns={"report": document, "summary": summary})
 
 

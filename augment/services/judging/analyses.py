@@ -5,8 +5,8 @@ Rows of tables are dicts. None is unknown or undefined, never zero.
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from statistics import fmean, median, stdev
 from typing import Any
 
@@ -39,6 +39,9 @@ SEED = 2026
 MISSES = (State.UNREADABLE, State.REFUSED)
 _ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, WISHES, DISTANCES, FINDINGS)
 _PAIRS = TypeAdapter(tuple[paired.PairedComparison, ...])
+_COMPARED = tuple(field.name for field in fields(paired.PairedComparison))[2:]
+_PREFIXES = {"displacement": "", "wish": "wish_"}
+"""Of keys of a row, by the distance that they are about."""
 _AT_ONCE = 50
 """So many rows are measured before they are stored."""
 
@@ -93,9 +96,9 @@ def repeatability(job: GenerationJob) -> list[Row]:
     """Return the variation between each contestant's samples, of rows that have an outcome.
 
     The displacement of a sample is the mean over its matched objects, over time where something
-    moves, as in all analyses; `within_m` is the pooled
-    standard deviation, within a scenario, of its mean displacement. `missed` is the share of
-    answers that were unreadable or refused.
+    moves, as in all analyses; `within_m` is the pooled standard deviation, within a scenario, of
+    its mean displacement. The distance to the wish is `wish_...`. `missed` is the share of answers
+    that were unreadable or refused.
     """
     by_contestant: dict[str, list[AugmentationLine]] = defaultdict(list)
     for line in _lines(job):
@@ -133,18 +136,21 @@ def read_answers(job: GenerationJob) -> Answers:
     return dict(sorted(answers.items()))
 
 
-def compare_pairs(answers: Answers) -> Sequence[paired.PairedComparison]:
+def compare_pairs(answers: Answers) -> list[Row]:
     """Compare all contestants with each other on the scenarios that both placed something in.
 
     A scenario's value is the median over its samples of the mean displacement of their matched
-    objects.
+    objects, and of their distance to the wish (`wish_...`); None where no scenario has both.
     """
-    values = {slug: _median_errors(measured) for slug, measured in answers.items()}
-
-    def compute() -> bytes:
-        return _PAIRS.dump_json(paired.compare_all(values, seed=SEED))
-
-    return _PAIRS.validate_json(compute_once("json", compute, digest_code(), values))
+    names = [f"{prefix}{name}" for prefix in _PREFIXES.values() for name in _COMPARED]
+    rows: defaultdict[tuple[str, str], Row] = defaultdict(lambda: dict.fromkeys(names))
+    for distance, prefix in _PREFIXES.items():
+        values = {slug: _median_errors(some, distance) for slug, some in answers.items()}
+        compute = partial(_compare, values)
+        for pair in _PAIRS.validate_json(compute_once("json", compute, digest_code(), values)):
+            numbers = {f"{prefix}{name}": getattr(pair, name) for name in _COMPARED}
+            rows[pair.first, pair.second] |= numbers
+    return [{"first": pair[0], "second": pair[1], **row} for pair, row in sorted(rows.items())]
 
 
 def measure_wordings(answers: Answers) -> list[Row]:
@@ -152,16 +158,16 @@ def measure_wordings(answers: Answers) -> list[Row]:
     lines = []
     for measured in answers.values():
         scenarios = {entry.row.scenario.slug: entry.row.scenario for entry in measured}
-        wishes: defaultdict[int, list[float]] = defaultdict(list)
-        for slug, value in _median_errors(measured).items():
-            wishes[scenarios[slug].paraphrase_of_id or scenarios[slug].pk].append(value)
-        several = [values for values in wishes.values() if len(values) > 1]
-        if several:
-            line = {
-                "scenarios": len(several),
-                "wordings": sum(map(len, several)),
-                "within_m": paired.within_sd(several),
-            }
+        line: Row = {}
+        for distance, prefix in _PREFIXES.items():
+            wishes: defaultdict[int, list[float]] = defaultdict(list)
+            for slug, value in _median_errors(measured, distance).items():
+                wishes[scenarios[slug].paraphrase_of_id or scenarios[slug].pk].append(value)
+            several = [values for values in wishes.values() if len(values) > 1]
+            line[f"{prefix}scenarios"] = len(several)
+            line[f"{prefix}wordings"] = sum(map(len, several))
+            line[f"{prefix}within_m"] = paired.within_sd(several)
+        if line["wordings"] or line["wish_wordings"]:
             lines.append(_who(measured[0].row) | line)
     return lines
 
@@ -216,12 +222,17 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
         )
 
 
-def _median_errors(measured: Sequence[MeasuredRow]) -> dict[str, float]:
-    """Return by scenario the median over samples of the mean displacement in metres."""
+def _compare(values: Mapping[str, Mapping[str, float]]) -> bytes:
+    return _PAIRS.dump_json(paired.compare_all(values, seed=SEED))
+
+
+def _median_errors(measured: Sequence[MeasuredRow], distance: str) -> dict[str, float]:
+    """Return by scenario the median over samples of the mean of a distance in metres."""
     samples: defaultdict[str, list[float]] = defaultdict(list)
     for entry in measured:
-        if entry.displacement is not None and entry.displacement.matches:
-            samples[entry.row.scenario.slug].append(fmean(entry.displacement.errors_m))
+        found = getattr(entry, distance)
+        if found is not None and found.matches:
+            samples[entry.row.scenario.slug].append(fmean(found.errors_m))
     return {slug: median(values) for slug, values in sorted(samples.items())}
 
 
@@ -232,21 +243,24 @@ def _who(row: Augmentation) -> Row:
 
 def _repeat_line(lines: Sequence[AugmentationLine]) -> Row:
     by_sample: dict[int, list[AugmentationLine]] = defaultdict(list)
-    by_scenario: dict[int, list[float]] = defaultdict(list)
     for line in lines:
         by_sample[line.row.sample].append(line)
-        if line.displacement is not None and line.displacement.mean_m is not None:
-            by_scenario[line.row.scenario_id].append(line.displacement.mean_m)
     samples = [by_sample[number] for number in sorted(by_sample)]
     missed = [fmean(line.row.state in MISSES for line in sample) for sample in samples]
-    return {
+    row = {
         **_who(lines[0].row),
         "samples": len(samples),
-        **_spread("displacement_m", [_distance_m(sample) for sample in samples]),
         **_spread("missed", missed),
         **_spread("usd", [_usd(sample) for sample in samples]),
-        "within_m": paired.within_sd(by_scenario.values()),
     }
+    for distance, prefix in _PREFIXES.items():
+        row |= _spread(f"{distance}_m", [_distance_m(sample, distance) for sample in samples])
+        by_scenario: defaultdict[int, list[float]] = defaultdict(list)
+        for line in lines:
+            if (found := getattr(line, distance)) is not None and found.matches:
+                by_scenario[line.row.scenario_id].append(found.mean_m)
+        row[f"{prefix}within_m"] = paired.within_sd(by_scenario.values())
+    return row
 
 
 def _spread(name: str, values: Sequence[float | None]) -> Row:
@@ -261,9 +275,9 @@ def _spread(name: str, values: Sequence[float | None]) -> Row:
     return {f"{name}_mean": fmean(present), f"{name}_sd": sd, f"{name}_values": tuple(present)}
 
 
-def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:
-    measured = [line.displacement.errors_m for line in lines if line.displacement is not None]
-    errors_m = list(chain.from_iterable(measured))
+def _distance_m(lines: Sequence[AugmentationLine], distance: str) -> float | None:
+    measured = (getattr(line, distance) for line in lines)
+    errors_m = [error for found in measured if found is not None for error in found.errors_m]
     return fmean(errors_m) if errors_m else None
 
 
