@@ -95,16 +95,7 @@ class ReplyUnreadable(AugmentError):
 
 
 class ToolError(AugmentError):
-    """A model called a tool in a way that has no answer. Give it the sentence; it may call again.
-
-    Args:
-        tool: The name of the tool.
-        problem: What is wrong, and what would be right.
-    """
-
-    def __init__(self, tool: str, problem: str) -> None:
-        self.problem = problem
-        super().__init__(f"{tool}: {problem}")
+    """A tool was called in a way that has no answer; the model gets the sentence, to try again."""
 
 
 class ModelFault(AugmentError):

@@ -255,15 +255,19 @@ def _with(right: Modification, agents: Agents) -> Modification:
 
 
 def _shift(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.0) -> Agents:
-    """Move everybody along and across the lane ahead, turned as it turns."""
-    moved = []
-    for agent in agents:
-        place = route.locate_agent(agent)
-        ahead_m = place.ahead_m + along_m
-        turn = route.heading_at(ahead_m) - place.tangent_rad
-        x_m, y_m = route.position(ahead_m, place.left_m + left_m)
-        moved.append(move_to(agent, x_m, y_m, wrap(agent.heading_rad + turn)))
-    return tuple(moved)
+    """Move everybody along and across the lane ahead."""
+    return tuple(shift_agent(agent, route, along_m, left_m) for agent in agents)
+
+
+def shift_agent(
+    agent: TrafficAgent, route: EgoRoute, along_m: float, left_m: float = 0.0
+) -> TrafficAgent:
+    """Move the agent along and across the lane ahead, turned as it turns."""
+    place = route.locate_agent(agent)
+    ahead_m = place.ahead_m + along_m
+    turn = route.heading_at(ahead_m) - place.tangent_rad
+    x_m, y_m = route.position(ahead_m, place.left_m + left_m)
+    return move_to(agent, x_m, y_m, wrap(agent.heading_rad + turn))
 
 
 def move_to(

@@ -23,6 +23,7 @@ from augment.scene.planned_motion import PlannedMotion
 from augment.variants.respondents import ModelRole
 
 _MOTION = TypeAdapter(PlannedMotion)
+_NUMBERS = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
 
 KnownTasks = Callable[[str], Sequence[tuple[Scene, Intent]]]
 """Scenes that an instruction is put to, each with what it asks for, looked up by its text."""
@@ -135,25 +136,17 @@ def read_changed_agents(prompt: str) -> list[TrafficAgent]:
     vectors: dict[str, list[Any]] = {}
     for title in ("\nAdded agents:\n", "\nMoved agents:\n"):
         vectors |= json.JSONDecoder().raw_decode(prompt, prompt.index(title) + len(title))[0]
-    return [
-        TrafficAgent(
-            id=name,
-            type=AgentType(kind),
-            x_m=float(x_m),
-            y_m=float(y_m),
-            heading_rad=float(heading_rad),
-            width_m=float(width_m),
-            length_m=float(length_m),
-            speed_mps=float(speed_mps),
-            lane_id=lane,
-            motion=_MOTION.validate_python(last[0])
-            if last and isinstance(last[0], dict)
-            else None,
+    changed = []
+    for name, (kind, *values) in vectors.items():
+        numbers, (lane, *last) = (
+            dict(zip(_NUMBERS, map(float, values[:6]), strict=True)),
+            values[6:],
         )
-        for name, (kind, x_m, y_m, heading_rad, width_m, length_m, speed_mps, lane, *last) in (
-            vectors.items()
-        )
-    ]
+        moves = last and isinstance(last[0], dict)
+        motion = _MOTION.validate_python(last[0]) if moves else None
+        made = {"id": name, "type": AgentType(kind), "lane_id": lane, "motion": motion}
+        changed.append(TrafficAgent(**made, **numbers))
+    return changed
 
 
 # Private

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from augment.llm.costs import least_tokens
+from augment.prompts.blocks import Strict
 
 Calls = tuple[tuple[str, str], ...]
 """Calls of functions: name and arguments as written."""
@@ -24,25 +25,21 @@ class BadRequest(Exception):
     """The request breaks the wire's rules; the text says where."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
-
-
-class _Text(_Strict):
+class _Text(Strict):
     type: Literal["text"]
     text: str
 
 
-class _Url(_Strict):
+class _Url(Strict):
     url: Annotated[str, Field(pattern=f"^{_PNG_URL}")]
 
 
-class _Picture(_Strict):
+class _Picture(Strict):
     type: Literal["image_url"]
     image_url: _Url
 
 
-class SpokenMessage(_Strict):
+class SpokenMessage(Strict):
     """One turn of the conversation."""
 
     role: Literal["system", "developer", "user", "assistant", "tool"]
@@ -65,23 +62,23 @@ class SpokenMessage(_Strict):
         return [base64.b64decode(url.removeprefix(_PNG_URL)) for url in urls]
 
 
-class _Named(_Strict):
+class _Named(Strict):
     name: Annotated[str, Field(min_length=1)]
     strict: Literal[True]
     schema_: Annotated[dict[str, Any], Field(alias="schema")]
 
 
-class _NamedSchema(_Strict):
+class _NamedSchema(Strict):
     type: Literal["json_schema"]
     json_schema: _Named
 
 
-class _ObjectSchema(_Strict):
+class _ObjectSchema(Strict):
     type: Literal["json_object"]
     schema_: Annotated[dict[str, Any], Field(alias="schema")]
 
 
-class ChatRequest(_Strict):
+class ChatRequest(Strict):
     """The body of a POST to /v1/chat/completions."""
 
     model: Annotated[str, Field(min_length=1)]

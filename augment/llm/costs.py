@@ -7,7 +7,7 @@ token) and every sum is rounded up, so that counting never falls short of the bi
 import json
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from decimal import Decimal
 
 from augment.errors import ContextTruncated
@@ -68,13 +68,7 @@ class WorstCase:
 
     def nano_usd(self, price: Price | None) -> int | None:
         """Return the cost in nano-dollars, None if the price is unknown."""
-        if price is None:
-            return None
-        return price.nano_usd(
-            prompt_tokens=self.prompt_tokens,
-            completion_tokens=self.completion_tokens,
-            cached_tokens=self.cached_tokens,
-        )
+        return None if price is None else price.nano_usd(**asdict(self))
 
 
 def worst_case(request: Request) -> WorstCase:

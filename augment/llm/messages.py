@@ -7,7 +7,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -138,12 +138,7 @@ class Tool:
 
     def to_document(self) -> dict[str, object]:
         """The tool in the form of the OpenAI-compatible wire."""
-        function = {
-            "name": self.name,
-            "description": self.description,
-            "parameters": self.parameters,
-        }
-        return {"type": "function", "function": function}
+        return {"type": "function", "function": asdict(self)}
 
 
 class ToolChoice(StrEnum):
@@ -273,14 +268,6 @@ def request_hash(
 
 
 def shorten(text: str, most: int) -> str:
-    """The text, or its beginning with a mark of how long it was: at most `most` characters.
-
-    Raises:
-        ValueError: There is no room for the mark.
-    """
-    if len(text) <= most:
-        return text
+    """The text, or its beginning with a mark of how long it was: at most `most` characters."""
     mark = f"… [cut: {len(text)} characters]"
-    if len(mark) >= most:
-        raise ValueError(f"{most} characters leave no room for {mark!r}")
-    return text[: most - len(mark)] + mark
+    return text if len(text) <= most else text[: most - len(mark)] + mark

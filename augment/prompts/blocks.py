@@ -40,7 +40,7 @@ _Loaded = TypeVar("_Loaded")
 
 
 class Strict(BaseModel):
-    """The root of what is read from answers: nothing is converted, nothing unknown let through."""
+    """The root of what is read strictly: nothing is converted, nothing unknown let through."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 

@@ -287,24 +287,23 @@ def scene_vectors(
         short = names.lanes[lane.id]
         facts: Vector
         if isinstance(lane, entities.Lane):
-            heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
+            kind, heading_rad = "Lanes", line.heading_at(line.project(0.0, 0.0).s_m)
             facts = [_parse_number(short), compass(heading_rad), _relative(heading_rad)]
         else:
+            kind = "Lane connectors"
             ends = (names.lanes.get(end or "") for end in (lane.from_lane, lane.to_lane))
             facts = [*ends, lane.traffic_light.value, lane.turn_type.value]
         limit_mps = None if lane.speed_limit_mps is None else _metres(lane.speed_limit_mps)
+        coordinates: object = _points(line.resample(SPACING_M).points_m)
         if lanes is LaneFormat.BEZIER:
-            coordinates: object = control_points(bezier_lane(line))
-        else:
-            coordinates = _points(line.resample(SPACING_M).points_m)
-        kind = "Lanes" if isinstance(lane, entities.Lane) else "Lane connectors"
+            coordinates = control_points(bezier_lane(line))
         road[kind][short] = [*facts, _metres(lane.width_m), limit_mps, coordinates]
     extent = find_extent(scene, radius_m)
-    areas: dict[str, Vector] = {}
-    for area in scene.areas:
-        boundary = boundary_near(area, extent, _BOUNDARY_TOLERANCE_M)
-        if len(boundary):
-            areas[names.areas[area.id]] = [area.kind.value, _points(boundary)]
+    areas: dict[str, Vector] = {
+        names.areas[area.id]: [area.kind.value, _points(boundary)]
+        for area in scene.areas
+        if len(boundary := boundary_near(area, extent, _BOUNDARY_TOLERANCE_M))
+    }
     shown = list_agents(scene, radius_m)
     agents = {names.agents[agent.id]: _agent_vector(agent, names) for agent in shown}
     return {"Agents": agents, **road, "Areas": areas}

@@ -10,9 +10,9 @@ from augment.prompts.reply import JudgeAnswer, read_judge
 from augment.variants.respondents import (
     ModelRole,
     RespondentClient,
-    Respondents,
     Sampling,
     Transcript,
+    ask_alone,
 )
 
 JUDGE_TOKENS = 4096
@@ -66,16 +66,16 @@ def ask_judge(
         ModelFault: The wire broke for good.
         BudgetSpent: The transcript's budget has no room for the call.
     """
-    respondents = Respondents(
-        clients={ModelRole.MODIFIER: RespondentClient(client=client, model=model)},
+    return ask_alone(
+        RespondentClient(client=client, model=model),
+        ModelRole.JUDGE,
+        judge_messages(question, instruction, pictures),
+        read_judge,
         transcript=transcript,
         sampling=Sampling(temperature=0.0),
         max_tokens=JUDGE_TOKENS,
         re_asks=0,
     )
-    messages = judge_messages(question, instruction, pictures)
-    answer, _, _ = respondents.read(ModelRole.JUDGE, messages, read_judge)
-    return answer
 
 
 def most_nano_usd(instruction: str, price: Price) -> int:

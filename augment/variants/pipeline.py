@@ -39,8 +39,9 @@ from augment.variants.respondents import (
     Respondents,
     Sampling,
     Transcript,
+    ask_alone,
 )
-from augment.variants.retrieval import RetrievalTool
+from augment.variants.retrieval import LaneTool, RetrievalTool
 from augment.variants.reviews import BlockForm, Limits, ReviewedAnswer, Verdict
 
 LEFT_ALONE = "The modifier left the scene as it is and did not say why."
@@ -48,10 +49,7 @@ READER_TOKENS = 4096
 """The length limit of an intent reader's answer."""
 
 _LONGEST_NOTED = 500
-_TOOLS: dict[Tools, type[RetrievalTool] | type[PoseTool]] = {
-    Tools.RETRIEVE: RetrievalTool,
-    Tools.POSE_ON_LANE: PoseTool,
-}
+_TOOLS: dict[Tools, type[LaneTool]] = {Tools.RETRIEVE: RetrievalTool, Tools.POSE_ON_LANE: PoseTool}
 
 
 class OutcomeStatus(StrEnum):
@@ -146,14 +144,14 @@ def ask_for_intent(
         ModelFault: The wire broke for good.
         BudgetSpent: The transcript's budget has no room for the next call.
     """
-    respondents = Respondents(
-        clients={ModelRole.MODIFIER: RespondentClient(client=client, model=model)},
+    return ask_alone(
+        RespondentClient(client=client, model=model),
+        ModelRole.READER,
+        fill.reader_messages(instruction),
+        read_intent,
         transcript=transcript,
         max_tokens=READER_TOKENS,
     )
-    messages = fill.reader_messages(instruction)
-    intent, _, _ = respondents.read(ModelRole.READER, messages, read_intent)
-    return intent
 
 
 def modifier_form(recipe: Recipe, *, native_tools: bool = False) -> Form:
@@ -364,7 +362,7 @@ class _ToolDesk:
     """
 
     name: Tools
-    tool: PoseTool | RetrievalTool
+    tool: LaneTool
     limits: Limits
     transcript: Transcript
     is_over: bool = False

@@ -13,7 +13,7 @@ Frame: ego frame; s along the shown part of a lane, from where it begins.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import MISSING, asdict, dataclass, fields
 from functools import cached_property
 from typing import Annotated, Any
@@ -26,24 +26,20 @@ from augment.checks import Ground
 from augment.errors import InvalidModification, ToolError
 from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts import vectors
-from augment.prompts.calls import Tools
-from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
+from augment.prompts.blocks import Strict
+from augment.prompts.vectors import LaneCurve
 from augment.scene.density import usual_size_m
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.scene.motion import LENGTH_S, Motion, Movement
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
-from augment.scene.schema import list_problems
 from augment.simulation.expected import expect_recording
+from augment.variants.retrieval import OBJECT_TYPES, Along, LaneTool, list_known
 
-TOOL = Tools.POSE_ON_LANE
 LANE_START = "lane"
-FURTHEST_M, WIDEST_M = 1000.0, 30.0
+WIDEST_M = 30.0
 MOST_PLACES = 16
-OBJECT_TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 
-# Control points this near to those of a piece are that piece: the prompt rounds to 0.01 m.
-COPIED_WITHIN_M = 0.05
 # How far an agent may be past an end of a lane and still count as beside it.
 BESIDE_WITHIN_M = 1.0
 FURTHEST_EDGE_M = 30.0
@@ -55,11 +51,9 @@ _OF_A_PLACE = frozenset({"distance_m", "lateral_m", "x_m", "y_m", "heading_rad",
 _ROUNDING_M = 0.005
 _TOUCH_M = 0.01
 _SEARCHED_M, _STEP_M = 50.0, 0.5
-_MOST_LISTED = 80
 
 _Several = (pydantic.BeforeValidator(lambda value: value if isinstance(value, list) else [value]),)
 _Many = Field(min_length=1, max_length=MOST_PLACES)
-_Along = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
 _Aside = Annotated[float, Field(ge=-WIDEST_M, le=WIDEST_M)]
 _Seconds = Annotated[float, Field(ge=0.0, le=LENGTH_S)]
 _Kind = Annotated[
@@ -67,24 +61,17 @@ _Kind = Annotated[
 ]
 
 
-class _Call(pydantic.BaseModel):
+class _Call(Strict):
     """The arguments of a call; one value counts as a list of it."""
-
-    model_config = pydantic.ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
     lane: Any
     start: str
-    distance_m: Annotated[list[_Along], *_Several, _Many]
+    distance_m: Annotated[list[Along], *_Several, _Many]
     lateral_m: Annotated[list[_Aside | None], *_Several, _Many] = [None]
     object: Annotated[list[_Kind], *_Several, _Many] = [AgentType.VEHICLE]
     speed_mps: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
     motion: PlannedMotion | None = None
     after_s: Annotated[list[_Seconds], *_Several, Field(max_length=MOST_PLACES)] = []
-
-
-_CONTROL = pydantic.TypeAdapter(
-    list[tuple[_Along, _Along]], config=pydantic.ConfigDict(allow_inf_nan=False)
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,12 +123,8 @@ class PoseOnLane:
         return document
 
 
-@dataclass(frozen=True, eq=False)
-class PoseTool:
-    """The tool for one scene: make it once, call it often. Pure: no call changes it."""
-
-    scene: Scene
-    radius_m: float = DEFAULT_RADIUS_M
+class PoseTool(LaneTool):
+    """Our function for one scene."""
 
     def pose_on_lane(
         self,
@@ -200,21 +183,18 @@ class PoseTool:
             **self._side(centre, "right", -math.pi / 2.0),
         )
 
-    def answer(self, arguments: object) -> dict[str, object]:
-        """Return the answer to the model, ready for JSON.
+    def answer_call(self, arguments: object) -> dict[str, object]:
+        """Return a pose, or {"poses": one entry a place} where several distances were asked for.
 
-        A pose; {"poses": one entry a place} where several distances were asked for, with what is
-        the same at all of them beside it; or {"error": a sentence}, where nothing can be read,
-        and at each place that can't be.
+        What is the same at all of them stands beside it; at each place that has no answer stands
+        {"error": a sentence}.
         """
-        try:
-            call = _Call.model_validate(arguments)
-        except pydantic.ValidationError as fault:
-            return {"error": "; ".join(f"{place}: {text}" for place, text in list_problems(fault))}
+        call = _Call.model_validate(arguments)
         lists: list[list[Any]] = [call.distance_m, call.lateral_m, call.object]
         count = max(map(len, lists))
         if any(len(values) not in (1, count) for values in lists):
-            return {"error": "make the lists equally long, or give one value for all places"}
+            text = "make the lists equally long, or give one value for all places"
+            raise ToolError(text)
         # What is no list goes with each of the others.
         places = list(zip(*(values * (count // len(values)) for values in lists), strict=True))
         answers = [self._answer_at(call, *place) for place in places]
@@ -235,22 +215,6 @@ class PoseTool:
         return {"poses": own, **shared}
 
     @cached_property
-    def curves(self) -> dict[str, LaneCurve]:
-        """The shown lanes and connectors by short id."""
-        names = vectors.short_names(self._shown)
-        return vectors.lane_curves(self._shown, names, self.radius_m)
-
-    @cached_property
-    def agents(self) -> dict[str, TrafficAgent]:
-        """The shown agents by short id."""
-        return {agent.id: agent for agent in vectors.list_agents(self._shown, self.radius_m)}
-
-    @cached_property
-    def _shown(self) -> Scene:
-        """The scene in the ids that models read and write."""
-        return vectors.with_short_ids(self.scene, vectors.short_names(self.scene))
-
-    @cached_property
     def _ground(self) -> Ground:
         return Ground.of(self._shown, expect_recording)
 
@@ -267,7 +231,7 @@ class PoseTool:
             place = self.pose_on_lane(call.lane, call.start, distance_m, lateral_m, object_type)
             later = self._later(call, place, object_type) if call.motion or call.after_s else {}
         except ToolError as fault:
-            return {"error": fault.problem}
+            return {"error": str(fault)}
         return place.to_document() | later
 
     def _later(self, call: _Call, place: PoseOnLane, object_type: AgentType) -> dict[str, object]:
@@ -291,7 +255,7 @@ class PoseTool:
         try:
             check_motions(self._shown, change)
         except InvalidModification as fault:
-            raise ToolError(TOOL, str(fault)) from None
+            raise ToolError(str(fault)) from None
         motion = self._ground.motion_after(change, of_all=False)
         moved = motion.others[-1]
         later: dict[str, object] = {"later": [self._at(s, moved, motion) for s in call.after_s]}
@@ -320,39 +284,13 @@ class PoseTool:
             "ahead_m": _round(ahead_m),
         }
 
-    def find_line(self, lane: object) -> tuple[LaneCurve, float]:
-        """Return the line that a call follows, and its start on it.
-
-        Raises:
-            ToolError: Nobody knows it.
-        """
-        if isinstance(lane, str) and lane in self.curves:
-            return self.curves[lane], 0.0
-        control = None
-        try:
-            control = (
-                None
-                if isinstance(lane, str)
-                else vectors.curve_from(_CONTROL.validate_python(lane))
-            )
-        except ValueError:
-            raise ToolError(TOOL, "lane must be an id, or the control points of a piece") from None
-        for curve in self.curves.values():
-            for name, piece in zip(curve.pieces, curve.lane, strict=True):
-                if name == lane or (
-                    control is not None
-                    and np.abs(piece.curve.control_m - control.control_m).max() <= COPIED_WITHIN_M
-                ):
-                    return curve, piece.start_m
-        raise ToolError(TOOL, _unknown("lane", lane, self.curves))
-
     def _start(self, curve: LaneCurve, begins_m: float, start: str) -> tuple[float, float | None]:
         """Return where the distance starts, and how far left of the lane the agent there is."""
         if start == LANE_START:
             return begins_m, None
         if start not in self.agents:
-            problem = _unknown("agent", start, self.agents)
-            raise ToolError(TOOL, f'{problem} Or start at "{LANE_START}", its beginning.')
+            problem = list_known("agent", start, self.agents)
+            raise ToolError(f'{problem} Or start at "{LANE_START}", its beginning.')
         agent = self.agents[start]
         place = curve.project(agent.x_m, agent.y_m)
         is_before = place.s_m <= 1e-3
@@ -365,9 +303,8 @@ class PoseTool:
         is_shown = agent.lane_id in self.curves
         advice = f'call with lane "{agent.lane_id}"' if is_shown else "name a lane beside it"
         raise ToolError(
-            TOOL,
             f"{start} is not beside this lane, it is {past_m:.1f} m {where} of it. To start from "
-            f'{start}, {advice}; to start from the beginning of this lane, use "{LANE_START}".',
+            f'{start}, {advice}; to start from the beginning of this lane, use "{LANE_START}".'
         )
 
     def _walk(
@@ -465,16 +402,9 @@ def _refuse_past_end(
         return
     path = " -> ".join(curve.id for curve in passed)
     raise ToolError(
-        TOOL,
         f"the lanes that are shown {side} {over_m:.2f} m short of that ({path}): from this start "
-        f"distance_m can be {_round(possible_m):.2f} at {bound}",
+        f"distance_m can be {_round(possible_m):.2f} at {bound}"
     )
-
-
-def _unknown(kind: str, name: object, choices: Iterable[str]) -> str:
-    """Say that there is no such one, and which there are."""
-    listed = ", ".join([*choices][:_MOST_LISTED])
-    return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."
 
 
 def _round_angle(angle_rad: float) -> float:

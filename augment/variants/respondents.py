@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from augment import errors
 from augment.errors import ModelFault, ModelRefused
@@ -264,3 +264,20 @@ class Respondents:
                 if cut is not None:
                     raise cut
                 return reply
+
+
+def ask_alone(
+    who: RespondentClient,
+    role: ModelRole,
+    messages: Messages,
+    reader: Callable[[str], _Read],
+    **settings: Any,
+) -> _Read:
+    """Return what the answer of a model says that plays the only role; `Respondents` has settings.
+
+    Raises:
+        errors.ReplyUnreadable, ModelRefused, ModelFault: As `Respondents.read`.
+    """
+    respondents = Respondents(clients={ModelRole.MODIFIER: who}, **settings)
+    answer, _, _ = respondents.read(role, messages, reader)
+    return answer

@@ -3,44 +3,118 @@
 As the paper's project page draws it: `retrieve_suitable_pose(lane, agent, dist)` returns
 [x, y, heading] and tells nothing else. An offset from the lane is the model's to add.
 
+`LaneTool` is what it shares with ours (pose_tool.py).
+
 Frame: ego frame; dist along the lane from where it begins.
 """
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
 
+import numpy as np
 import pydantic
 from pydantic import Field
 
 from augment.errors import ToolError
 from augment.geometry.frames import Pose
-from augment.prompts.calls import Tools
-from augment.prompts.vectors import DEFAULT_RADIUS_M
-from augment.scene.entities import Scene
+from augment.prompts import vectors
+from augment.prompts.blocks import Strict
+from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
+from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.schema import list_problems
-from augment.variants.pose_tool import FURTHEST_M, OBJECT_TYPES, PoseTool
 
-TOOL = Tools.RETRIEVE
+FURTHEST_M = 1000.0
+OBJECT_TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
+
+# Control points this near to those of a piece are that piece: the prompt rounds to 0.01 m.
+COPIED_WITHIN_M = 0.05
 
 # Ends of lanes are shown to the centimetre, so a model's length may be this much too long.
 _ROUNDING_M = 0.02
+_MOST_LISTED = 80
+
+Along = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
+_CONTROL = pydantic.TypeAdapter(
+    list[tuple[Along, Along]], config=pydantic.ConfigDict(allow_inf_nan=False)
+)
 
 
-class _Call(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+@dataclass(frozen=True, eq=False)
+class LaneTool(ABC):
+    """A function about the lanes of one scene: make it once, call it often; no call changes it."""
 
+    scene: Scene
+    radius_m: float = DEFAULT_RADIUS_M
+
+    @abstractmethod
+    def answer_call(self, arguments: object) -> object:
+        """Return the answer to a call, ready for JSON.
+
+        Raises:
+            ToolError, pydantic.ValidationError: It has none.
+        """
+
+    def answer(self, arguments: object) -> Any:
+        """Return the answer to the model, ready for JSON, or {"error": a sentence}."""
+        try:
+            return self.answer_call(arguments)
+        except pydantic.ValidationError as fault:
+            return {"error": "; ".join(f"{place}: {text}" for place, text in list_problems(fault))}
+        except ToolError as fault:
+            return {"error": str(fault)}
+
+    def find_line(self, lane: object) -> tuple[LaneCurve, float]:
+        """Return the line that a call follows, and its start on it.
+
+        Raises:
+            ToolError: Nobody knows it.
+        """
+        if isinstance(lane, str) and lane in self.curves:
+            return self.curves[lane], 0.0
+        control = None
+        if not isinstance(lane, str):
+            try:
+                control = vectors.curve_from(_CONTROL.validate_python(lane))
+            except ValueError:
+                text = "lane must be an id, or the control points of a piece"
+                raise ToolError(text) from None
+        for curve in self.curves.values():
+            for name, piece in zip(curve.pieces, curve.lane, strict=True):
+                if name == lane or (
+                    control is not None
+                    and np.abs(piece.curve.control_m - control.control_m).max() <= COPIED_WITHIN_M
+                ):
+                    return curve, piece.start_m
+        raise ToolError(list_known("lane", lane, self.curves))
+
+    @cached_property
+    def curves(self) -> dict[str, LaneCurve]:
+        """The shown lanes and connectors by short id."""
+        names = vectors.short_names(self._shown)
+        return vectors.lane_curves(self._shown, names, self.radius_m)
+
+    @cached_property
+    def agents(self) -> dict[str, TrafficAgent]:
+        """The shown agents by short id."""
+        return {agent.id: agent for agent in vectors.list_agents(self._shown, self.radius_m)}
+
+    @cached_property
+    def _shown(self) -> Scene:
+        """The scene in the ids that models read and write."""
+        return vectors.with_short_ids(self.scene, vectors.short_names(self.scene))
+
+
+class _Call(Strict):
     lane: Any
     agent: Annotated[str, Field(pattern=f"^({'|'.join(OBJECT_TYPES)})$")]
     dist: Annotated[float, Field(ge=0.0, le=FURTHEST_M)]
 
 
-@dataclass(frozen=True, eq=False)
-class RetrievalTool:
-    """The paper's function for one scene. Pure: no call changes it."""
-
-    scene: Scene
-    radius_m: float = DEFAULT_RADIUS_M
+class RetrievalTool(LaneTool):
+    """The paper's function for one scene."""
 
     def retrieve_suitable_pose(self, lane: object, dist_m: float) -> Pose:
         """Return the pose on a lane's centreline; it is the same for agents of every type.
@@ -52,28 +126,24 @@ class RetrievalTool:
         Raises:
             ToolError: Nobody knows the lane, or it ends before the distance does.
         """
-        curve, begins_m = self._lanes.find_line(lane)
+        curve, begins_m = self.find_line(lane)
         length_m = curve.length_m - begins_m
         if dist_m > length_m + _ROUNDING_M:
-            raise ToolError(TOOL, f"this lane ends after {length_m:.2f}: dist is 0 to that")
+            raise ToolError(f"this lane ends after {length_m:.2f}: dist is 0 to that")
         return curve.pose_at(begins_m + min(dist_m, length_m))
 
-    def answer(self, arguments: object) -> list[float] | dict[str, object]:
-        """Return [x, y, heading] as the prompt rounds, or {"error": a sentence}."""
-        try:
-            call = _Call.model_validate(arguments)
-            pose = self.retrieve_suitable_pose(call.lane, call.dist)
-        except pydantic.ValidationError as fault:
-            return {"error": "; ".join(f"{place}: {text}" for place, text in list_problems(fault))}
-        except ToolError as fault:
-            return {"error": fault.problem}
+    def answer_call(self, arguments: object) -> list[float]:
+        """Return [x, y, heading] as the prompt rounds."""
+        call = _Call.model_validate(arguments)
+        pose = self.retrieve_suitable_pose(call.lane, call.dist)
         # 0.0 is added since JSON would tell minus zero.
         return [
             round(value, digits) + 0.0
             for value, digits in ((pose.x_m, 2), (pose.y_m, 2), (pose.heading_rad, 3))
         ]
 
-    @cached_property
-    def _lanes(self) -> PoseTool:
-        """The shown lanes, under the ids and control points of the prompt."""
-        return PoseTool(self.scene, self.radius_m)
+
+def list_known(kind: str, name: object, choices: Iterable[str]) -> str:
+    """Say that there is no such one, and which there are."""
+    listed = ", ".join([*choices][:_MOST_LISTED])
+    return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."

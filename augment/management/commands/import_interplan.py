@@ -6,7 +6,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.services.scenarios.interplan import StepKind, import_interplan
 from augment.services.terminal import TerminalCommand
 
@@ -31,13 +30,10 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Import one by one, and say each."""
         counts: Counter[StepKind] = Counter()
-        try:
-            for step in import_interplan(folder=options["folder"], data=options["nuplan"]):
-                counts[step.kind] += 1
-                self.stdout.write(step.text)
-                self.stdout.flush()
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        for step in import_interplan(folder=options["folder"], data=options["nuplan"]):
+            counts[step.kind] += 1
+            self.stdout.write(step.text)
+            self.stdout.flush()
         new, old = counts[StepKind.NEW], counts[StepKind.OLD]
         skipped = f"{counts[StepKind.SKIPPED]} skipped"
         summary = f"{new} scenarios imported, {old} were there already, {skipped}."
