@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.report import ROOT, load, table, write_block
+from tests.processes import environment_of
 
 SCENARIOS, DRIVES, PORT = 50, 20, 9154
 
@@ -30,12 +31,7 @@ def main() -> None:
     before = load()
     with tempfile.TemporaryDirectory(prefix="arena-bench-") as name:
         folder = Path(name)
-        os.environ |= {
-            "DJANGO_SETTINGS_MODULE": "arena.config.settings",
-            "DATABASE_URL": f"sqlite:///{folder}/db.sqlite3",
-            "ARENA_VAR_DIR": str(folder / "var"),
-            "ARENA_MEDIA_DIR": str(folder / "media"),
-        }
+        os.environ |= environment_of(folder) | {"DJANGO_SETTINGS_MODULE": "arena.config.settings"}
         subprocess.run([sys.executable, "manage.py", "prepare"], cwd=ROOT, check=True)
         rows = measure(folder)
     head = ["per core and hour", "done", "rows", "stored GB", "processor s each", "memory"]

@@ -1,7 +1,7 @@
 """The displacement error of the built-in contestants: `python -m bench.displacement`.
 
 Over the whole catalogue, with the seeds that jobs use, without a database. What a contestant
-refuses is missing; the last table counts only the objects of scenarios that all of them place.
+refuses is missing.
 """
 
 import hashlib
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from augment.baselines.registry import PLACERS, PlaceIntent
 from augment.errors import CannotPlace
 from augment.metrics.displacement import Displacement, displacement, summarise
-from augment.scene.entities import Modification, ScenarioType
+from augment.scene.entities import Modification
 from bench.report import table
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
@@ -59,21 +59,5 @@ def displacement_table(
     return table([*head, "mean (m)"], rows)
 
 
-def report() -> str:
-    """The tables over all scenarios, each type, and what all contestants place."""
-    made_by = placed_by_each()
-    parts = {"All": list(SLUGS)}
-    parts |= {
-        kind.value: [slug for slug in SLUGS if entry(slug).type is kind] for kind in ScenarioType
-    }
-    parts["What all of them place"] = [
-        slug for slug in SLUGS if all(found[slug] for found in made_by.values())
-    ]
-    return "\n\n".join(
-        f"{title}, {len(slugs)} scenarios\n\n{displacement_table(slugs, made_by)}"
-        for title, slugs in parts.items()
-    )
-
-
 if __name__ == "__main__":
-    print(report())
+    print(displacement_table(SLUGS, placed_by_each()))

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from augment.checks.finding import FaultClass
-from augment.fake_llm.careless import move_to
+from augment.fake_llm import careless
 from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
@@ -116,12 +116,8 @@ def neighbour_lane(route: EgoRoute, agents: Agents, rng: random.Random) -> Agent
 
 def straight_line(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None:
     """The distance laid out straight ahead of the ego instead of along its lane."""
-
-    def laid_out(agent: TrafficAgent) -> TrafficAgent:
-        place = route.locate_agent(agent)
-        return name_lane(route, move_to(agent, place.ahead_m, place.left_m))
-
-    made = change_each(agents, laid_out)
+    laid_out = careless.straight_line(agents, route, rng)
+    made = change_each(laid_out, lambda agent: name_lane(route, agent))
     off_m = [_seen_m(route, was, one) for one, was in zip(made, agents, strict=True)]
     return made if min(off_m) >= SEEN_M else None
 

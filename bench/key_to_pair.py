@@ -11,7 +11,7 @@ same presses (Event Timing, in steps of 8 ms), which includes decoding and drawi
 import argparse
 import statistics
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from playwright.sync_api import Browser, CDPSession, Page
@@ -53,26 +53,67 @@ new PerformanceObserver((list) => {
 HEADING = "From the key to the next pair"
 
 
-def main(votes: int, is_written: bool) -> None:
+def main() -> None:
     """Measure, print the table, and write it into docs/benchmarks.md where that is asked for."""
-    before, rows = load(), []
+    head = ["presses", "visible, ms: median", "p95", "max", "painted: median", "p95"]
+    measure_latencies("key_to_pair", HEADING, head, VOTES, _vote, sets=[CatalogueSet.PAPER])
+
+
+Measure = Callable[[Page, CDPSession, int], list[str]]
+"""Vote so many times on a page over a wire; return the cells of a row."""
+
+
+def measure_latencies(
+    module: str,
+    heading: str,
+    head: list[str],
+    votes: int,
+    measure: Measure,
+    *,
+    sets: Sequence[CatalogueSet],
+    script: str = "",
+) -> None:
+    """Serve the demo, let an expert vote at each latency, and print a row of each.
+
+    Args:
+        module: Of this package, for the sentence above the table.
+        heading: Of the section of docs/benchmarks.md.
+        head: Of the columns after the latency.
+        votes: So many, where the command line does not say.
+        measure: Makes a row.
+        sets: Whose scenarios the study shows.
+        script: Python that changes the demo's rows before.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("votes", type=int, nargs="?", default=votes)
+    parser.add_argument("--write", action="store_true", help="into docs/benchmarks.md")
+    asked, before, rows = parser.parse_args(), load(), []
+    names = {latency: f"expert-{latency}" for latency in LATENCIES_MS}
     with tempfile.TemporaryDirectory(prefix="arena-keys-") as folder:
         home = Home.at(Path(folder))
         home.must(*SMALL_DEMO)
-        prepare(home, votes, sets=[CatalogueSet.PAPER])
+        if script:
+            home.must("shell", "-c", script)
+        open_study(home, names.values(), asked.votes + 1, sets=sets)
         with home.serving() as address, chromium() as browser:
-            for latency in LATENCIES_MS:
-                rows.append(_row(latency, *_vote(browser, address, latency, votes)))
-    head = ["latency", "presses", "visible, ms: median", "p95", "max", "painted: median", "p95"]
-    text = f"`python -m bench.key_to_pair --write`; {before}.\n\n{table(head, rows)}"
+            for latency, name in names.items():
+                page = sign_in(browser, address, name)
+                wire = page.context.new_cdp_session(page)
+                wire.send("Network.enable")
+                how = {"downloadThroughput": -1, "uploadThroughput": -1, "latency": latency}
+                wire.send("Network.emulateNetworkConditions", {"offline": False, **how})
+                rows.append([f"{latency} ms", *measure(page, wire, asked.votes)])
+                page.context.close()
+    text = f"`python -m bench.{module} --write`; {before}.\n\n{table(['latency', *head], rows)}"
     print(text)
-    if is_written:
-        write_section(HEADING, text)
+    if asked.write:
+        write_section(heading, text)
 
 
-def prepare(home: Home, votes: int, *, sets: Sequence[CatalogueSet]) -> None:
-    """An expert for each latency, and a study of one pair more than they vote on."""
-    names = [f"expert-{latency}" for latency in LATENCIES_MS]
+def open_study(
+    home: Home, names: Collection[str], pairs: int, *more: str, sets: Sequence[CatalogueSet]
+) -> None:
+    """Open a study of the demo's answers with so many pairs for each of some new experts."""
     made = "; ".join(
         f"create_person(username={name!r}, password={PASSWORD!r}, role='expert')" for name in names
     )
@@ -83,43 +124,32 @@ def prepare(home: Home, votes: int, *, sets: Sequence[CatalogueSet]) -> None:
         f" AND catalogue_set IN ({', '.join(repr(one.value) for one in sets)})"
     )
     home.must(
-        *("open_study", "Keys", "--experts", *names, "--votes-per-expert", str(votes + 1)),
+        *("open_study", f"Of {', '.join(names)}", "--experts", *names),
         *("--contestants", "reference", "rule-placer", "sim-good-otm", "sim-careless-otm"),
         *("--scenarios", *(slug for (slug,) in scenarios), "--seed", "5", "--allow-simulated"),
+        *("--votes-per-expert", str(pairs), *more),
     )
 
 
-def _vote(
-    browser: Browser, address: str, latency_ms: int, votes: int
-) -> tuple[list[float], list[float]]:
-    page, _ = sign_in(browser, address, latency_ms)
-    vote(page, votes, ready="body.is-live #answers:not([inert])", stopwatch=STOPWATCH)
-    found = _numbers(page, "visible"), _numbers(page, "painted")
-    page.context.close()
-    return found
-
-
-def sign_in(browser: Browser, address: str, latency_ms: int) -> tuple[Page, CDPSession]:
-    """The expert's home in a context of its own, and its wire, which has the latency from now."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
-    page = context.new_page()
+def sign_in(browser: Browser, address: str, name: str) -> Page:
+    """The expert's home in a context of its own."""
+    page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
     page.goto(f"{address}/login/")
-    page.fill("input[name=username]", f"expert-{latency_ms}")
+    page.fill("input[name=username]", name)
     page.fill("input[name=password]", PASSWORD)
     page.click("main form button")
     page.wait_for_url(f"{address}/")
-    wire = context.new_cdp_session(page)
-    wire.send("Network.enable")
-    throughput = {"downloadThroughput": -1, "uploadThroughput": -1}
-    how = {"offline": False, "latency": latency_ms, **throughput}
-    wire.send("Network.emulateNetworkConditions", how)
-    return page, wire
+    return page
 
 
-def vote(page: Page, votes: int, *, ready: str, stopwatch: str) -> None:
-    """Go to the voting page and vote by keys, the stopwatch running once `ready` is there."""
+def start_voting(page: Page, ready: str = "body.is-live #answers:not([inert])") -> None:
+    """Go to the voting page and wait until `ready` is there."""
     page.click("a[href*='/vote/']")
     page.wait_for_selector(ready)
+
+
+def vote(page: Page, votes: int, stopwatch: str) -> None:
+    """Vote by keys, the stopwatch running."""
     page.wait_for_timeout(2000)
     page.evaluate(stopwatch)
     for number in range(votes):
@@ -127,30 +157,19 @@ def vote(page: Page, votes: int, *, ready: str, stopwatch: str) -> None:
         page.wait_for_timeout(PAUSE_MS)
 
 
-def _numbers(page: Page, name: str) -> list[float]:
-    found: list[float] = page.evaluate(f"window.{name}")
-    return found
-
-
-def _row(latency_ms: int, visible: list[float], painted: list[float]) -> list[str]:
+def _vote(page: Page, wire: CDPSession, votes: int) -> list[str]:
+    start_voting(page)
+    vote(page, votes, STOPWATCH)
+    visible, painted = page.evaluate("[window.visible, window.painted]")
     # Presses that were painted within 16 ms are not reported by the browser.
-    painted = painted + [16.0] * (len(visible) - len(painted))
+    painted += [16.0] * (len(visible) - len(painted))
     figures = [*_spread(visible), max(visible), *_spread(painted)]
-    return [f"{latency_ms} ms", str(len(visible)), *(f"{figure:.1f}" for figure in figures)]
+    return [str(len(visible)), *(f"{figure:.1f}" for figure in figures)]
 
 
 def _spread(values: list[float]) -> tuple[float, float]:
     return statistics.median(values), statistics.quantiles(values, n=20)[-1]
 
 
-def read_arguments(votes: int) -> tuple[int, bool]:
-    """How many votes, and whether the table goes into the docs."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("votes", type=int, nargs="?", default=votes)
-    parser.add_argument("--write", action="store_true", help="into docs/benchmarks.md")
-    asked = parser.parse_args()
-    return asked.votes, asked.write
-
-
 if __name__ == "__main__":
-    main(*read_arguments(VOTES))
+    main()

@@ -9,17 +9,13 @@ it; bytes are those on the wire, of pictures, films and what films play over.
 """
 
 import statistics
-import tempfile
-from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
-from playwright.sync_api import Browser
+from playwright.sync_api import CDPSession, Page
 
 from augment.scene.entities import CatalogueSet
-from bench.key_to_pair import LATENCIES_MS, prepare, read_arguments, sign_in, vote
-from bench.report import load, table, write_section
-from tests.browser.chromium import chromium
-from tests.stack import SMALL_DEMO, Home
+from bench.key_to_pair import measure_latencies, start_voting, vote
 
 VOTES = 30
 
@@ -65,38 +61,20 @@ addEventListener("keydown", (event) => {
 HEADING = "From the key to the first frame of films"
 
 
-def main(votes: int, is_written: bool) -> None:
+def main() -> None:
     """Measure, print the table, and write it into docs/benchmarks.md where that is asked for."""
-    before, rows = load(), []
-    with tempfile.TemporaryDirectory(prefix="arena-films-") as folder:
-        home = Home.at(Path(folder))
-        home.must(*SMALL_DEMO)
-        home.must("shell", "-c", MOVE)
-        prepare(home, votes, sets=[CatalogueSet.PAPER, CatalogueSet.MOVING])
-        with home.serving() as address, chromium() as browser:
-            for latency in LATENCIES_MS:
-                moved, bytes_a_pair = _vote(browser, address, latency, votes)
-                p95 = statistics.quantiles(moved, n=20)[-1]
-                figures = [statistics.median(moved), p95, max(moved), bytes_a_pair / 1000]
-                cells = [f"{one:.1f}" for one in figures]
-                rows.append([f"{latency} ms", str(len(moved)), *cells])
-    head = ["latency", "pairs", "first frame, ms: median", "p95", "max", "kB a pair"]
-    text = f"`python -m bench.moving_ballot --write`; {before}.\n\n{table(head, rows)}"
-    print(text)
-    if is_written:
-        write_section(HEADING, text)
+    head = ["pairs", "first frame, ms: median", "p95", "max", "kB a pair"]
+    sets = [CatalogueSet.PAPER, CatalogueSet.MOVING]
+    measure_latencies("moving_ballot", HEADING, head, VOTES, _vote, sets=sets, script=MOVE)
 
 
-def _vote(
-    browser: Browser, address: str, latency_ms: int, votes: int
-) -> tuple[list[float], float]:
-    """How long the films of each pair took, and the bytes of a pair, which has three pictures."""
-    page, wire = sign_in(browser, address, latency_ms)
+def _vote(page: Page, wire: CDPSession, votes: int) -> list[str]:
+    """How long the films of each pair took, and the kB of a pair, which has three pictures."""
     picture_of: dict[str, str] = {}
     sizes: dict[str, float] = {}
 
     def asked(event: dict[str, Any]) -> None:
-        path = event["request"]["url"].partition("?")[0].removeprefix(address)
+        path = urlsplit(event["request"]["url"]).path
         if path.startswith("/i/"):
             picture_of[event["requestId"]] = path
 
@@ -106,11 +84,14 @@ def _vote(
 
     wire.on("Network.requestWillBeSent", asked)
     wire.on("Network.loadingFinished", loaded)
-    vote(page, votes, ready="canvas.reel:not([hidden])", stopwatch=STOPWATCH)
+    start_voting(page, ready="canvas.reel:not([hidden])")
+    vote(page, votes, STOPWATCH)
     moved: list[float] = page.evaluate("window.moved")
-    page.context.close()
-    return moved, sum(sizes.values()) / (len(sizes) / 3)
+    kilobytes = sum(sizes.values()) / (len(sizes) / 3) / 1000
+    p95 = statistics.quantiles(moved, n=20)[-1]
+    figures = [statistics.median(moved), p95, max(moved), kilobytes]
+    return [str(len(moved)), *(f"{one:.1f}" for one in figures)]
 
 
 if __name__ == "__main__":
-    main(*read_arguments(VOTES))
+    main()

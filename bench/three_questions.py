@@ -16,7 +16,9 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page
 
-from bench.key_to_pair import PASSWORD
+from augment.scene.entities import CatalogueSet
+from bench.key_to_pair import open_study, sign_in, start_voting
+from bench.report import table
 from tests.browser.chromium import chromium
 from tests.stack import SMALL_DEMO, Home
 
@@ -42,7 +44,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="arena-questions-") as folder:
         home = Home.at(Path(folder))
         home.must(*SMALL_DEMO)
-        _prepare(home, pairs)
+        for number, questions in BALLOTS.items():
+            more = ("--questions", *questions, "--repeats", "0")
+            open_study(home, [f"expert-{number}"], pairs + 1, *more, sets=list(CatalogueSet))
         with home.serving() as address, chromium() as browser:
             pages = {number: _enter(browser, address, number) for number in BALLOTS}
             took: dict[int, list[tuple[float, float]]] = {number: [] for number in BALLOTS}
@@ -50,46 +54,18 @@ def main() -> None:
                 for number, page in pages.items():
                     took[number].append(_judge(page, number))
     print(f"The hand looks {LOOK_S:g} s at a pair and takes {KEY_S:g} s a key: both assumed.\n")
-    print("| questions | pairs | a pair, s: median | software alone, ms: median |")
-    print("|---|---|---|---|")
-    medians = {}
+    medians, rows = {}, []
     for number, found in took.items():
         whole, software = (statistics.median(values) for values in zip(*found, strict=True))
         medians[number] = whole
-        print(f"| {number} | {len(found)} | {whole:.2f} | {1000 * software:.1f} |")
-    print(f"\nratio {medians[3] / medians[1]:.2f} (at most {MOST_RATIO:g})")
-
-
-def _prepare(home: Home, pairs: int) -> None:
-    """An expert and a study for each ballot, with one pair more than they vote on."""
-    made = "; ".join(
-        f"create_person(username='expert-{number}', password={PASSWORD!r}, role='expert')"
-        for number in BALLOTS
-    )
-    home.must("shell", "-c", f"from arena.people.services import create_person; {made}")
-    scenarios = home.rows(
-        "SELECT slug FROM augment_scenario WHERE id IN"
-        " (SELECT scenario_id FROM augment_augmentation)"
-    )
-    for number, questions in BALLOTS.items():
-        home.must(
-            *("open_study", f"Asks {number}", "--experts", f"expert-{number}"),
-            *("--votes-per-expert", str(pairs + 1), "--questions", *questions),
-            *("--contestants", "reference", "rule-placer", "sim-good-otm", "sim-careless-otm"),
-            *("--scenarios", *(slug for (slug,) in scenarios), "--allow-simulated"),
-            *("--repeats", "0", "--seed", "5"),
-        )
+        rows.append([str(number), str(len(found)), f"{whole:.2f}", f"{1000 * software:.1f}"])
+    head = ["questions", "pairs", "a pair, s: median", "software alone, ms: median"]
+    print(f"{table(head, rows)}\n\nratio {medians[3] / medians[1]:.2f} (at most {MOST_RATIO:g})")
 
 
 def _enter(browser: Browser, address: str, number: int) -> Page:
-    page = browser.new_context(viewport={"width": 1280, "height": 720}).new_page()
-    page.goto(f"{address}/login/")
-    page.fill("input[name=username]", f"expert-{number}")
-    page.fill("input[name=password]", PASSWORD)
-    page.click("main form button")
-    page.wait_for_url(f"{address}/")
-    page.click("a[href*='/vote/']")
-    page.wait_for_selector("body.is-live #answers:not([inert])")
+    page = sign_in(browser, address, f"expert-{number}")
+    start_voting(page)
     return page
 
 
