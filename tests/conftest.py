@@ -17,8 +17,10 @@ from xdist.scheduler import LoadScopeScheduling
 
 import tests.properties  # noqa: F401
 from arena.management.commands.prepare import compile_catalogue
+from augment.fake_llm.server import FakeServer, running
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
+from tests.intents import known
 from tests.on_postgres import FILES
 from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
@@ -67,6 +69,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def _takes_long(item: pytest.Item) -> bool:
     return item.get_closest_marker("slow") is not None or item.nodeid.startswith(tuple(GROUPS))
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[FakeServer]:
+    """The stand-in, which knows the catalogue; its slow model takes longer than any test."""
+    with running(slow_s=3600.0, known=known) as serving:
+        yield serving
 
 
 @pytest.fixture(scope="session")

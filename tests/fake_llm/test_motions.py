@@ -13,18 +13,15 @@ from augment.fake_llm.careless import MOTION_MISTAKES
 from augment.fake_llm.playing import review_problems
 from augment.fake_llm.server import FakeServer, running
 from augment.fake_llm.sight import Task
-from augment.llm.client import Patience
-from augment.llm.openai_wire import OpenAIWire
 from augment.prompts.vectors import changes_text
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
-from augment.variants.pipeline import EditTask, Outcome, run
+from augment.variants.pipeline import EditTask, Outcome
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import ModelRole, RespondentClient
 from tests.checks.test_asked_motions import WISHES
 from tests.fixtures.shelf import entry, shown_scene
-from tests.variants.memory import MemoryTranscript
+from tests.variants.playing import MemoryTranscript, play, stand_in_model
 
 OPEN = "way-ferry-road"
 KNOWN = WISHES | {OPEN: (shown_scene(OPEN), entry(OPEN).intent or Intent())}
@@ -43,16 +40,9 @@ def server() -> Iterator[FakeServer]:
 def asked(
     server: FakeServer, name: str, variant: str, *, native: bool = False, model: str = "fake-good"
 ) -> Outcome:
-    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=60.0) as client:
-        good = RespondentClient(client=client, model=model, native_tools=native)
-        return run(
-            find_recipe(variant),
-            EditTask(scene=KNOWN[name][0], instruction=name),
-            modifier=good,
-            transcript=MemoryTranscript(),
-            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-            others={ModelRole.REVIEWER: good},
-        )
+    task = EditTask(scene=KNOWN[name][0], instruction=name)
+    with stand_in_model(server, model, native=native) as good:
+        return play(find_recipe(variant), task, good, MemoryTranscript())
 
 
 @pytest.mark.parametrize(

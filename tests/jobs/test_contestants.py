@@ -40,7 +40,7 @@ from augment.variants.respondents import ModelRole
 from tests.intents import known
 from tests.jobs.models import llama_job, ran
 from tests.jobs.rows import add_scenario, only_row
-from tests.llm.recorder import recorder
+from tests.llm.json_server import recorder
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"

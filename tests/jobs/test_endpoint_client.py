@@ -19,7 +19,7 @@ from augment.variants.respondents import ModelRole, RespondentClient, Respondent
 from tests.jobs.rows import add_model, add_scenario, only_row
 from tests.jobs.scripted import Scripted
 from tests.llm.json_server import serving
-from tests.variants.memory import MemoryTranscript
+from tests.variants.playing import MemoryTranscript
 
 pytestmark = pytest.mark.django_db(transaction=True)
 ASKED = Request(

@@ -14,7 +14,7 @@ from augment.services.running import runner
 from augment.services.running.transcript_records import full_transcript
 from tests.jobs.models import llama_job
 from tests.jobs.rows import only_row
-from tests.llm.recorder import recorder
+from tests.llm.json_server import recorder
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db

@@ -18,8 +18,8 @@ from augment.services.running.transcript_records import full_transcript, list_tr
 from augment.variants.respondents import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, ran
 from tests.jobs.rows import INSTRUCTION, NOON, launch, only_row
+from tests.llm.json_server import GOOD as HEARD
 from tests.llm.raw_server import speaking, whole
-from tests.llm.recorder import GOOD as HEARD
 from tests.variants.playing import GOOD
 from tests.web.cast import people, signed_in
 

@@ -1,11 +1,12 @@
-"""A local server that answers every POST with JSON; what it answers is up to its subclasses."""
+"""Local servers that answer every POST with JSON: what is up to subclasses, or the same to all."""
 
 import json
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socketserver import ThreadingTCPServer
 from typing import Any, TypeVar
 
 
@@ -54,7 +55,7 @@ class _Handler(BaseHTTPRequestHandler):
         pass
 
 
-Server = TypeVar("Server", bound=JsonServer)
+Server = TypeVar("Server", bound=ThreadingTCPServer)
 
 
 @contextmanager
@@ -67,3 +68,35 @@ def serving(server: Server) -> Iterator[Server]:
         server.shutdown()
         server.server_close()
         thread.join()
+
+
+GOOD = {
+    "id": "1",
+    "object": "chat.completion",
+    "created": 0,
+    "model": "m",
+    "choices": [
+        {"index": 0, "finish_reason": "stop", "message": {"role": "assistant", "content": "Hi"}}
+    ],
+}
+
+
+class Recorder(JsonServer):
+    """Keeps the headers that it is sent."""
+
+    def __init__(self, status: int, body: object, headers: dict[str, str] | None) -> None:
+        super().__init__(headers)
+        self.status, self.body = status, body
+        self.heard: list[dict[str, str]] = []
+
+    def hear(self, headers: dict[str, str]) -> None:
+        self.heard.append(headers)
+
+    def answer(self, body: dict[str, Any]) -> tuple[int, object]:
+        return self.status, self.body
+
+
+def recorder(
+    status: int = 200, body: object = GOOD, headers: dict[str, str] | None = None
+) -> AbstractContextManager[Recorder]:
+    return serving(Recorder(status, body, headers))

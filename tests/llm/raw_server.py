@@ -2,57 +2,41 @@
 
 import socket
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
+from socketserver import BaseRequestHandler, ThreadingTCPServer
+
+from tests.llm.json_server import serving
 
 Say = Callable[[socket.socket], None]
 
 
-class RawServer:
+class RawServer(ThreadingTCPServer):
     """Listens at a free port; reads one request a connection, then lets `say` answer."""
 
-    def __init__(self, say: Say, *, reads: bool = True) -> None:
-        self._say, self._reads = say, reads
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.port = self._listening.getsockname()[1]
+    daemon_threads = True
+
+    def __init__(self, say: Say, *, reads: bool) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.say, self.reads = say, reads
+        self.port = self.server_address[1]
         self.url = f"http://127.0.0.1:{self.port}/v1"
         self.heard: list[bytes] = []
-        self.stopped = threading.Event()
 
-    def serve(self) -> None:
-        while True:
-            try:
-                connection, _ = self._listening.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._one, args=(connection,), daemon=True).start()
 
-    def close(self) -> None:
-        self.stopped.set()
-        with suppress(OSError):
-            self._listening.shutdown(socket.SHUT_RDWR)
-        self._listening.close()
+class _Handler(BaseRequestHandler):
+    server: RawServer
 
-    def _one(self, connection: socket.socket) -> None:
+    def handle(self) -> None:
         # Whoever is spoken to may be gone: that is what most of these tests are about.
-        with connection, suppress(OSError):
-            if self._reads:
-                self.heard.append(_request(connection))
-            else:
-                self.heard.append(connection.recv(65536))
-            self._say(connection)
+        with suppress(OSError):
+            read = _request if self.server.reads else lambda connection: connection.recv(65536)
+            self.server.heard.append(read(self.request))
+            self.server.say(self.request)
 
 
-@contextmanager
-def speaking(say: Say, *, reads: bool = True) -> Iterator[RawServer]:
-    server = RawServer(say, reads=reads)
-    thread = threading.Thread(target=server.serve, daemon=True)
-    thread.start()
-    try:
-        yield server
-    finally:
-        server.close()
-        thread.join()
+def speaking(say: Say, *, reads: bool = True) -> AbstractContextManager[RawServer]:
+    return serving(RawServer(say, reads=reads))
 
 
 def head(*headers: str, status: str = "200 OK") -> bytes:

@@ -6,16 +6,19 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from augment.errors import ModelFault, NotSent, ParameterRefused
 from augment.fake_llm.server import FakeServer
 from augment.llm import wire_transport
+from augment.llm.addresses import Resolve
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
+from tests.llm.json_server import GOOD, recorder
 from tests.llm.raw_server import speaking, whole
-from tests.llm.recorder import GOOD, recorder
+from tests.llm.test_addresses import leading_to
 from tests.llm.test_hostile_servers import ASKED, BODY
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
@@ -90,18 +93,6 @@ def test_any_other_json_is_a_fault(body: object) -> None:
         client.complete(request("m"))
 
 
-@pytest.mark.parametrize(
-    ("headers", "wait_s"),
-    [({"retry-after-ms": "250"}, 0.25), ({"Retry-After": "soon"}, None), ({}, None)],
-)
-def test_the_wait_that_an_endpoint_asks_for(headers: dict[str, str], wait_s: float | None) -> None:
-    with (
-        recorder(503, {"error": {"message": "busy"}}, headers) as server,
-        OpenAIWire(base_url=server.url, api_key=None) as client,
-    ):
-        assert fault(lambda model: client.complete(request(model)), "m").retry_after_s == wait_s
-
-
 def test_a_key_goes_to_its_endpoint_and_nothing_of_the_environment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -169,69 +160,41 @@ def test_the_certificate_of_an_endpoint_is_checked() -> None:
     assert checked_by.check_hostname
 
 
-WITH_SEED = Request(
-    model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),), temperature=0.0, seed=7
-)
-
-
-def error(message: str, param: str | None = None, code: str | None = None) -> object:
-    return {"error": {"message": message, "type": "x", "param": param, "code": code}}
-
-
-def refusal_to(body: object, status: int = 400) -> ModelFault:
-    with (
-        recorder(status, body) as server,
-        OpenAIWire(base_url=server.url, api_key=None) as client,
-        pytest.raises(ModelFault) as caught,
-    ):
-        client.complete(WITH_SEED)
-    return caught.value
-
-
 @pytest.mark.parametrize("status", [400, 422])
 def test_a_parameter_that_is_not_taken_is_named(status: int) -> None:
-    refused = refusal_to(error("Unknown field max_completion_tokens."), status)
-    assert isinstance(refused, ParameterRefused)
-    assert (refused.parameter, refused.status, refused.retryable) == (
-        "max_completion_tokens",
-        status,
-        True,
-    )
-
-
-class Names:
-    """A name service whose every look finds the next answer; the last one stays."""
-
-    def __init__(self, *answers: str) -> None:
-        self.answers = list(answers)
-        self.asked: list[str] = []
-
-    def __call__(self, host: str, port: object, **_: object) -> list[Any]:
-        self.asked.append(host)
-        answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
-        return [(0, 0, 0, "", (address, 0)) for address in answer.split()]
-
-
-def test_a_name_is_connected_to_where_it_was_looked_up_and_keeps_its_host_header() -> None:
-    names = Names("127.0.0.1")
     with (
-        speaking(whole(BODY)) as server,
-        OpenAIWire(
-            base_url=f"http://models.example:{server.port}/v1", api_key=KEY, resolve=names
-        ) as client,
+        recorder(status, {"error": {"message": "Unknown field max_completion_tokens."}}) as server,
+        OpenAIWire(base_url=server.url, api_key=None) as client,
+        pytest.raises(ParameterRefused) as caught,
     ):
+        client.complete(request("m"))
+    refused = caught.value
+    assert (refused.parameter, refused.status) == ("max_completion_tokens", status)
+    assert refused.retryable
+
+
+def named(port: int, names: Resolve, scheme: str = "http") -> OpenAIWire:
+    """A client of a server by its name."""
+    base_url = f"{scheme}://models.example:{port}/v1"
+    return OpenAIWire(base_url=base_url, api_key=KEY, resolve=names)
+
+
+@pytest.mark.parametrize("addresses", [["127.0.0.1"], ["::1", "127.0.0.1"]])
+def test_a_name_is_connected_to_where_somebody_listens_and_keeps_its_host_header(
+    addresses: list[str],
+) -> None:
+    names = Mock(side_effect=leading_to(*addresses))
+    with speaking(whole(BODY)) as server, named(server.port, names) as client:
         assert client.complete(ASKED).text == "Hi"
+    assert names.call_count == 1, "what was checked is what is connected to"
     assert f"host: models.example:{server.port}\r\n".encode() in server.heard[0].lower()
-    assert names.asked == ["models.example"]
 
 
 @pytest.mark.parametrize("later", ["169.254.169.254", "127.0.0.1 fd00:ec2::254", "64:ff9b::1"])
 def test_a_name_that_leads_to_a_forbidden_address_is_not_connected_to(later: str) -> None:
     with (
         speaking(whole(BODY)) as server,
-        OpenAIWire(
-            base_url=f"http://models.example:{server.port}/v1", api_key=KEY, resolve=Names(later)
-        ) as client,
+        named(server.port, leading_to(*later.split())) as client,
         pytest.raises(NotSent, match=r"models\.example leads to .*metadata") as raised,
     ):
         client.complete(ASKED)
@@ -239,27 +202,11 @@ def test_a_name_that_leads_to_a_forbidden_address_is_not_connected_to(later: str
     assert server.heard == []
 
 
-def test_the_next_address_is_tried_where_nobody_listens_at_the_first() -> None:
-    with (
-        speaking(whole(BODY)) as server,
-        OpenAIWire(
-            base_url=f"http://models.example:{server.port}/v1",
-            api_key=None,
-            resolve=Names("::1 127.0.0.1"),
-        ) as client,
-    ):
-        assert client.complete(ASKED).text == "Hi"
-
-
 def test_the_certificate_is_held_against_the_name_and_not_the_address() -> None:
     # The first bytes of a handshake name the server in clear.
     with (
         speaking(lambda connection: None, reads=False) as server,
-        OpenAIWire(
-            base_url=f"https://models.example:{server.port}/v1",
-            api_key=KEY,
-            resolve=Names("127.0.0.1"),
-        ) as client,
+        named(server.port, leading_to("127.0.0.1"), "https") as client,
         pytest.raises(NotSent, match="the connection failed"),
     ):
         client.complete(ASKED)

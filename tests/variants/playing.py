@@ -1,22 +1,68 @@
-"""One run of any recipe against a script, with everything that it did."""
+"""One run of any recipe, with everything that it did in a transcript that lives as long."""
 
 import json
 import random
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 from augment.errors import ModelFault
+from augment.fake_llm.server import FakeServer
 from augment.llm.client import Patience
-from augment.llm.messages import Reply, ToolCall
+from augment.llm.messages import Reply, Request, ToolCall
+from augment.llm.openai_wire import OpenAIWire
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pipeline import EditTask, Outcome, run
-from augment.variants.recipes import find_recipe
-from augment.variants.respondents import ModelRole, RespondentClient
+from augment.variants.recipes import Recipe, find_recipe
+from augment.variants.respondents import ModelRole, NoteKind, RespondentClient, Transcript
 from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
-from tests.variants.memory import MemoryTranscript
+
+
+@dataclass(slots=True)
+class RecordedCall:
+    number: int
+    role: ModelRole
+    request: Request
+    prompt_version: str
+    reply: Reply | None = None
+    fault: ModelFault | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedNote:
+    kind: NoteKind
+    document: dict[str, object]
+
+
+@dataclass(slots=True)
+class MemoryTranscript:
+    """Calls are numbered from 1."""
+
+    calls: list[RecordedCall] = field(default_factory=list)
+    notes: list[RecordedNote] = field(default_factory=list)
+
+    def cached_reply(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        return None
+
+    def record_request(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        self.calls.append(RecordedCall(len(self.calls) + 1, role, request, prompt_version))
+        return len(self.calls)
+
+    def sending(self, number: int) -> None:
+        pass
+
+    def record_reply(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        self.calls[number - 1].reply = reply
+        self.calls[number - 1].fault = fault
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        self.calls[number - 1].fault = fault
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        self.notes.append(RecordedNote(kind, document))
 
 
 def agent(**changes: object) -> dict[str, object]:
@@ -60,6 +106,30 @@ GOOD = answer(block(agent()))
 
 WISH = "Add a parked car 21.4 m ahead."
 Script = Iterable[str | Reply | ModelFault]
+Others = Mapping[ModelRole, RespondentClient]
+
+
+def play(
+    recipe: Recipe,
+    task: EditTask,
+    modifier: RespondentClient,
+    transcript: Transcript,
+    others: Others | None = None,
+) -> Outcome:
+    """A run that waits for nothing."""
+    patience = Patience(sleep=lambda _: None, rng=random.Random(0))
+    return run(
+        recipe, task, modifier=modifier, transcript=transcript, patience=patience, others=others
+    )
+
+
+@contextmanager
+def stand_in_model(
+    server: FakeServer, model: str, *, native: bool = False, timeout_s: float = 60.0
+) -> Iterator[RespondentClient]:
+    """A model of the stand-in over HTTP."""
+    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=timeout_s) as client:
+        yield RespondentClient(client=client, model=model, native_tools=native)
 
 
 class Play:
@@ -70,20 +140,19 @@ class Play:
         *,
         shown: Scene | None = None,
         native: bool = False,
-        others: Mapping[ModelRole, RespondentClient] | None = None,
+        others: Others | None = None,
         intent: Intent | None = None,
         block: BlockForm = BlockForm.TEXT,
     ) -> None:
         self.client = ScriptedClient(script)
         self.transcript = MemoryTranscript()
         recipe = find_recipe(variant)
-        self.outcome: Outcome = run(
+        self.outcome = play(
             replace(recipe, limits=replace(recipe.limits, block=block)),
             EditTask(scene=shown or scene(), instruction=WISH, intent=intent),
-            modifier=RespondentClient(client=self.client, model="m", native_tools=native),
-            transcript=self.transcript,
-            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-            others=others,
+            RespondentClient(client=self.client, model="m", native_tools=native),
+            self.transcript,
+            others,
         )
 
     @property

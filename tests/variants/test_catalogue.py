@@ -4,24 +4,18 @@ Call counts and their order are those of the paper: m modifier, r reviewer, e en
 """
 
 import math
-import random
-from collections.abc import Iterator
 
 import pytest
 
-from augment.fake_llm.server import FakeServer, running
-from augment.llm.client import Patience
-from augment.llm.openai_wire import OpenAIWire
+from augment.fake_llm.server import FakeServer
 from augment.metrics.displacement import displacement
 from augment.prompts.calls import Tools
-from augment.variants.pipeline import EditTask, Outcome, OutcomeStatus, run
+from augment.variants.pipeline import EditTask, Outcome, OutcomeStatus
 from augment.variants.recipes import RECIPES, find_recipe
-from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
 from tests.checks.worlds import findings
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
-from tests.intents import known
-from tests.variants.memory import MemoryTranscript
+from tests.variants.playing import MemoryTranscript, play, stand_in_model
 
 CALLS_OF_GOOD = {
     "otm": "m",
@@ -49,25 +43,13 @@ UNMET = {
 SOME = [next(slug for slug in SLUGS if slug.startswith(kind)) for kind in KINDS]
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[FakeServer]:
-    with running(known=known) as serving:
-        yield serving
-
-
 def played(
-    server: FakeServer, model: str, variant: str, slug: str, *, native: bool = False
+    server: FakeServer, model: str, variant: str, slug: str
 ) -> tuple[Outcome, MemoryTranscript]:
+    task = EditTask(scene=shown_scene(slug), instruction=entry(slug).instruction)
     transcript = MemoryTranscript()
-    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=30.0) as client:
-        outcome = run(
-            find_recipe(variant),
-            EditTask(scene=shown_scene(slug), instruction=entry(slug).instruction),
-            modifier=RespondentClient(client=client, model=model, native_tools=native),
-            transcript=transcript,
-            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-        )
-    return outcome, transcript
+    with stand_in_model(server, model) as modifier:
+        return play(find_recipe(variant), task, modifier, transcript), transcript
 
 
 def order(transcript: MemoryTranscript) -> str:

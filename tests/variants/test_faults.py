@@ -5,23 +5,19 @@ are calls of their own.
 """
 
 import csv
-import random
 import re
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from augment.errors import ModelFault
-from augment.fake_llm.server import MODELS, FakeServer, running
-from augment.llm.client import Patience
-from augment.llm.openai_wire import OpenAIWire
-from augment.variants.pipeline import EditTask, run
+from augment.fake_llm.server import MODELS, FakeServer
+from augment.variants.pipeline import EditTask
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import ModelRole, RespondentClient
-from tests.intents import known
+from augment.variants.respondents import ModelRole
 from tests.scenes import scene
-from tests.variants.memory import MemoryTranscript
+from tests.variants.playing import MemoryTranscript, play, stand_in_model
 
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
 with (Path(__file__).parent / "faults.csv").open(encoding="utf-8", newline="") as _file:
@@ -29,31 +25,18 @@ with (Path(__file__).parent / "faults.csv").open(encoding="utf-8", newline="") a
 REVIEWS = {None: "none", True: "accepted", False: "not accepted"}
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[FakeServer]:
-    with running(slow_s=30.0, known=known) as serving:
-        yield serving
-
-
 @pytest.mark.parametrize("row", FAULTS, ids=lambda row: f"{row['fault']} ({row['variant']})")
 def test_a_fault_ends_as_expected(server: FakeServer, row: dict[str, str]) -> None:
     model = row["model"]
     timeout_s = 0.5 if model == "fake-slow" else 30.0
-    transcript = MemoryTranscript()
-    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=timeout_s) as client:
+    task, transcript = EditTask(scene=scene(), instruction=WISH), MemoryTranscript()
+    with stand_in_model(server, model, timeout_s=timeout_s) as modifier:
         players = {
-            ModelRole(role): RespondentClient(client=client, model=name)
+            ModelRole(role): replace(modifier, model=name)
             for role, name in re.findall(r"(\w+) (fake-[\w-]+)", row["other_roles"])
         }
         try:
-            made = run(
-                find_recipe(row["variant"]),
-                EditTask(scene=scene(), instruction=WISH),
-                modifier=RespondentClient(client=client, model=model),
-                transcript=transcript,
-                patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-                others=players,
-            )
+            made = play(find_recipe(row["variant"]), task, modifier, transcript, players)
             found = made.status.value
             reviewed = REVIEWS[made.is_accepted] if made.modification else ""
         except ModelFault as fault:

@@ -1,21 +1,20 @@
 """What a recipe is said to ask, beside what it asks."""
 
 import json
-import random
 
 import pytest
 
 from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
 from augment.fake_llm.wire import chat_request
-from augment.llm.client import Patience, Sending, watch_nothing
+from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.variants.pipeline import EditTask, run
+from augment.variants.pipeline import EditTask
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.respondents import ModelRole, RespondentClient
 from augment.variants.showing import CallRange, call_ranges
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import known
-from tests.variants.memory import MemoryTranscript
+from tests.variants.playing import MemoryTranscript, play
 
 SLUG = "overtake-terrace-row"
 MODIFIER, REVIEWER = ModelRole.MODIFIER, ModelRole.REVIEWER
@@ -39,14 +38,12 @@ class Playing:
 
 
 def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:
-    transcript = MemoryTranscript()
-    run(
-        RECIPES[variant],
-        EditTask(scene=shown_scene(SLUG), instruction=entry(SLUG).instruction),
-        modifier=RespondentClient(client=Playing(character), model="m"),
-        transcript=transcript,
-        patience=Patience(sleep=lambda _: None, rng=random.Random(1)),
+    task = EditTask(scene=shown_scene(SLUG), instruction=entry(SLUG).instruction)
+    transcript, modifier = (
+        MemoryTranscript(),
+        RespondentClient(client=Playing(character), model="m"),
     )
+    play(RECIPES[variant], task, modifier, transcript)
     roles = [call.role for call in transcript.calls]
     return {role: roles.count(role) for role in dict.fromkeys(roles)}
 

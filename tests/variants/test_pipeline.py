@@ -9,8 +9,7 @@ from augment.variants.respondents import RespondentClient
 from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
-from tests.variants.memory import MemoryTranscript
-from tests.variants.playing import GOOD, Play, agent, answer, block, call, native
+from tests.variants.playing import GOOD, MemoryTranscript, Play, agent, answer, block, call, native
 
 
 def test_one_good_answer_is_one_call_and_a_modification() -> None:

@@ -35,11 +35,8 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     ("line", "said"),
     [
         ('{"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
-        ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
-        ('{"call": 3, "arguments": {}}', "has the form"),
         (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
         (call(lane="Lane9"), "there is no lane 'Lane9'"),
-        (call(distance_m="21.4 m"), "distance_m[0]: Input should be a valid number"),
         ('{"call": "pose_on_lane", "arguments": [1]}', "Input should be a valid dictionary"),
         ('{"call": "pose_on_lane", "arguments": {"distance_m": NaN}}', "NaN is not a number"),
     ],
@@ -51,12 +48,10 @@ def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> No
     assert play.outcome.status is OutcomeStatus.DONE
 
 
-@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
 @pytest.mark.parametrize("native", [False, True])
-def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
-    form: str, native: bool
-) -> None:
-    play = Play("fc-plus", [f"I look it up.\n\n{form}\n", car(21.4)], native=native)
+def test_a_call_in_another_form_is_answered_and_recorded_as_mended(native: bool) -> None:
+    said = f"I look it up.\n\n{FORMS['bullet']}\n"
+    play = Play("fc-plus", [said, car(21.4)], native=native)
     assert (play.roles, play.x_m) == ("mm", 21.4)
     told = play.client.requests[1].messages[-1]
     assert told.speaker is Speaker.USER
@@ -67,20 +62,10 @@ def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
     assert (note["tool"], note["understood"], note["mended"]) == ("pose_on_lane", True, True)
 
 
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        ("- {'call': 'pose_on_lane', 'arguments': {'lane': Lane1}}", "one line of the form"),
-        ("I would call pose_on_lane from Agent1.", "is named and not called"),
-        ("x = pose_on_lane('Lane1', 'Agent1', 21.4)", "is named and not called"),
-    ],
-)
-def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
-    answer: str, said: str
-) -> None:
-    play = Play("fc-plus", [answer, car(21.4)])
+def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement() -> None:
+    play = Play("fc-plus", ["I would call pose_on_lane from Agent1.", car(21.4)])
     told = play.client.requests[1].messages[-1].text
-    assert said in told
+    assert "is named and not called" in told
     assert "placement" not in told
     assert told.endswith("or give your answer in the five sections.")
     assert (play.roles, play.x_m) == ("mm", 21.4)
