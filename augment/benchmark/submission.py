@@ -247,8 +247,11 @@ class _Checker:
             return entry
         ground = Ground.of(task.scene, lambda *change: expect_recording(*change, task.replayed))
         distance = displacement(entry.modification, task.reference, ground)
-        wish = task.intent and displacement_from_wish(entry.modification, task.intent, ground)
-        return replace(entry, displacement=distance, wish=wish)
+        entry = replace(entry, displacement=distance)
+        if task.intent is None:
+            return entry
+        wish = displacement_from_wish(entry.modification, task.intent, ground)
+        return replace(entry, wish=wish)
 
     def _read(self, task: BenchmarkTask, sample: int, files: Sequence[str]) -> SubmittedEntry:
         entry = SubmittedEntry(

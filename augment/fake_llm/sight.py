@@ -138,14 +138,11 @@ def read_changed_agents(prompt: str) -> list[TrafficAgent]:
         vectors |= json.JSONDecoder().raw_decode(prompt, prompt.index(title) + len(title))[0]
     changed = []
     for name, (kind, *values) in vectors.items():
-        numbers, (lane, *last) = (
-            dict(zip(_NUMBERS, map(float, values[:6]), strict=True)),
-            values[6:],
-        )
-        moves = last and isinstance(last[0], dict)
-        motion = _MOTION.validate_python(last[0]) if moves else None
-        made = {"id": name, "type": AgentType(kind), "lane_id": lane, "motion": motion}
-        changed.append(TrafficAgent(**made, **numbers))
+        made: dict[str, Any] = dict(zip(_NUMBERS, map(float, values[:6]), strict=True))
+        lane, *last = values[6:]
+        if last and isinstance(last[0], dict):
+            made["motion"] = _MOTION.validate_python(last[0])
+        changed.append(TrafficAgent(id=name, type=AgentType(kind), lane_id=lane, **made))
     return changed
 
 

@@ -20,16 +20,14 @@ import sys
 import venv
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from statistics import median
-from urllib.error import URLError
-from urllib.request import urlopen
 
 from bench.report import ROOT, load, table, write_section
 from tests.processes import Machine, machine, wait_until
-from tests.stack import free_port
+from tests.stack import answers, free_port
 
 HEADING = "A real language model, from the endpoint to the table"
 VARIANTS = ("otm", "fc", "tqa", "fc+geo")
@@ -104,13 +102,6 @@ def make_environment() -> Path:
         subprocess.run(command, check=True, env={**os.environ, **PORTABLE})
         stamp.write_text(digest)
     return python
-
-
-def answers(address: str) -> bool:
-    """Return whether a server answers there."""
-    with suppress(URLError, OSError), urlopen(address, timeout=5):
-        return True
-    return False
 
 
 def prepare(installation: Machine, base_url: str) -> str:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from socketserver import ThreadingTCPServer
+from socketserver import TCPServer
 from typing import Any, TypeVar
 
 
@@ -55,7 +55,7 @@ class _Handler(BaseHTTPRequestHandler):
         pass
 
 
-Server = TypeVar("Server", bound=ThreadingTCPServer)
+Server = TypeVar("Server", bound=TCPServer)
 
 
 @contextmanager

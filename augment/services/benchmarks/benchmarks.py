@@ -283,6 +283,7 @@ def _make_set(row: Benchmark, items: Iterable[BenchmarkItem]) -> BenchmarkSet:
 
 def _make_task(item: BenchmarkItem) -> BenchmarkTask:
     row, recording = item.scenario, item.scenario.base_scene.recording
+    loaded = scenes.LoadedScenario(row)
     return BenchmarkTask(
         name=row.slug,
         type=row.type,
@@ -290,10 +291,10 @@ def _make_task(item: BenchmarkItem) -> BenchmarkTask:
         language=row.language,
         split=Split(item.split),
         stratum=Stratum(item.stratum),
-        scene=scenes.LoadedScenario(row).scene,
+        scene=loaded.scene,
         recording=None if recording is None else recording_from_document(recording),
         keeps_traffic=row.keep_traffic,
         paraphrase_of="" if row.paraphrase_of is None else row.paraphrase_of.slug,
         reference=load_standard(row),
-        intent=scenes.load_intent(row),
+        intent=loaded.intent,
     )

@@ -167,43 +167,29 @@ def get_entries(row: Submission) -> list[SubmittedEntry]:
     return sorted(entries, key=lambda entry: entry.status is EntryStatus.READ)
 
 
-def submission_report(contestant: Contestant) -> SubmissionReport:
-    """Return the report from which a contestant of kind submission answers.
-
-    Raises:
-        Conflict: It is not in this installation.
-    """
-    reports = Submission.objects.filter(contestant=contestant).values_list("report", flat=True)
-    document = reports.first()
-    if document is None:
-        raise Conflict(f"The submission of “{contestant.slug}” is not in this installation.")
-    return report_from_document(document)
-
-
 def find_entry(contestant: Contestant, scenario: str, sample: int) -> SubmittedEntry:
     """Return a submission's entry for a scenario, by its slug.
 
     Raises:
         Conflict: It has no such scenario or sample.
     """
-    report = submission_report(contestant)
-    _require_answers(contestant, report, [scenario], sample)
-    entries = report.entries
+    entries = refuse_unanswered(contestant, [scenario], samples=sample).entries
     return next(entry for entry in entries if (entry.task, entry.sample) == (scenario, sample))
 
 
-def refuse_unanswered(contestant: Contestant, scenarios: Iterable[str], *, samples: int) -> None:
-    """Refuse scenarios, by their slugs, or samples that a submission does not answer.
+def refuse_unanswered(
+    contestant: Contestant, scenarios: Iterable[str], *, samples: int
+) -> SubmissionReport:
+    """Return a submission's report, which answers these scenarios, by their slugs, and samples.
 
     Raises:
-        Conflict: There are such ones.
+        Conflict: It does not answer all of them, or is not in this installation.
     """
-    _require_answers(contestant, submission_report(contestant), scenarios, samples)
-
-
-def _require_answers(
-    contestant: Contestant, report: SubmissionReport, scenarios: Iterable[str], samples: int
-) -> None:
+    reports = Submission.objects.filter(contestant=contestant).values_list("report", flat=True)
+    document = reports.first()
+    if document is None:
+        raise Conflict(f"The submission of “{contestant.slug}” is not in this installation.")
+    report = report_from_document(document)
     n = report.card.samples
     if samples > n:
         text = f"“{contestant.slug}” has {n} sample{'s' * (n != 1)} a scenario, not {samples}."
@@ -216,3 +202,4 @@ def _require_answers(
             f"and answers its scenarios alone, not {', '.join(strange[:8])}"
             f"{' and others' * (len(strange) > 8)}."
         )
+    return report
