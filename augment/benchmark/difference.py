@@ -7,6 +7,7 @@ the source as its own format shows it (`SourceView`): what a format loses of bot
 Frame: the ego frame of the source. Notation: S agents of the source, C of the changed scene.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -245,18 +246,14 @@ def _merge_state(
             changes[name] = getattr(agent, name)
     if agent.type is not shown.type:
         changes["type"] = agent.type
-    ends = agent.walk_to_m, shown.walk_to_m
-    if (None in ends and ends != (None, None)) or _apart_m(*ends) > near_m:
+    end, shown_end = agent.walk_to_m, shown.walk_to_m
+    if math.dist(end, shown_end) > near_m if end and shown_end else end != shown_end:
         changes["walk_to_m"] = agent.walk_to_m
     if agent.motion != shown.motion:
         changes["motion"] = agent.motion
     if not changes:
         return source
     return replace(source, **changes, lane_id=agent.lane_id)  # type: ignore[arg-type]
-
-
-def _apart_m(first: tuple[float, float] | None, other: tuple[float, float] | None) -> float:
-    return float(np.hypot(*np.subtract(first, other))) if first and other else 0.0
 
 
 def _free_ids(taken: set[str]) -> Iterator[str]:

@@ -37,7 +37,7 @@ PER_TYPE = 2
 CONTEXT_TOKENS = 8192
 MOST_TOKENS = 768
 """Of an answer; a model of this size often repeats itself until it is cut off."""
-LONGEST_CALL_S = 600
+PATIENT = {"ARENA_LLM_TIMEOUT_S": "600", "ARENA_LLM_QUEUE_S": "600"}
 # Instructions of this processor alone (AMX) have crashed llama.cpp in a virtual machine.
 PORTABLE = {"CMAKE_ARGS": "-DGGML_NATIVE=OFF"}
 JOB = "real-model"
@@ -51,7 +51,7 @@ WEIGHTS = (
 def main(arguments: list[str]) -> None:
     """Print the table; with `--write` store it as well."""
     before = load()
-    with served() as base_url, machine(_settings()) as installation:
+    with served() as base_url, machine(PATIENT) as installation:
         redis = installation.redis()
         worker = installation.worker(concurrency=1)
         try:
@@ -207,10 +207,6 @@ def slug_of(block: str, variant: str) -> str:
 
 _MODELS = "from augment.models import EndpointModel; EndpointModel.objects"
 _OF_CONTESTANT = "JOIN augment_contestant c ON a.contestant_id = c.id WHERE c.slug"
-
-
-def _settings() -> dict[str, str]:
-    return {"ARENA_LLM_TIMEOUT_S": str(LONGEST_CALL_S), "ARENA_LLM_QUEUE_S": str(LONGEST_CALL_S)}
 
 
 if __name__ == "__main__":

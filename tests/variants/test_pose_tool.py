@@ -15,7 +15,8 @@ from augment.scene.entities import AreaKind, InterplanRules, Scene, SceneOptions
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import LanePath
 from augment.scene.planned_mover import check_lane_path
-from augment.variants.pose_tool import OBJECT_TYPES, PoseTool
+from augment.variants.pose_tool import PoseTool
+from augment.variants.retrieval import OBJECT_TYPES
 from tests.fixtures.shelf import whole_scene
 from tests.scenes import curve, junction, scene, vehicle
 
