@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AliasChoices, BeforeValidator, Field, PlainSerializer, TypeAdapter
+from pydantic import AliasChoices, BeforeValidator, Field, TypeAdapter
 
 from augment.errors import InvalidModification
 from augment.scene import entities
@@ -24,7 +24,6 @@ from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path, remember
 
-ENGLISH = "en"
 _ALWAYS_WRITTEN = ("requests", "kind", "body")
 
 
@@ -44,8 +43,7 @@ def _scene_problems(scene: entities.Scene) -> Iterator[Problem]:
             (path(key, i, "id"), element.id) for i, element in enumerate(getattr(scene, key))
         ]
     yield from _find_doubled(named)
-    yield from _second_egos(agents=scene.agents)
-    yield from _motion_problems(agents=scene.agents)
+    yield from _agent_problems(agents=scene.agents)
     yield from _reference_problems(scene)
     try:
         check_scene_motions(scene)
@@ -64,8 +62,7 @@ def _modification_problems(change: entities.Modification) -> Iterator[Problem]:
     named += [(path("move", i, "id"), agent.id) for i, agent in enumerate(change.moved)]
     named += [(path("remove", i), name) for i, name in enumerate(change.removed)]
     yield from _find_doubled(named)
-    yield from _second_egos(add=change.added, move=change.moved)
-    yield from _motion_problems(add=change.added, move=change.moved)
+    yield from _agent_problems(add=change.added, move=change.moved)
 
 
 def _find_doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
@@ -76,16 +73,11 @@ def _find_doubled(named: Iterable[tuple[str, str]]) -> Iterator[Problem]:
         first.setdefault(name, place)
 
 
-def _second_egos(**agents: Iterable[Any]) -> Iterator[Problem]:
+def _agent_problems(**agents: Iterable[entities.TrafficAgent]) -> Iterator[Problem]:
     for key, listed in agents.items():
         for index, agent in enumerate(listed):
             if agent.type is entities.AgentType.EGO_VEHICLE:
                 yield path(key, index, "type"), "there is one ego, and it is not in this list"
-
-
-def _motion_problems(**agents: Iterable[entities.TrafficAgent]) -> Iterator[Problem]:
-    for key, listed in agents.items():
-        for index, agent in enumerate(listed):
             if agent.motion is not None and agent.walk_to_m is not None:
                 yield path(key, index, "motion"), "an agent has a walk or a motion, not both"
 
@@ -130,11 +122,9 @@ def _recording_problems(recording: Recording) -> Iterator[Problem]:
     for place, states in rows:
         if len(states) != len(times_s):
             yield place, f"expected {len(times_s)} states, one a step, got {len(states)}"
-    seen: set[str] = set()
-    for index, track in enumerate(recording.tracks):
-        if track.agent_id in seen:
-            yield path("tracks", index, "agent_id"), f"{track.agent_id!r} has a track already"
-        seen.add(track.agent_id)
+    yield from _find_doubled(
+        (path("tracks", i, "agent_id"), track.agent_id) for i, track in enumerate(recording.tracks)
+    )
 
 
 def _intent_problems(intent: Intent) -> Iterator[Problem]:
@@ -243,26 +233,22 @@ class CatalogueEntry:
 
     slug: _Words
     scene: _Words
-    follows: Annotated[str, Field(exclude_if=lambda slug: not slug)] = ""
+    follows: str = ""
     type: entities.ScenarioType | MotionPreset | Aim
-    language: Annotated[_Language, Field(exclude_if=lambda code: code == ENGLISH)] = ENGLISH
+    language: _Language = "en"
     instruction: _Words
-    paraphrases: Annotated[
-        tuple[Wording, ...], Field(max_length=20, exclude_if=lambda wordings: not wordings)
-    ] = ()
+    paraphrases: Annotated[tuple[Wording, ...], Field(max_length=20)] = ()
     keep_traffic: Yes
     provenance: _Words
     notes: Text = ""
     intent: Annotated[
         Intent | None,
         BeforeValidator(lambda document: document and intent_from_document(document)),
-        PlainSerializer(lambda intent: intent and intent_to_document(intent)),
     ] = None
     reference: Annotated[
         entities.Modification,
         Field(validation_alias=AliasChoices("reference", "example")),
         BeforeValidator(modification_from_document),
-        PlainSerializer(modification_to_document),
     ]
 
     @property
@@ -271,13 +257,4 @@ class CatalogueEntry:
         return self.intent is not None and self.intent.purpose is not None
 
 
-_ENTRY = Codec("scenario", TypeAdapter(CatalogueEntry))
-entry_from_document = _ENTRY.from_document
-
-
-def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
-    """Return the entry as a JSON document; the answer to an open wish stands as its example."""
-    document = _ENTRY.to_document(entry)
-    if entry.is_open:
-        document["example"] = document.pop("reference")
-    return document
+entry_from_document = Codec("scenario", TypeAdapter(CatalogueEntry)).from_document

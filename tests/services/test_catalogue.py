@@ -23,7 +23,7 @@ from augment.models import (
     GenerationJob,
     Scenario,
 )
-from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
+from augment.scene.codec import intent_to_document, modification_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.services.benchmarks.benchmarks import load_standard
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
@@ -36,17 +36,19 @@ from tests.scenes import scene, vehicle
 
 pytestmark = pytest.mark.django_db
 
-PARKED = CatalogueEntry(
-    slug="parked-car",
-    scene="street",
-    type=ScenarioType.NUDGE,
-    instruction="Add a parked car 20 m ahead.",
-    keep_traffic=False,
-    provenance="made for a test",
-    notes="",
-    reference=Modification(added=(vehicle("Agent2", 20.0, -0.8),)),
-    intent=parked(20.0),
-)
+REFERENCE = Modification(added=(vehicle("Agent2", 20.0, -0.8),))
+PARKED = {
+    "format": "scenario-arena/scenario",
+    "version": 1,
+    "slug": "parked-car",
+    "scene": "street",
+    "type": ScenarioType.NUDGE,
+    "instruction": "Add a parked car 20 m ahead.",
+    "keep_traffic": False,
+    "provenance": "made for a test",
+    "reference": modification_to_document(REFERENCE),
+    "intent": intent_to_document(parked(20.0)),
+}
 
 
 @pytest.fixture
@@ -55,7 +57,7 @@ def folder(tmp_path: Path) -> Path:
     for name in ("scenes", "scenarios"):
         (folder / name).mkdir(parents=True)
     (folder / "scenes/street.json").write_text(json.dumps(scene_to_document(scene())))
-    (folder / "scenarios/parked-car.json").write_text(json.dumps(entry_to_document(PARKED)))
+    (folder / "scenarios/parked-car.json").write_text(json.dumps(PARKED))
     return folder
 
 
@@ -95,7 +97,7 @@ def test_a_folder_becomes_rows_and_lines_in_the_log(folder: Path) -> None:
     assert (scenario.slug, scenario.type) == ("parked-car", "nudge_around_parked_vehicle")
     assert scenario.in_catalogue
     assert scenario.base_scene.source == "authored"
-    assert LoadedScenario(scenario).reference == PARKED.reference
+    assert LoadedScenario(scenario).reference == REFERENCE
     assert set(Event.objects.values_list("actor", "object_kind")) == {
         (ada.pk, "scene"),
         (ada.pk, "scenario"),
@@ -240,7 +242,7 @@ def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Pa
     assert [*BaseScene.objects.filter(provenance="newer")] == [
         BaseScene.objects.get(slug="avenue")
     ]
-    assert Augmentation.objects.get().scenario.instruction == PARKED.instruction
+    assert Augmentation.objects.get().scenario.instruction == PARKED["instruction"]
 
 
 def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
