@@ -5,25 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from augment.checks import Finding, FindingKind, Ground, Severity
+from augment.checks import FindingKind, Ground, Severity
 from augment.checks.registry import check_against_intent
-from augment.scene.entities import AgentType, Modification, TrafficAgent, TrafficSide
-from augment.scene.intent import (
-    Bearing,
-    Body,
-    CrashedCar,
-    CrashRequest,
-    Facing,
-    Intent,
-    LaneChoice,
-    LateralTarget,
-    Length,
-    Relation,
-    Shape,
-    Side,
-    Spot,
-    VehicleRequest,
-)
+from augment.scene import intent as wish
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TrafficSide
+from tests.checks.worlds import faults_against
 from tests.fixtures.shelf import AUTHORED
 from tests.intents import (
     CENTRED,
@@ -41,16 +27,18 @@ from tests.scenes import cone, curve, pedestrian, scene, vehicle
 
 CAR = parked(20.0, lateral=towards(LEFT_EDGE, 1.2))
 MIDDLE = parked(20.0, lateral=CENTRED)
-FACING = parked(20.0, facing=Facing.AGAINST_LANE)
-WALK = walk(20.0, Side.LEFT)
-CRASH = crash(20.0, 2, CrashedCar(turn_deg=40.0))
-LINE = cones(20.0, 3, Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.5))
-BUS = parked(35.0, body=Body.BUS)
+FACING = parked(20.0, facing=wish.Facing.AGAINST_LANE)
+WALK = walk(20.0, wish.Side.LEFT)
+CRASH = crash(20.0, 2, wish.CrashedCar(turn_deg=40.0))
+LINE = cones(20.0, 3, wish.Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.5))
+BUS = parked(35.0, body=wish.Body.BUS)
 DRIVING = parked(30.0, speed_mps=8.0)
-ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
-FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),))
-SLANTED = walk(20.0, Side.LEFT, drift_m=8.0)
-NARROWED = cones(20.0, 3, Shape.TAPER, start=Side.RIGHT, ends_in_middle=True, has_worker=True)
+ONCOMING = parked(20.0, lane=wish.LaneChoice.ONCOMING)
+FILE = walk(20.0, wish.Side.LEFT, count=2, is_file=True, behind=(metres(3.0),))
+SLANTED = walk(20.0, wish.Side.LEFT, drift_m=8.0)
+NARROWED = cones(
+    20.0, 3, wish.Shape.TAPER, start=wish.Side.RIGHT, ends_in_middle=True, has_worker=True
+)
 
 ACROSS = (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),)
 CARS = (vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 24.5, 0.0, math.radians(40.0)))
@@ -66,12 +54,11 @@ CONES = tuple(cone(f"Agent{n + 2}", 20.0 + 2.5 * n, -1.5) for n in range(3))
 A_BUS = replace(vehicle("Agent2", 35.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
 
 
-def held(intent: Intent, *added: TrafficAgent) -> tuple[Finding, ...]:
-    return check_against_intent(Ground.of(scene()), Modification(added=added), intent)
-
-
-def faults(intent: Intent, *added: TrafficAgent) -> set[FindingKind]:
-    return {one.kind for one in held(intent, *added) if one.is_fault}
+def faults(
+    intent: wish.Intent | None, *added: TrafficAgent, where: Scene | None = None
+) -> set[FindingKind]:
+    found = faults_against(where or scene(), Modification(added=added), intent)
+    return {one.kind for one in found}
 
 
 @pytest.mark.parametrize(
@@ -94,7 +81,7 @@ def faults(intent: Intent, *added: TrafficAgent) -> set[FindingKind]:
     ],
 )
 def test_what_is_as_asked_for_has_no_fault(
-    intent: Intent, added: tuple[TrafficAgent, ...]
+    intent: wish.Intent, added: tuple[TrafficAgent, ...]
 ) -> None:
     assert faults(intent, *added) == set()
 
@@ -141,11 +128,15 @@ def test_what_is_as_asked_for_has_no_fault(
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), FindingKind.ASKED_DISTANCE),
         (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), FindingKind.ASKED_ACROSS),
         (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=-7.0)), FindingKind.ASKED_SPACING),
-        (cones(20.0, 3, Shape.TAPER, start=Side.LEFT), TAPER[:3], FindingKind.ASKED_SIDE),
+        (
+            cones(20.0, 3, wish.Shape.TAPER, start=wish.Side.LEFT),
+            TAPER[:3],
+            FindingKind.ASKED_SIDE,
+        ),
     ],
 )
 def test_what_is_not_as_asked_for_is_the_one_fault(
-    intent: Intent, added: tuple[TrafficAgent, ...], kind: FindingKind
+    intent: wish.Intent, added: tuple[TrafficAgent, ...], kind: FindingKind
 ) -> None:
     found = faults(intent, *added)
     assert found - {FindingKind.WALK_HEADING} == {kind}
@@ -198,10 +189,10 @@ def test_a_distance_may_be_off_by_the_whole_tolerance(
 )
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
-    ("facing", "lane_deg"), [(Facing.WITH_LANE, 0.0), (Facing.AGAINST_LANE, 180.0)]
+    ("facing", "lane_deg"), [(wish.Facing.WITH_LANE, 0.0), (wish.Facing.AGAINST_LANE, 180.0)]
 )
 def test_a_vehicle_may_be_turned_by_fifteen_degrees(
-    facing: Facing, lane_deg: float, sign: float, off_deg: float, is_fault: bool
+    facing: wish.Facing, lane_deg: float, sign: float, off_deg: float, is_fault: bool
 ) -> None:
     heading_rad = math.remainder(math.radians(lane_deg + sign * off_deg), math.tau)
     found = faults(parked(20.0, facing=facing), vehicle("Agent2", 20.0, 0.0, heading_rad))
@@ -209,11 +200,8 @@ def test_a_vehicle_may_be_turned_by_fifteen_degrees(
 
 
 def test_a_finding_says_the_numbers() -> None:
-    (distance,) = (
-        one
-        for one in held(CAR, vehicle("Agent2", 27.3, 1.2))
-        if one.kind is FindingKind.ASKED_DISTANCE
-    )
+    change = Modification(added=(vehicle("Agent2", 27.3, 1.2),))
+    (distance,) = faults_against(scene(), change, CAR)
     assert distance.severity is Severity.WRONG
     assert distance.measured["off"] == pytest.approx(7.3)
     assert distance.sentence() == (
@@ -222,48 +210,35 @@ def test_a_finding_says_the_numbers() -> None:
 
 
 def test_the_distance_is_counted_along_a_bend() -> None:
-    ground = Ground.of(curve())
     bent = vehicle("Agent2", 10.0 + 40.0 * math.sin(0.5), 40.0 * (1.0 - math.cos(0.5)), 0.5)
     straight = vehicle("Agent2", 30.0, 0.0)
     said = parked(30.0, lateral=CENTRED)
-    kinds = [
-        {
-            one.kind
-            for one in check_against_intent(ground, Modification(added=(agent,)), said)
-            if one.is_fault
-        }
-        for agent in (bent, straight)
-    ]
-    assert kinds[0] == set()
-    assert FindingKind.ASKED_ACROSS in kinds[1]
+    assert faults(said, bent, where=curve()) == set()
+    assert FindingKind.ASKED_ACROSS in faults(said, straight, where=curve())
 
 
 def test_the_kerb_is_where_the_map_says() -> None:
-    said = parked(20.0, lateral=towards(LateralTarget.KERB, 1.2))
+    said = parked(20.0, lateral=towards(wish.LateralTarget.KERB, 1.2))
     for side, y_m in ((TrafficSide.RIGHT, -1.2), (TrafficSide.LEFT, 1.2)):
-        ground = Ground.of(scene(traffic_side=side))
-        found = check_against_intent(
-            ground, Modification(added=(vehicle("Agent2", 20.0, y_m),)), said
-        )
-        assert not [one for one in found if one.is_fault]
+        where = scene(traffic_side=side)
+        assert faults(said, vehicle("Agent2", 20.0, y_m), where=where) == set()
 
 
 def test_what_is_doubtful_is_settled_where_it_was_asked_for() -> None:
     agent = vehicle("Agent2", 20.0, 0.0, math.pi)
-    alone = check_against_intent(Ground.of(scene()), Modification(added=(agent,)), None)
-    assert [one.kind for one in alone if one.is_fault] == [FindingKind.HEADING]
+    assert faults(None, agent) == {FindingKind.HEADING}
     assert faults(FACING, agent) == set()
 
 
 def test_what_is_open_is_held_against_nothing() -> None:
-    somewhere = Intent(requests=(replace(CAR.requests[0], spot=Spot(), speed_mps=None),))  # type: ignore[arg-type]
+    somewhere = wish.Intent(requests=(replace(CAR.requests[0], spot=wish.Spot(), speed_mps=None),))  # type: ignore[arg-type]
     here = replace(vehicle("Agent2", 47.0, 0.4), speed_mps=3.0)
     assert faults(somewhere, here) == set()
 
 
 def test_any_number_answers_an_open_count_but_none_does_not() -> None:
     (request,) = LINE.requests
-    some = Intent(requests=(replace(request, count=None),))
+    some = wish.Intent(requests=(replace(request, count=None),))
     assert faults(some, *CONES) == set()
     assert faults(some, *CONES[:2]) == set()
     assert faults(some) == {FindingKind.ASKED_COUNT}
@@ -272,14 +247,14 @@ def test_any_number_answers_an_open_count_but_none_does_not() -> None:
 def test_ahead_without_a_number_is_anywhere_ahead() -> None:
     (request,) = MIDDLE.requests
     where = replace(request.spot, distance=None)
-    ahead = Intent(requests=(replace(request, spot=where),))
+    ahead = wish.Intent(requests=(replace(request, spot=where),))
     assert faults(ahead, vehicle("Agent2", 47.0, 0.0)) == set()
     assert faults(ahead, vehicle("Agent2", -20.0, 0.0)) == {FindingKind.ASKED_DISTANCE}
 
 
 def test_a_row_is_measured_from_centre_to_centre_along_its_lane_or_straight() -> None:
-    one = VehicleRequest(spot=spot(20.0), count=3, speed_mps=0.0, spacing=metres(8.0))
-    row = Intent(requests=(one,))
+    one = wish.VehicleRequest(spot=spot(20.0), count=3, speed_mps=0.0, spacing=metres(8.0))
+    row = wish.Intent(requests=(one,))
     cars = [vehicle(f"Agent{n + 2}", 20.0 + 8.0 * n, 0.0) for n in range(3)]
     assert faults(row, *cars) == set()
     gaps = [vehicle(f"Agent{n + 2}", 20.0 + 12.8 * n, 0.0) for n in range(3)]  # 8 m between boxes
@@ -289,7 +264,7 @@ def test_a_row_is_measured_from_centre_to_centre_along_its_lane_or_straight() ->
 def test_cones_around_a_sharp_bend_are_apart_along_the_lane() -> None:
     """On a circle of 6 m, 5 m along the lane are 4.8 m straight, and 3.8 m at its inner edge."""
     bend, wanted = curve(6.0), metres(5.0)
-    line = cones(12.5, 3, Shape.LINE, lateral=towards(LEFT_EDGE), spacing=wanted)
+    line = cones(12.5, 3, wish.Shape.LINE, lateral=towards(LEFT_EDGE), spacing=wanted)
     angles = [(2.5 + 5.0 * n) / 6.0 for n in range(2)]
     inner = [(10.0 + 4.25 * math.sin(a), 6.0 - 4.25 * math.cos(a)) for a in angles]
     added = [cone(f"Agent{n + 2}", *place) for n, place in enumerate([(7.5, 1.75), *inner])]
@@ -299,8 +274,8 @@ def test_cones_around_a_sharp_bend_are_apart_along_the_lane() -> None:
     assert spacing.measured["value"] == pytest.approx(5.0, abs=0.1)
 
 
-SPOT = Spot(distance=Length(low_m=25.0, high_m=25.0), relation=Relation.AHEAD)
-GAP = Length(low_m=4.6, high_m=4.6)
+SPOT = wish.Spot(distance=wish.Length(low_m=25.0, high_m=25.0), relation=wish.Relation.AHEAD)
+GAP = wish.Length(low_m=4.6, high_m=4.6)
 
 
 def cars(*places: tuple[float, float, float]) -> tuple[TrafficAgent, ...]:
@@ -311,16 +286,18 @@ def cars(*places: tuple[float, float, float]) -> tuple[TrafficAgent, ...]:
     )
 
 
-CHAIN = CrashRequest(
+CHAIN = wish.CrashRequest(
     spot=SPOT,
     count=3,
-    others=(CrashedCar(gap=GAP, turn_deg=25.0), CrashedCar(gap=GAP, turn_deg=60.0)),
+    others=(wish.CrashedCar(gap=GAP, turn_deg=25.0), wish.CrashedCar(gap=GAP, turn_deg=60.0)),
 )
-BEHIND = CrashRequest(
-    spot=SPOT, count=2, others=(CrashedCar(gap=GAP, bearing=Bearing.BEHIND, turn_deg=40.0),)
+BEHIND = wish.CrashRequest(
+    spot=SPOT,
+    count=2,
+    others=(wish.CrashedCar(gap=GAP, bearing=wish.Bearing.BEHIND, turn_deg=40.0),),
 )
-PLAIN = CrashRequest(spot=SPOT, count=2)
-FIRST_ACROSS = CrashRequest(spot=SPOT, count=2, facing=Facing.ACROSS)
+PLAIN = wish.CrashRequest(spot=SPOT, count=2)
+FIRST_ACROSS = wish.CrashRequest(spot=SPOT, count=2, facing=wish.Facing.ACROSS)
 AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
 
 
@@ -344,6 +321,6 @@ AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
     ],
 )
 def test_how_crashed_cars_lie_to_each_other(
-    request_: CrashRequest, added: tuple[TrafficAgent, ...], kinds: list[str]
+    request_: wish.CrashRequest, added: tuple[TrafficAgent, ...], kinds: list[str]
 ) -> None:
-    assert faults(Intent(requests=(request_,)), *added) == set(kinds)
+    assert faults(wish.Intent(requests=(request_,)), *added) == set(kinds)

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.checks import FindingKind, Ground, Severity
-from augment.checks.registry import check_against_intent
+from augment.checks import FindingKind
 from augment.errors import CannotPlace
 from augment.scene.codec import INTENT, intent_from_document
 from augment.scene.entities import AgentType, Area, AreaKind, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion
+from tests.checks.worlds import faults_against
 from tests.scene.test_presets import bend, crossing, lanes
 from tests.scenes import pedestrian, scene, vehicle
 
@@ -111,12 +111,8 @@ WISHES: dict[str, tuple[Scene, Intent]] = {
 
 
 def faults(base: Scene, change: Modification, intent: Intent) -> set[FindingKind]:
-    found = check_against_intent(Ground.of(base), change, intent)
-    return {
-        one.kind
-        for one in found
-        if one.severity is Severity.WRONG and one.kind.startswith("asked")
-    }
+    found = faults_against(base, change, intent)
+    return {one.kind for one in found if one.kind.startswith("asked")}
 
 
 @pytest.mark.parametrize("name", WISHES)

@@ -12,7 +12,7 @@ from augment.baselines.rule_placer import place
 from augment.checks.derived import classify_change, describe_change
 from augment.checks.finding import FindingKind
 from augment.checks.ground import Ground
-from augment.checks.registry import check_against_intent, findings_on
+from augment.checks.registry import findings_on
 from augment.checks.wish import measure_wish
 from augment.geometry.frames import Pose, difference, overlap
 from augment.scene.codec import intent_to_document
@@ -29,15 +29,8 @@ from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import PlannedMotion
 from tests.checks.test_asked_motions import WISHES
-from tests.fixtures.shelf import (
-    HARD_SCENES,
-    HARD_SLUGS,
-    SCENES,
-    SLUGS,
-    entry,
-    shown_scene,
-    whole_scene,
-)
+from tests.checks.worlds import faults_against
+from tests.fixtures import shelf
 from tests.recorded import recorded_moments
 from tests.scenes import junction, pedestrian, scene, vehicle
 
@@ -118,8 +111,8 @@ def _answers(drawn: TrafficAgent, placed: TrafficAgent) -> bool:
 def test_what_is_drawn_in_the_catalogue_is_placed_again_by_its_own_sentence() -> None:
     problems = [
         problem
-        for name in (*SCENES, *HARD_SCENES)
-        for problem in place_as_drawn(name, whole_scene(name), 6)
+        for name in (*shelf.SCENES, *shelf.HARD_SCENES)
+        for problem in place_as_drawn(name, shelf.whole_scene(name), 6)
     ]
     assert not problems
 
@@ -138,16 +131,15 @@ def test_what_is_drawn_on_recorded_moments_is_placed_again_by_its_own_sentence(
 
 def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
     unanswered = set()
-    for slug in (*SLUGS[::3], *HARD_SLUGS[::3], "brewery-crossing-pile-up"):
-        given, here = entry(slug), shown_scene(slug)
+    for slug in (*shelf.SLUGS[::3], *shelf.HARD_SLUGS[::3], "brewery-crossing-pile-up"):
+        given, here = shelf.entry(slug), shelf.shown_scene(slug)
         if given.reference.is_empty:
             continue
         sentence, intent = describe_change(ScenarioType(given.type), given.reference, here)
         assert sentence.endswith(".")
         assert intent is not None
         assert intent_to_document(intent)["requests"] is not None
-        found = check_against_intent(Ground.of(here), given.reference, intent)
-        unanswered |= {slug} if any(one.is_fault for one in found) else set()
+        unanswered |= {slug} if faults_against(here, given.reference, intent) else set()
     assert not unanswered
 
 
@@ -202,9 +194,7 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
         assert words in sentence
     assert intent is not None
     assert "barrier: 45 m ahead of the ego on the way to Lane2" in list_statements(intent)
-    assert not [
-        one for one in check_against_intent(Ground.of(here), change, intent) if one.is_fault
-    ]
+    assert faults_against(here, change, intent) == []
     measured = findings_on(Ground.of(here), Modification(added=(replace(barrier, y_m=0.5),)))
     assert "is 45.0 m ahead of the ego along the way to Lane2 and" in measured[0].sentence()
     placed = {one.type: one for one in place(here, intent).modification.added}
@@ -212,8 +202,7 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     assert placed[AgentType.PEDESTRIAN].pose.beside(0.0) == pytest.approx((40.0, 3.0))
     assert placed[AgentType.PEDESTRIAN].walk_to_m == person.walk_to_m
     far = Modification(added=(replace(barrier, x_m=50.0, y_m=-2.0), replace(person, y_m=6.0)))
-    found = check_against_intent(Ground.of(here), far, intent)
-    assert [one.kind for one in found if one.is_fault] == [
+    assert [one.kind for one in faults_against(here, far, intent)] == [
         *(FindingKind.ASKED_DISTANCE, FindingKind.ASKED_ACROSS, FindingKind.ASKED_ACROSS)
     ]
 
@@ -251,8 +240,8 @@ def test_a_motion_that_was_placed_is_derived_as_it_was_asked_for(name: str) -> N
         assert getattr(wanted, part) in (None, getattr(got, part))
     assert f"then: {got.preset.label.lower()}" in sentence
     assert classify_change(change, base) == wanted.preset
-    found = check_against_intent(Ground.of(base), change, intent)
-    assert not [one for one in found if one.is_fault and one.kind.startswith("asked")]
+    found = faults_against(base, change, intent)
+    assert not [one for one in found if one.kind.startswith("asked")]
 
 
 def test_a_motion_that_is_no_preset_stays_outside_the_fields() -> None:

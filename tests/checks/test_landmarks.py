@@ -12,22 +12,9 @@ from augment.checks.lanes_across import (
     list_absent,
     resolve_spots,
 )
-from augment.checks.registry import check_against_intent
+from augment.scene import intent as wish
 from augment.scene.entities import Modification, TurnType
-from augment.scene.intent import (
-    Intent,
-    LaneChoice,
-    Length,
-    MapPlace,
-    Move,
-    Pick,
-    Relation,
-    Side,
-    Sight,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
+from tests.checks.worlds import faults_against
 from tests.fixtures.shelf import whole_scene
 from tests.intents import metres, parked
 from tests.scenes import scene
@@ -42,12 +29,11 @@ def lanes_of(scene_name: str, route: TurnType = TurnType.STRAIGHT) -> LanesAcros
     return lanes
 
 
-def faults(intent: Intent, modification: Modification) -> list[str]:
-    found = check_against_intent(Ground.of(LANDMARK_STREET), modification, intent)
-    return [one.sentence() for one in found if one.is_fault]
+def faults(intent: wish.Intent, modification: Modification) -> list[str]:
+    return [one.sentence() for one in faults_against(LANDMARK_STREET, modification, intent)]
 
 
-PARKED_LEFT = Pick(kind=Sight.PARKED, side=Side.LEFT)
+PARKED_LEFT = wish.Pick(kind=wish.Sight.PARKED, side=wish.Side.LEFT)
 
 
 @pytest.mark.parametrize(
@@ -56,16 +42,16 @@ PARKED_LEFT = Pick(kind=Sight.PARKED, side=Side.LEFT)
         (PARKED_LEFT, [1.0]),
         (replace(PARKED_LEFT, ordinal=3), [14.2]),
         (replace(PARKED_LEFT, ordinal=5), []),
-        (replace(PARKED_LEFT, relation=Relation.BEHIND), [-5.1]),
-        (replace(PARKED_LEFT, relation=Relation.BEHIND, ordinal=2), [-11.0]),
+        (replace(PARKED_LEFT, relation=wish.Relation.BEHIND), [-5.1]),
+        (replace(PARKED_LEFT, relation=wish.Relation.BEHIND, ordinal=2), [-11.0]),
         (replace(PARKED_LEFT, every=True), [1.0, 6.9, 14.2, 28.2]),
-        (Pick(kind=Sight.PARKED, side=Side.RIGHT, ordinal=2), [15.4]),
-        (Pick(kind=Sight.BICYCLE, lane=LaneChoice.ONCOMING), [72.0]),
-        (Pick(kind=Sight.BICYCLE, lane=LaneChoice.OWN), []),
-        (Pick(kind=Sight.BUS), []),
+        (wish.Pick(kind=wish.Sight.PARKED, side=wish.Side.RIGHT, ordinal=2), [15.4]),
+        (wish.Pick(kind=wish.Sight.BICYCLE, lane=wish.LaneChoice.ONCOMING), [72.0]),
+        (wish.Pick(kind=wish.Sight.BICYCLE, lane=wish.LaneChoice.OWN), []),
+        (wish.Pick(kind=wish.Sight.BUS), []),
     ],
 )
-def test_the_nearest_that_fits_is_the_first(pick: Pick, along_m: list[float]) -> None:
+def test_the_nearest_that_fits_is_the_first(pick: wish.Pick, along_m: list[float]) -> None:
     lanes = lanes_of("terrace-row")
     found = [lanes.route.locate_agent(one).ahead_m for one in find_picked(lanes, pick)]
     assert found == pytest.approx(along_m, abs=0.05)
@@ -73,29 +59,31 @@ def test_the_nearest_that_fits_is_the_first(pick: Pick, along_m: list[float]) ->
 
 def test_a_junction_begins_where_the_ego_s_lane_ends() -> None:
     """The ego is 36 m before the middle; stop lines are 4 + 7 + 5 m off it."""
-    start_m = find_mark(lanes_of("market-crossing"), MapPlace.JUNCTION_START)
-    end_m = find_mark(lanes_of("market-crossing"), MapPlace.JUNCTION_END)
+    start_m = find_mark(lanes_of("market-crossing"), wish.MapPlace.JUNCTION_START)
+    end_m = find_mark(lanes_of("market-crossing"), wish.MapPlace.JUNCTION_END)
     assert (start_m, end_m) == pytest.approx((20.0, 52.0), abs=0.01)
-    assert find_mark(lanes_of("terrace-row"), MapPlace.JUNCTION_START) is None
-    turned_m = find_mark(lanes_of("market-crossing", TurnType.RIGHT), MapPlace.JUNCTION_END)
+    assert find_mark(lanes_of("terrace-row"), wish.MapPlace.JUNCTION_START) is None
+    turned_m = find_mark(lanes_of("market-crossing", TurnType.RIGHT), wish.MapPlace.JUNCTION_END)
     assert turned_m is not None
     assert 30.0 < turned_m < 45.0
 
 
 def test_a_crosswalk_is_counted_by_its_middle() -> None:
     """Authored from 117 to 120.5 m, the ego at 80 m."""
-    assert find_mark(lanes_of("plane-tree-street"), MapPlace.CROSSWALK) == pytest.approx(
+    assert find_mark(lanes_of("plane-tree-street"), wish.MapPlace.CROSSWALK) == pytest.approx(
         38.75, abs=0.1
     )
-    assert find_mark(lanes_of("terrace-row"), MapPlace.CROSSWALK) is None
+    assert find_mark(lanes_of("terrace-row"), wish.MapPlace.CROSSWALK) is None
 
 
 def test_a_distance_from_a_landmark_becomes_one_from_the_ego() -> None:
-    three = Length(low_m=3.0, high_m=3.0)
-    spot = Spot(distance=three, relation=Relation.BEHIND, landmark=PARKED_LEFT)
-    level = Spot(landmark=replace(PARKED_LEFT, relation=Relation.BEHIND))
-    absent = replace(spot, landmark=Pick(kind=Sight.BUS))
-    intent = Intent(requests=tuple(VehicleRequest(spot=one) for one in (spot, level, absent)))
+    three = wish.Length(low_m=3.0, high_m=3.0)
+    spot = wish.Spot(distance=three, relation=wish.Relation.BEHIND, landmark=PARKED_LEFT)
+    level = wish.Spot(landmark=replace(PARKED_LEFT, relation=wish.Relation.BEHIND))
+    absent = replace(spot, landmark=wish.Pick(kind=wish.Sight.BUS))
+    intent = wish.Intent(
+        requests=tuple(wish.VehicleRequest(spot=one) for one in (spot, level, absent))
+    )
     lanes = lanes_of("terrace-row")
     spans = [one.spot.span_m for one in resolve_spots(intent, lanes).requests]
     assert spans[0] == pytest.approx((-2.0, -2.0), abs=0.05)
@@ -108,9 +96,9 @@ def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
     lanes = lanes_of("terrace-row")
     (car,) = find_picked(lanes, replace(PARKED_LEFT, ordinal=3))
     (other,) = find_picked(lanes, replace(PARKED_LEFT, ordinal=4))
-    ten = Length(low_m=21.0, high_m=21.0)
-    there = Spot(distance=ten, relation=Relation.AHEAD, lane=LaneChoice.OWN)
-    intent = Intent(moves=(Move(who=replace(PARKED_LEFT, ordinal=3), spot=there),))
+    ten = wish.Length(low_m=21.0, high_m=21.0)
+    there = wish.Spot(distance=ten, relation=wish.Relation.AHEAD, lane=wish.LaneChoice.OWN)
+    intent = wish.Intent(moves=(wish.Move(who=replace(PARKED_LEFT, ordinal=3), spot=there),))
     x_m, y_m = lanes.route.position(21.0, 0.0)
     right = replace(car, x_m=x_m, y_m=y_m)
     x_m, y_m = lanes.route.position(26.0, 0.0)
@@ -127,7 +115,7 @@ def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
 def test_who_is_to_go_has_to_go_and_nobody_else() -> None:
     lanes = lanes_of("terrace-row")
     every = find_picked(lanes, replace(PARKED_LEFT, every=True))
-    intent = Intent(removals=(replace(PARKED_LEFT, every=True),))
+    intent = wish.Intent(removals=(replace(PARKED_LEFT, every=True),))
     names = tuple(one.id for one in every)
     assert faults(intent, Modification(removed=names)) == []
     assert faults(intent, Modification(removed=names[1:])) == [
@@ -136,7 +124,7 @@ def test_who_is_to_go_has_to_go_and_nobody_else() -> None:
 
 
 def test_whatever_is_done_about_a_wish_that_can_t_be_met_is_wrong() -> None:
-    intent = Intent(unmet="There is no tram {here}.")
+    intent = wish.Intent(unmet="There is no tram {here}.")
     gone = LANDMARK_STREET.agents[0].id
     assert faults(intent, Modification()) == []
     found = faults(intent, Modification(removed=(gone,)))
@@ -146,19 +134,22 @@ def test_whatever_is_done_about_a_wish_that_can_t_be_met_is_wrong() -> None:
 @pytest.mark.parametrize(
     ("bus_m", "relation", "distance", "wanted"),
     [
-        (20.0, Relation.AHEAD, metres(6.0), (26.0, 26.0)),
-        (20.0, Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
-        (20.0, Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
-        (20.0, Relation.AHEAD, None, None),
+        (20.0, wish.Relation.AHEAD, metres(6.0), (26.0, 26.0)),
+        (20.0, wish.Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
+        (20.0, wish.Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
+        (20.0, wish.Relation.AHEAD, None, None),
     ],
 )
 def test_a_distance_from_another_object_is_added_to_that_ones(
-    bus_m: float, relation: Relation, distance: Length | None, wanted: tuple[float, float] | None
+    bus_m: float,
+    relation: wish.Relation,
+    distance: wish.Length | None,
+    wanted: tuple[float, float] | None,
 ) -> None:
     (bus,) = parked(bus_m).requests
-    named = VehicleRequest(spot=bus.spot, name="bus")
-    walker = WalkRequest(spot=Spot(anchor="bus", relation=relation, distance=distance))
+    named = wish.VehicleRequest(spot=bus.spot, name="bus")
+    walker = wish.WalkRequest(spot=wish.Spot(anchor="bus", relation=relation, distance=distance))
     lanes = LanesAcross.of(Ground.of(scene()))
     assert lanes is not None
-    resolved = resolve_spots(Intent(requests=(named, walker)), lanes)
+    resolved = resolve_spots(wish.Intent(requests=(named, walker)), lanes)
     assert resolved.requests[1].spot.span_m == wanted

@@ -10,10 +10,10 @@ import pytest
 from augment.checks import Ground
 from augment.checks.ground import ChangedScene
 from augment.checks.purpose import check_drive, measure_passage, measure_sight
-from augment.checks.registry import check_against_intent
 from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.intent import Intent, Length, Purpose
 from augment.scene.intent_parts import Amount
+from tests.checks.worlds import faults_against
 from tests.scenes import cone, pedestrian, scene, vehicle
 from tests.simulation.worlds import street
 
@@ -95,9 +95,8 @@ ACROSS = vehicle("A", 30.0, 0.0, 1.0)
 def test_the_effect_alone_is_held_against_a_purpose(
     intent: Intent, added: list[TrafficAgent], words: list[str]
 ) -> None:
-    change = Modification(added=tuple(added))
-    found = check_against_intent(Ground.of(street()), change, intent)
-    faults = [one.sentence() for one in found if one.is_fault]
+    found = faults_against(street(), Modification(added=tuple(added)), intent)
+    faults = [one.sentence() for one in found]
     assert len(faults) == len(words), faults
     assert all(said.endswith(end) for said, end in zip(faults, words, strict=True)), faults
 
@@ -106,8 +105,7 @@ def test_moving_and_removing_may_serve_a_purpose() -> None:
     scene = replace(street(), agents=(vehicle("A", 30.0, 0.0), vehicle("B", 50.0, 0.0)))
     moved = replace(scene.agents[0], x_m=35.0)
     change = Modification(moved=(moved,), removed=("B",))
-    found = check_against_intent(Ground.of(scene), change, WIDE)
-    assert [one.sentence() for one in found if one.is_fault] == []
+    assert faults_against(scene, change, WIDE) == []
 
 
 @pytest.mark.parametrize(

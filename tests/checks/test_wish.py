@@ -11,23 +11,8 @@ from hypothesis import strategies as st
 from augment.baselines.rule_placer import place
 from augment.checks import Ground
 from augment.checks.wish import WishDistance, measure_wish
+from augment.scene import intent as wish
 from augment.scene.entities import Area, AreaKind, Modification, Scene, TrafficAgent
-from augment.scene.intent import (
-    Bearing,
-    Body,
-    CrashedCar,
-    Intent,
-    LaneChoice,
-    MapPlace,
-    Nearness,
-    Post,
-    Relation,
-    Setting,
-    Shape,
-    Side,
-    Spot,
-    VehicleRequest,
-)
 from tests.intents import (
     CENTRED,
     LEFT_EDGE,
@@ -66,17 +51,21 @@ def car(ahead_m: float, left_m: float, number: int = 2) -> TrafficAgent:
     return vehicle(f"Agent{number}", ahead_m, left_m)
 
 
-def named(*settings: Setting) -> Intent:
+def named(*settings: wish.Setting) -> wish.Intent:
     """One car in the ego's lane at a named place."""
-    where = Spot(lane=LaneChoice.OWN, settings=settings)
-    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, speed_mps=0.0, count=1),))
+    where = wish.Spot(lane=wish.LaneChoice.OWN, settings=settings)
+    return wish.Intent(
+        requests=(wish.VehicleRequest(spot=where, body=wish.Body.CAR, speed_mps=0.0, count=1),)
+    )
 
 
-def by_zebra(relation: Relation | None) -> Intent:
+def by_zebra(relation: wish.Relation | None) -> wish.Intent:
     """One car 5 m from the zebra, or on it."""
     five = metres(5.0) if relation else None
-    where = Spot(distance=five, relation=relation, mark=MapPlace.CROSSWALK)
-    return Intent(requests=(VehicleRequest(spot=where, body=Body.CAR, speed_mps=0.0, count=1),))
+    where = wish.Spot(distance=five, relation=relation, mark=wish.MapPlace.CROSSWALK)
+    return wish.Intent(
+        requests=(wish.VehicleRequest(spot=where, body=wish.Body.CAR, speed_mps=0.0, count=1),)
+    )
 
 
 def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
@@ -85,30 +74,34 @@ def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
 
 AT_20 = parked(20.0)
 SIDE = parked(20.0, lateral=towards(LEFT_EDGE, 1.2))
-RANGE = parked(20.0, lateral=towards(LEFT_EDGE, how=Nearness.SLIGHTLY))
-OUTSIDE = parked(20.0, lateral=towards(RIGHT_EDGE, how=Nearness.OUTSIDE))
-ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
-LINE = cones(20.0, 3, Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.0, 3.0))
-ROW = cones(20.0, 3, Shape.ROW, spacing=metres(1.2))
-TAPER = cones(20.0, 3, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, ends_in_middle=True)
-RING = cones(20.0, 4, Shape.RING, spacing=metres(2.0), has_worker=True)
-WORKED = cones(20.0, 2, Shape.ROW, spacing=metres(1.0), has_worker=True, post=Post.BEHIND)
-PAIR = crash(20.0, 2, CrashedCar(gap=metres(4.0), bearing=Bearing.LEFT))
-WALK = walk(20.0, Side.LEFT)
-QUEUE = Intent(
+RANGE = parked(20.0, lateral=towards(LEFT_EDGE, how=wish.Nearness.SLIGHTLY))
+OUTSIDE = parked(20.0, lateral=towards(RIGHT_EDGE, how=wish.Nearness.OUTSIDE))
+ONCOMING = parked(20.0, lane=wish.LaneChoice.ONCOMING)
+LINE = cones(20.0, 3, wish.Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.0, 3.0))
+ROW = cones(20.0, 3, wish.Shape.ROW, spacing=metres(1.2))
+TAPER = cones(
+    20.0, 3, wish.Shape.TAPER, spacing=metres(2.5), start=wish.Side.LEFT, ends_in_middle=True
+)
+RING = cones(20.0, 4, wish.Shape.RING, spacing=metres(2.0), has_worker=True)
+WORKED = cones(
+    20.0, 2, wish.Shape.ROW, spacing=metres(1.0), has_worker=True, post=wish.Post.BEHIND
+)
+PAIR = crash(20.0, 2, wish.CrashedCar(gap=metres(4.0), bearing=wish.Bearing.LEFT))
+WALK = walk(20.0, wish.Side.LEFT)
+QUEUE = wish.Intent(
     requests=(
-        VehicleRequest(
+        wish.VehicleRequest(
             spot=parked(20.0).requests[0].spot,
-            body=Body.CAR,
+            body=wish.Body.CAR,
             count=3,
             spacing=metres(6.0, 8.0),
             speed_mps=0.0,
         ),
     )
 )
-FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
+FILE = walk(20.0, wish.Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
 
-HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]] = [
+HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[float]]] = [
     # One object along the lane and across it.
     (STREET, AT_20, (car(20.0, 1.5),), [0.0]),
     (STREET, AT_20, (car(23.0, 0.0),), [3.0]),
@@ -172,26 +165,26 @@ HAND_COMPUTED: list[tuple[Scene, Intent, tuple[TrafficAgent, ...], list[float]]]
         [0.0, 0.4],
     ),
     # Named places: the junction lies 20 to 36 m ahead.
-    (junction(), named(Setting.BEFORE_INTERSECTION), (car(10.0, 0.0),), [0.0]),
-    (junction(), named(Setting.BEFORE_INTERSECTION), (car(22.0, 0.0),), [2.0]),
-    (junction(), named(Setting.IN_INTERSECTION), (car(30.0, 0.0),), [0.0]),
-    (junction(), named(Setting.IN_INTERSECTION), (car(17.5, 0.0),), [2.5]),
-    (junction(), named(Setting.AFTER_INTERSECTION), (car(30.0, 0.0),), [6.0]),
-    (ZEBRA, by_zebra(Relation.BEHIND), (car(25.0, 0.0),), [0.0]),  # before its near edge
-    (ZEBRA, by_zebra(Relation.AHEAD), (car(40.0, 0.0),), [1.0]),  # past its far edge
+    (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(10.0, 0.0),), [0.0]),
+    (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(22.0, 0.0),), [2.0]),
+    (junction(), named(wish.Setting.IN_INTERSECTION), (car(30.0, 0.0),), [0.0]),
+    (junction(), named(wish.Setting.IN_INTERSECTION), (car(17.5, 0.0),), [2.5]),
+    (junction(), named(wish.Setting.AFTER_INTERSECTION), (car(30.0, 0.0),), [6.0]),
+    (ZEBRA, by_zebra(wish.Relation.BEHIND), (car(25.0, 0.0),), [0.0]),  # before its near edge
+    (ZEBRA, by_zebra(wish.Relation.AHEAD), (car(40.0, 0.0),), [1.0]),  # past its far edge
     (ZEBRA, by_zebra(None), (car(33.0, 0.0),), [0.0]),
-    (ZEBRA, named(Setting.ON_CROSSWALK), (car(37.0, 0.0),), [3.0]),
-    (ZEBRA, named(Setting.OFF_CROSSWALK), (car(31.0, 0.0),), [1.0]),
-    (ZEBRA, named(Setting.BY_PARKED_RIGHT), (car(21.0, 0.0),), [0.0]),
-    (ZEBRA, named(Setting.BY_PARKED_RIGHT), (car(30.0, 0.0),), [3.6]),
-    (ZEBRA, named(Setting.BY_PARKED_LEFT), (car(30.0, 0.0),), [0.0]),  # nobody is: it is open
-    (BEND, named(Setting.IN_BEND), (car(-10.0, 0.0),), [6.0]),
+    (ZEBRA, named(wish.Setting.ON_CROSSWALK), (car(37.0, 0.0),), [3.0]),
+    (ZEBRA, named(wish.Setting.OFF_CROSSWALK), (car(31.0, 0.0),), [1.0]),
+    (ZEBRA, named(wish.Setting.BY_PARKED_RIGHT), (car(21.0, 0.0),), [0.0]),
+    (ZEBRA, named(wish.Setting.BY_PARKED_RIGHT), (car(30.0, 0.0),), [3.6]),
+    (ZEBRA, named(wish.Setting.BY_PARKED_LEFT), (car(30.0, 0.0),), [0.0]),  # nobody is: it is open
+    (BEND, named(wish.Setting.IN_BEND), (car(-10.0, 0.0),), [6.0]),
 ]
 
 
 @pytest.mark.parametrize(("where", "intent", "added", "distances_m"), HAND_COMPUTED)
 def test_the_distance_is_the_way_to_the_nearest_admitted_placement(
-    where: Scene, intent: Intent, added: tuple[TrafficAgent, ...], distances_m: list[float]
+    where: Scene, intent: wish.Intent, added: tuple[TrafficAgent, ...], distances_m: list[float]
 ) -> None:
     found = measure_wish(Ground.of(where), Modification(added=added), intent)
     assert found is not None
@@ -218,7 +211,7 @@ def shifted(added: Sequence[TrafficAgent], shifts: Sequence[tuple[float, float]]
     return Modification(added=tuple(moved))
 
 
-def measured(intent: Intent, change: Modification) -> WishDistance:
+def measured(intent: wish.Intent, change: Modification) -> WishDistance:
     found = measure_wish(Ground.of(STREET), change, intent)
     assert found is not None
     return found
@@ -233,14 +226,14 @@ def test_what_the_rule_placer_places_is_what_was_asked_for(name: str) -> None:
 @pytest.mark.parametrize(
     ("where", "setting"),
     [
-        (junction(), Setting.BEFORE_INTERSECTION),
-        (junction(), Setting.IN_INTERSECTION),
-        (junction(), Setting.AFTER_INTERSECTION),
-        (ZEBRA, Setting.ON_CROSSWALK),
-        (ZEBRA, Setting.BY_PARKED_RIGHT),
+        (junction(), wish.Setting.BEFORE_INTERSECTION),
+        (junction(), wish.Setting.IN_INTERSECTION),
+        (junction(), wish.Setting.AFTER_INTERSECTION),
+        (ZEBRA, wish.Setting.ON_CROSSWALK),
+        (ZEBRA, wish.Setting.BY_PARKED_RIGHT),
     ],
 )
-def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: Setting) -> None:
+def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: wish.Setting) -> None:
     added = place(where, named(setting), seed=3).modification.added
     found = measure_wish(Ground.of(where), Modification(added=added), named(setting))
     assert found is not None

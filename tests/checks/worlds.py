@@ -1,35 +1,11 @@
-"""Small worlds for the checks: the catalogue's references, and scenes moved as one body."""
+"""Findings of the checks on small worlds."""
 
-import json
 from collections.abc import Iterable
-from pathlib import Path
-from typing import NamedTuple
 
 from augment.checks import Finding, FindingKind, Ground, Severity, findings_on
-from augment.scene.codec import modification_from_document, scene_from_document
-from augment.scene.entities import Modification, Scene, TrafficAgent, without_traffic
-
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-
-
-class Reference(NamedTuple):
-    """A scenario of the catalogue: its scene as experts see it, and what belongs into it."""
-
-    slug: str
-    scene: Scene
-    modification: Modification
-
-
-def references() -> list[Reference]:
-    found = []
-    for file in sorted((FIXTURES / "scenarios").glob("*.json")):
-        document = json.loads(file.read_text())
-        text = (FIXTURES / "scenes" / f"{document['scene']}.json").read_text()
-        scene = scene_from_document(json.loads(text))
-        shown = scene if document["keep_traffic"] else without_traffic(scene)
-        reference = modification_from_document(document["reference"])
-        found.append(Reference(document["slug"], shown, reference))
-    return found
+from augment.checks.registry import check_against_intent
+from augment.scene.entities import Modification, Scene, TrafficAgent
+from augment.scene.intent import Intent
 
 
 def findings(scene: Scene, change: Modification) -> tuple[Finding, ...]:
@@ -47,3 +23,9 @@ def of_kind(found: Iterable[Finding], kind: FindingKind) -> list[Finding]:
 def severities(found: Iterable[Finding]) -> set[tuple[FindingKind, Severity]]:
     """What speaks against a modification: the kinds that are more than facts."""
     return {(one.kind, one.severity) for one in found if one.severity is not Severity.FACT}
+
+
+def faults_against(base: Scene, change: Modification, intent: Intent | None) -> list[Finding]:
+    """What speaks against a modification, held against what was asked for."""
+    found = check_against_intent(Ground.of(base), change, intent)
+    return [one for one in found if one.is_fault]
