@@ -258,7 +258,6 @@ class KeyMissing(AugmentError):
     """
 
     def __init__(self, variable: str, endpoint: str) -> None:
-        self.variable = variable
         super().__init__(
             f"The environment variable {variable}, which holds the key of endpoint "
             f"{endpoint!r}, is not set where the worker runs."

@@ -5,47 +5,31 @@ from functools import cache
 from typing import Any
 
 from augment.fake_llm.sight import same_text
+from augment.scene import intent as wish
 from augment.scene.entities import Scene
-from augment.scene.intent import (
-    Body,
-    ConesRequest,
-    CrashedCar,
-    CrashRequest,
-    Intent,
-    LaneChoice,
-    Lateral,
-    LateralTarget,
-    Length,
-    Nearness,
-    Relation,
-    Setting,
-    Shape,
-    Side,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import scene
 
-LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY
+LEFT_EDGE, RIGHT_EDGE = wish.LateralTarget.LEFT_BOUNDARY, wish.LateralTarget.RIGHT_BOUNDARY
 
 
-def metres(low_m: float, high_m: float | None = None, *, about: bool = False) -> Length:
-    return Length(low_m=low_m, high_m=low_m if high_m is None else high_m, is_approximate=about)
+def metres(low_m: float, high_m: float | None = None, *, about: bool = False) -> wish.Length:
+    return wish.Length(
+        low_m=low_m, high_m=low_m if high_m is None else high_m, is_approximate=about
+    )
 
 
 def spot(
     ahead_m: float,
-    *settings: Setting,
-    lane: LaneChoice | None = LaneChoice.OWN,
-    lateral: Lateral | None = None,
+    *settings: wish.Setting,
+    lane: wish.LaneChoice | None = wish.LaneChoice.OWN,
+    lateral: wish.Lateral | None = None,
     about: bool = False,
-) -> Spot:
+) -> wish.Spot:
     """So far ahead of the ego; behind it where that is negative."""
-    return Spot(
+    return wish.Spot(
         distance=metres(abs(ahead_m), about=about),
-        relation=Relation.AHEAD if ahead_m >= 0.0 else Relation.BEHIND,
+        relation=wish.Relation.AHEAD if ahead_m >= 0.0 else wish.Relation.BEHIND,
         lane=lane,
         lateral=lateral,
         settings=settings,
@@ -53,48 +37,59 @@ def spot(
 
 
 def towards(
-    target: LateralTarget, offset_m: float | None = None, how: Nearness | None = None
-) -> Lateral:
+    target: wish.LateralTarget, offset_m: float | None = None, how: wish.Nearness | None = None
+) -> wish.Lateral:
     offset = None if offset_m is None else metres(offset_m)
-    return Lateral(target=target, offset=offset, nearness=how)
+    return wish.Lateral(target=target, offset=offset, nearness=how)
 
 
-CENTRED = towards(LateralTarget.LANE_CENTRE)
+CENTRED = towards(wish.LateralTarget.LANE_CENTRE)
 
 
-def parked(ahead_m: float = 21.4, *, body: Body = Body.CAR, **where: Any) -> Intent:
+def parked(ahead_m: float = 21.4, *, body: wish.Body = wish.Body.CAR, **where: Any) -> wish.Intent:
     """One vehicle that stands."""
     what = {name: where.pop(name) for name in ("facing", "speed_mps", "turn_deg") if name in where}
-    request = VehicleRequest(
+    request = wish.VehicleRequest(
         spot=spot(ahead_m, **where), body=body, count=1, **{"speed_mps": 0.0, **what}
     )
-    return Intent(requests=(request,))
+    return wish.Intent(requests=(request,))
 
 
-def walk(ahead_m: float, start: Side | None, *settings: Setting, **what: Any) -> Intent:
+def walk(
+    ahead_m: float, start: wish.Side | None, *settings: wish.Setting, **what: Any
+) -> wish.Intent:
     """Somebody crosses from that side."""
-    request = WalkRequest(
+    request = wish.WalkRequest(
         spot=spot(ahead_m, *settings, lane=None), start=start, **{"count": 1, **what}
     )
-    return Intent(requests=(request,))
+    return wish.Intent(requests=(request,))
 
 
 def cones(
-    ahead_m: float, count: int, shape: Shape, *, lateral: Lateral | None = None, **what: Any
-) -> Intent:
+    ahead_m: float,
+    count: int,
+    shape: wish.Shape,
+    *,
+    lateral: wish.Lateral | None = None,
+    **what: Any,
+) -> wish.Intent:
     """Cones in a shape."""
-    request = ConesRequest(spot=spot(ahead_m, lateral=lateral), shape=shape, count=count, **what)
-    return Intent(requests=(request,))
+    request = wish.ConesRequest(
+        spot=spot(ahead_m, lateral=lateral), shape=shape, count=count, **what
+    )
+    return wish.Intent(requests=(request,))
 
 
-def crash(ahead_m: float, count: int, *others: CrashedCar, settings: Any = ()) -> Intent:
+def crash(ahead_m: float, count: int, *others: wish.CrashedCar, settings: Any = ()) -> wish.Intent:
     """Crashed cars."""
-    request = CrashRequest(spot=spot(ahead_m, *settings), count=count, others=others)
-    return Intent(requests=(request,))
+    request = wish.CrashRequest(spot=spot(ahead_m, *settings), count=count, others=others)
+    return wish.Intent(requests=(request,))
 
 
 PAPER = parked(
-    body=Body.VEHICLE, about=True, lateral=Lateral(target=LEFT_EDGE, offset=metres(0.0, 1.5))
+    body=wish.Body.VEHICLE,
+    about=True,
+    lateral=wish.Lateral(target=LEFT_EDGE, offset=metres(0.0, 1.5)),
 )
 """The paper's own example: a parked vehicle 21.4 m ahead, towards the left lane boundary."""
 
@@ -104,13 +99,13 @@ _WISH = re.compile(r"Add a parked (car|vehicle) ([0-9.]+) m ahead(?: of the ego 
 CONE = "Place a traffic cone on the ego's lane 20 m in front of the ego."
 
 
-def known(instruction: str) -> list[tuple[Scene, Intent]]:
+def known(instruction: str) -> list[tuple[Scene, wish.Intent]]:
     """The stand-in's list in tests: the catalogue, and the one wish that tests make."""
     found = _WISH.fullmatch(instruction)
     if found:
-        return [(scene(), parked(float(found[2]), body=Body(found[1])))]
+        return [(scene(), parked(float(found[2]), body=wish.Body(found[1])))]
     if instruction == CONE:
-        return [(scene(), cones(20.0, 1, Shape.LINE))]
+        return [(scene(), cones(20.0, 1, wish.Shape.LINE))]
     shelved = [entry(slug) for slug in _catalogue().get(instruction, ())]
     return [(shown_scene(one.slug), one.intent) for one in shelved if one.intent is not None]
 

@@ -9,24 +9,11 @@ import numpy as np
 
 from augment.geometry.frames import Pose, wrap
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    Lane,
-    LaneConnector,
-    Origin,
-    Point,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-    TrafficSide,
-    TurnType,
-)
+from augment.scene import entities
 
-EGO = TrafficAgent(
+EGO = entities.TrafficAgent(
     id="Agent1",
-    type=AgentType.EGO_VEHICLE,
+    type=entities.AgentType.EGO_VEHICLE,
     x_m=0.0,
     y_m=0.0,
     heading_rad=0.0,
@@ -40,10 +27,10 @@ EGO = TrafficAgent(
 _LINES = ("centerline", "left_boundary", "right_boundary")
 
 
-def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> TrafficAgent:
-    return TrafficAgent(
+def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> entities.TrafficAgent:
+    return entities.TrafficAgent(
         id=name,
-        type=AgentType.VEHICLE,
+        type=entities.AgentType.VEHICLE,
         x_m=x_m,
         y_m=y_m,
         heading_rad=heading_rad,
@@ -52,42 +39,44 @@ def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> Traf
     )
 
 
-def cone(name: str, x_m: float, y_m: float) -> TrafficAgent:
-    return replace(vehicle(name, x_m, y_m), type=AgentType.TRAFFIC_CONE, width_m=0.5, length_m=0.5)
+def cone(name: str, x_m: float, y_m: float) -> entities.TrafficAgent:
+    return replace(
+        vehicle(name, x_m, y_m), type=entities.AgentType.TRAFFIC_CONE, width_m=0.5, length_m=0.5
+    )
 
 
 def pedestrian(
     name: str, x_m: float, y_m: float, walk_to_m: tuple[float, float] | None = None
-) -> TrafficAgent:
+) -> entities.TrafficAgent:
     heading = 0.0 if walk_to_m is None else math.atan2(walk_to_m[1] - y_m, walk_to_m[0] - x_m)
     return replace(
         vehicle(name, x_m, y_m, heading),
-        type=AgentType.PEDESTRIAN,
+        type=entities.AgentType.PEDESTRIAN,
         width_m=0.791,
         length_m=0.9,
         walk_to_m=walk_to_m,
     )
 
 
-def scene(**changes: object) -> Scene:
+def scene(**changes: object) -> entities.Scene:
     """A straight two-way street, right-hand traffic: Lane1 is the ego's, Lane2 comes towards it.
 
     Both lanes are 3.5 m wide and run from x = -50 m to x = 100 m; a walkway on either side.
     """
-    made = Scene(
+    made = entities.Scene(
         name="street",
         ego=EGO,
-        traffic_side=TrafficSide.RIGHT,
-        origin=Origin(frame="test", x_m=0.0, y_m=0.0, heading_rad=0.0),
+        traffic_side=entities.TrafficSide.RIGHT,
+        origin=entities.Origin(frame="test", x_m=0.0, y_m=0.0, heading_rad=0.0),
         provenance="made for a test",
         lanes=(
-            Lane(
+            entities.Lane(
                 id="Lane1",
                 centerline=Polyline([(-50.0, 0.0), (100.0, 0.0)]),
                 width_m=3.5,
                 speed_limit_mps=13.9,
             ),
-            Lane(
+            entities.Lane(
                 id="Lane2",
                 centerline=Polyline([(100.0, 3.5), (-50.0, 3.5)]),
                 width_m=3.5,
@@ -95,19 +84,19 @@ def scene(**changes: object) -> Scene:
             ),
         ),
         areas=(
-            Area(
+            entities.Area(
                 id="Area1",
-                kind=AreaKind.DRIVABLE,
+                kind=entities.AreaKind.DRIVABLE,
                 boundary_m=((-50.0, -1.75), (100.0, -1.75), (100.0, 5.25), (-50.0, 5.25)),
             ),
-            Area(
+            entities.Area(
                 id="Area2",
-                kind=AreaKind.WALKWAY,
+                kind=entities.AreaKind.WALKWAY,
                 boundary_m=((-50.0, -4.25), (100.0, -4.25), (100.0, -1.75), (-50.0, -1.75)),
             ),
-            Area(
+            entities.Area(
                 id="Area3",
-                kind=AreaKind.WALKWAY,
+                kind=entities.AreaKind.WALKWAY,
                 boundary_m=((-50.0, 5.25), (100.0, 5.25), (100.0, 7.75), (-50.0, 7.75)),
             ),
         ),
@@ -115,7 +104,7 @@ def scene(**changes: object) -> Scene:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
-def curve(radius_m: float = 40.0) -> Scene:
+def curve(radius_m: float = 40.0) -> entities.Scene:
     """One lane that bends left on a circle of that radius around (0, radius), after 10 m straight.
 
     Where the bend has turned by an angle a, the lane is at x = 10 + r sin a, y = r (1 - cos a).
@@ -125,12 +114,12 @@ def curve(radius_m: float = 40.0) -> Scene:
     line = Polyline(np.vstack([[[-50.0, 0.0], [0.0, 0.0]], bend]))
     return scene(
         name="curve",
-        lanes=(Lane(id="Lane1", centerline=line, width_m=3.5, speed_limit_mps=8.3),),
+        lanes=(entities.Lane(id="Lane1", centerline=line, width_m=3.5, speed_limit_mps=8.3),),
         areas=(),
     )
 
 
-def junction() -> Scene:
+def junction() -> entities.Scene:
     """Lane1 ends at x = 20 m; connectors lead straight on (Lane2) and to the left (Lane3)."""
     left = [
         (20.0 + 8.0 * math.sin(a), 8.0 - 8.0 * math.cos(a)) for a in np.linspace(0, 1.5708, 19)
@@ -138,27 +127,27 @@ def junction() -> Scene:
     return scene(
         name="junction",
         lanes=(
-            Lane(id="Lane1", centerline=Polyline([(-50, 0), (20, 0)]), width_m=3.5),
-            Lane(id="Lane2", centerline=Polyline([(36, 0), (100, 0)]), width_m=3.5),
-            Lane(id="Lane3", centerline=Polyline([(28, 8), (28, 60)]), width_m=3.5),
+            entities.Lane(id="Lane1", centerline=Polyline([(-50, 0), (20, 0)]), width_m=3.5),
+            entities.Lane(id="Lane2", centerline=Polyline([(36, 0), (100, 0)]), width_m=3.5),
+            entities.Lane(id="Lane3", centerline=Polyline([(28, 8), (28, 60)]), width_m=3.5),
         ),
         connectors=(
-            LaneConnector(
+            entities.LaneConnector(
                 id="Connector1",
                 from_lane="Lane1",
                 to_lane="Lane2",
                 centerline=Polyline([(20, 0), (36, 0)]),
                 width_m=3.5,
-                traffic_light=TrafficLight.GREEN,
+                traffic_light=entities.TrafficLight.GREEN,
             ),
-            LaneConnector(
+            entities.LaneConnector(
                 id="Connector2",
                 from_lane="Lane1",
                 to_lane="Lane3",
                 centerline=Polyline(left),
                 width_m=3.5,
-                traffic_light=TrafficLight.RED,
-                turn_type=TurnType.LEFT,
+                traffic_light=entities.TrafficLight.RED,
+                turn_type=entities.TurnType.LEFT,
             ),
         ),
         areas=(),
@@ -171,7 +160,7 @@ def pose_in_parent(frame: Pose, seen: Pose) -> Pose:
     return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(seen.heading_rad + frame.heading_rad))
 
 
-def moved_scene(scene: Scene, frame: Pose, flip: float = 1.0) -> Scene:
+def moved_scene(scene: entities.Scene, frame: Pose, flip: float = 1.0) -> entities.Scene:
     """The whole scene, ego included, mirrored at the x axis (flip -1) and carried to a frame."""
 
     def way(given: Any) -> Any:
@@ -197,13 +186,17 @@ def moved_scene(scene: Scene, frame: Pose, flip: float = 1.0) -> Scene:
     )
 
 
-def moved_agent(agent: TrafficAgent, frame: Pose, flip: float = 1.0) -> TrafficAgent:
+def moved_agent(
+    agent: entities.TrafficAgent, frame: Pose, flip: float = 1.0
+) -> entities.TrafficAgent:
     ((x_m, y_m),) = _moved_points([(agent.x_m, agent.y_m)], frame, flip)
     walk_to_m = agent.walk_to_m and _moved_points([agent.walk_to_m], frame, flip)[0]
     heading_rad = wrap(flip * agent.heading_rad + frame.heading_rad)
     return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk_to_m)
 
 
-def _moved_points(points: Sequence[Point], frame: Pose, flip: float) -> tuple[Point, ...]:
+def _moved_points(
+    points: Sequence[entities.Point], frame: Pose, flip: float
+) -> tuple[entities.Point, ...]:
     moved = frame.to_parent(np.array(points) * (1.0, flip))
     return tuple((float(x_m), float(y_m)) for x_m, y_m in moved)

@@ -263,4 +263,4 @@ def _touching_m(body: Body, before: Pose, pose_at: Callable[[float], Pose]) -> f
 
 def _shared_area(body: Body, pose: Pose, other: Pose) -> float:
     """Return the share of a box that two of that kind have in common."""
-    return overlap(_box(body, pose), _box(body, other)).share_of_first
+    return overlap(_box(body, pose), _box(body, other)).share

@@ -9,7 +9,7 @@ import shapely
 from augment.checks.finding import Finding, FindingKind, Severity, find
 from augment.checks.ground import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
 from augment.geometry import frames
-from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.entities import STEERED, AgentType, Point, TrafficAgent
 from augment.scene.planned_motion import PointPath
 
 TOUCH_M = 0.01
@@ -50,7 +50,6 @@ USUAL_MPS: dict[AgentType, float] = {
 _MOVED_MPS = USUAL_MPS | {AgentType.GENERIC_OBJECT: 4.0}
 """With a motion: also doors, balls and animals."""
 RIDERS = frozenset({AgentType.PEDESTRIAN, AgentType.BICYCLE})
-_LONG = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 
 
 def name_type(kind: AgentType) -> str:
@@ -71,16 +70,14 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
         shared = frames.overlap(situation.boxes[agent.id], situation.boxes[other.id])
         if shared.depth_m <= TOUCH_M:
             continue
-        # Of the smaller box: the larger share is its own.
-        share = max(shared.share_of_first, shared.share_of_second)
         is_ego = other.id == ego_id
         yield find(
             FindingKind.OVERLAP,
-            Severity.WRONG if is_ego else _overlap_severity(agent, other, share),
+            Severity.WRONG if is_ego else _overlap_severity(agent, other, shared.share),
             [agent, other],
             "{agents[0]} and {agents[1]} overlap by {share_of_smaller:.0%} of the smaller box, "
             "{depth_m:.2f} m deep.",
-            share_of_smaller=share,
+            share_of_smaller=shared.share,
             depth_m=shared.depth_m,
         )
 
@@ -115,7 +112,7 @@ def size(situation: ChangedScene) -> Iterator[Finding]:
             *(shortest / max(length_m, 1e-3), length_m / longest),
             *(narrowest / max(width_m, 1e-3), width_m / widest),
         )
-        is_swapped, words = agent.type in _LONG and width_m > length_m, "wider than long"
+        is_swapped, words = agent.type in STEERED and width_m > length_m, "wider than long"
         if not is_swapped:
             words = f"unusual for {name_type(agent.type)}"
         if is_swapped or max(factors) > 1.0:

@@ -14,29 +14,22 @@ from numpy.typing import NDArray
 
 from augment.geometry.frames import Box
 from augment.geometry.polyline import FloatArray
+from augment.scene import entities
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    Modification,
-    Scene,
-    TrafficAgent,
-    apply,
-)
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
 from augment.scene.motion import Expectation, Motion, Movement, find_motion, with_movers_alone
 
 SEAM_M = 0.3
 """A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
-VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
+VEHICLES = frozenset(
+    {entities.AgentType.VEHICLE, entities.AgentType.BUS, entities.AgentType.EGO_VEHICLE}
+)
 STOPPED_BELOW_MPS = 0.5
 CRASH_GAP_M = 1.5
 """Between cars of one accident; those placed by hand for interPlan are up to 1.43 m apart."""
 # Least length and width of a box.
 _SMALLEST_M = 0.01
-_ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
-_WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
+_WALKS = (entities.AreaKind.WALKWAY, entities.AreaKind.CROSSWALK)
 
 
 class Surface:
@@ -46,7 +39,7 @@ class Surface:
     crosses itself is taken as the ground that it encloses.
     """
 
-    def __init__(self, lanes: Iterable[AnyLane] = (), areas: Iterable[Area] = ()) -> None:
+    def __init__(self, lanes: Iterable[AnyLane] = (), areas: Iterable[entities.Area] = ()) -> None:
         pieces = np.concatenate([strips(list(lanes)), rings(list(areas))])
         self._pieces = pieces[~shapely.is_empty(pieces)]
         self._tree = shapely.STRtree(self._pieces)
@@ -146,7 +139,7 @@ def strips(lanes: Sequence[AnyLane]) -> NDArray[np.object_]:
     return made
 
 
-def rings(areas: Sequence[Area]) -> NDArray[np.object_]:
+def rings(areas: Sequence[entities.Area]) -> NDArray[np.object_]:
     """Return one geometry an area."""
     made = np.empty(len(areas), dtype=object)
     made[:] = [shapely.Polygon(area.boundary_m) for area in areas]
@@ -166,16 +159,18 @@ class Ground:
         expect: Returns what is expected after t0; asked only where something moves.
     """
 
-    scene: Scene
+    scene: entities.Scene
     graph: LaneGraph
     expect: Expectation
 
     @classmethod
-    def of(cls, scene: Scene, expect: Expectation = lambda scene, modification: None) -> "Ground":
+    def of(
+        cls, scene: entities.Scene, expect: Expectation = lambda scene, modification: None
+    ) -> "Ground":
         """Return the ground of a scene, by default one without a recording."""
         return cls(scene=scene, graph=LaneGraph(scene), expect=expect)
 
-    def motion_after(self, modification: Modification, *, of_all: bool = True) -> Motion:
+    def motion_after(self, modification: entities.Modification, *, of_all: bool = True) -> Motion:
         """Return everybody's motion after a change, including agents recorded later.
 
         Args:
@@ -185,34 +180,34 @@ class Ground:
         Raises:
             InvalidModification: The modification does not fit the scene.
         """
-        after = apply(self.scene, modification)
+        after = entities.apply(self.scene, modification)
         if not of_all:
             after = with_movers_alone(after, {agent.id for agent in modification.changed})
         recording = self.expect(self.scene, modification)
         return find_motion(after, recording=recording, with_later=of_all)
 
-    def _areas(self, *kinds: AreaKind) -> list[Area]:
+    def _areas(self, *kinds: entities.AreaKind) -> list[entities.Area]:
         return [area for area in self.scene.areas if area.kind in kinds]
 
     @cached_property
     def road(self) -> Surface:
         """Surface on which vehicles may stand."""
-        return Surface(self.graph.lanes.values(), self._areas(*_ROAD))
+        return Surface(self.graph.lanes.values(), self._areas(*entities.DRIVEN_ON))
 
     @cached_property
     def everything(self) -> Surface:
         """Everything that the map shows: the road, walkways and crosswalks."""
-        return Surface(self.graph.lanes.values(), self._areas(*_ROAD, *_WALKS))
+        return Surface(self.graph.lanes.values(), self._areas(*entities.DRIVEN_ON, *_WALKS))
 
     @cached_property
     def carparks(self) -> Surface:
         """Surface on which vehicles stand in any direction."""
-        return Surface(areas=self._areas(AreaKind.CARPARK))
+        return Surface(areas=self._areas(entities.AreaKind.CARPARK))
 
     @cached_property
     def walkways(self) -> Surface:
         """Surface beside the road for pedestrians; empty if the map has none."""
-        return Surface(areas=self._areas(AreaKind.WALKWAY))
+        return Surface(areas=self._areas(entities.AreaKind.WALKWAY))
 
     @cached_property
     def route(self) -> EgoRoute | None:
@@ -231,21 +226,21 @@ class ChangedScene:
     """
 
     ground: Ground
-    modification: Modification
-    everyone: tuple[TrafficAgent, ...]
+    modification: entities.Modification
+    everyone: tuple[entities.TrafficAgent, ...]
 
     @classmethod
-    def of(cls, ground: Ground, modification: Modification) -> "ChangedScene":
+    def of(cls, ground: Ground, modification: entities.Modification) -> "ChangedScene":
         """Return the modification on its ground.
 
         Raises:
             InvalidModification: It does not fit the scene.
         """
-        after = apply(ground.scene, modification)
+        after = entities.apply(ground.scene, modification)
         return cls(ground=ground, modification=modification, everyone=after.everyone)
 
     @property
-    def changed(self) -> tuple[TrafficAgent, ...]:
+    def changed(self) -> tuple[entities.TrafficAgent, ...]:
         """The added and the moved agents, which the findings are about."""
         return self.modification.changed
 
@@ -300,7 +295,7 @@ class ChangedScene:
         graph = self.ground.graph
         return {agent.id: graph.beside(agent.x_m, agent.y_m) for agent in self.changed}
 
-    def new_pairs(self) -> Iterator[tuple[TrafficAgent, TrafficAgent]]:
+    def new_pairs(self) -> Iterator[tuple[entities.TrafficAgent, entities.TrafficAgent]]:
         """Yield every pair with a changed agent in it, that one first, each once."""
         done: set[str] = set()
         for agent in self.changed:
@@ -322,6 +317,6 @@ class ChangedScene:
         return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)
 
 
-def is_stopped(agent: TrafficAgent) -> bool:
+def is_stopped(agent: entities.TrafficAgent) -> bool:
     """Return whether an agent stands."""
     return abs(agent.speed_mps) < STOPPED_BELOW_MPS

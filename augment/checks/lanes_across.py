@@ -13,18 +13,9 @@ import shapely
 
 from augment.checks.ground import Ground, is_stopped
 from augment.geometry.frames import difference
+from augment.scene import entities
 from augment.scene import intent as intents
 from augment.scene.ego_route import EgoRoute, RoutePosition
-from augment.scene.entities import (
-    AgentType,
-    AreaKind,
-    LaneConnector,
-    Point,
-    TrafficAgent,
-    TrafficLight,
-    TrafficSide,
-    TurnType,
-)
 from augment.scene.lane_graph import Beside, LanePosition, best_aligned
 from augment.scene.presets import find_crossing
 
@@ -40,14 +31,14 @@ _ON_A_SIDE_M = 1.0
 _ALIGNED_RAD = math.radians(15.0)
 _MISSED_M = 0.1
 """A place that leads further from its point than this does not tell where the point is."""
-_VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
+_VEHICLES = (entities.AgentType.VEHICLE, entities.AgentType.BUS)
 _SIGHTS = {
     **dict.fromkeys(
         (intents.Sight.VEHICLE, intents.Sight.PARKED, intents.Sight.MOVING), _VEHICLES
     ),
-    intents.Sight.BUS: (AgentType.BUS,),
-    intents.Sight.BICYCLE: (AgentType.BICYCLE,),
-    intents.Sight.PEDESTRIAN: (AgentType.PEDESTRIAN,),
+    intents.Sight.BUS: (entities.AgentType.BUS,),
+    intents.Sight.BICYCLE: (entities.AgentType.BICYCLE,),
+    intents.Sight.PEDESTRIAN: (entities.AgentType.PEDESTRIAN,),
 }
 
 
@@ -92,7 +83,9 @@ class LanesAcross:
     _over: dict[str, "LanesAcross | None"] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> "LanesAcross | None":
+    def of(
+        cls, ground: Ground, turn: entities.TurnType = entities.TurnType.STRAIGHT
+    ) -> "LanesAcross | None":
         """Return those of the ground's ego, None where the map has no lane for it.
 
         Args:
@@ -100,7 +93,7 @@ class LanesAcross:
             turn: Which way the route goes where the lanes part.
         """
         route = ground.route
-        if turn is not TurnType.STRAIGHT:
+        if turn is not entities.TurnType.STRAIGHT:
             route = EgoRoute.of(ground.scene, ground.graph, turn=turn)
         return None if route is None else cls(route=route)
 
@@ -116,7 +109,7 @@ class LanesAcross:
     @property
     def kerb(self) -> float:
         """On which side of the ego's lane the kerb is: 1 left, -1 right."""
-        return 1.0 if self.route.scene.traffic_side is TrafficSide.LEFT else -1.0
+        return 1.0 if self.route.scene.traffic_side is entities.TrafficSide.LEFT else -1.0
 
     def band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         """Return the lane of that choice, None where there is none there."""
@@ -180,7 +173,9 @@ def _band(lane: Beside, tangent_rad: float, choice: intents.LaneChoice) -> Band 
     )
 
 
-def find_place(lanes: LanesAcross, point: Point, heading_rad: float | None = None) -> LanePlace:
+def find_place(
+    lanes: LanesAcross, point: entities.Point, heading_rad: float | None = None
+) -> LanePlace:
     """Return where a point lies along the lane that it is on, else along the nearest one.
 
     The ego's route and the lanes beside it come first, then the way to the lane that fits the
@@ -206,13 +201,13 @@ def find_place(lanes: LanesAcross, point: Point, heading_rad: float | None = Non
     return min(places, key=lambda item: item[0])[1]
 
 
-def find_place_along(lanes: LanesAcross, via: str | None, point: Point) -> LanePlace:
+def find_place_along(lanes: LanesAcross, via: str | None, point: entities.Point) -> LanePlace:
     """Return where a point lies along a way's own lane, however far beside it."""
     return next(_list_places(lanes.over(via), via, point))[0]
 
 
 def _list_places(
-    lanes: LanesAcross | None, via: str | None, point: Point
+    lanes: LanesAcross | None, via: str | None, point: entities.Point
 ) -> Iterator[tuple[LanePlace, float]]:
     """Yield a point's place by each lane of a way, and how far from it that place leads."""
     if lanes is None:
@@ -238,7 +233,7 @@ def _list_places(
         yield spot, math.dist(point, (there.x_m, there.y_m))
 
 
-def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[TrafficAgent, ...]:
+def find_picked(lanes: LanesAcross, pick: intents.Pick) -> tuple[entities.TrafficAgent, ...]:
     """Return who is meant: one, or all of `every`; empty where nobody fits."""
     sign = 1.0 if pick.relation is intents.Relation.AHEAD else -1.0
     agents = []
@@ -256,7 +251,7 @@ def find_mark(lanes: LanesAcross, mark: intents.MapPlace) -> float | None:
         return next((sum(ends_m) / 2.0 for ends_m in list_crosswalks(lanes)), None)
     route, begins_m = lanes.route, -lanes.route.ego_s_m
     for name, ends_m in zip(route.lane_ids, route.ends_m, strict=True):
-        if isinstance(route.graph.lane(name), LaneConnector) and ends_m > 0.0:
+        if isinstance(route.graph.lane(name), entities.LaneConnector) and ends_m > 0.0:
             return begins_m if mark is intents.MapPlace.JUNCTION_START else ends_m
         begins_m = ends_m
     return None
@@ -347,7 +342,7 @@ def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
 
 
 def _fits(
-    lanes: LanesAcross, pick: intents.Pick, agent: TrafficAgent, place: RoutePosition
+    lanes: LanesAcross, pick: intents.Pick, agent: entities.TrafficAgent, place: RoutePosition
 ) -> bool:
     stands = is_stopped(agent)
     if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
@@ -392,16 +387,16 @@ def list_arms(lanes: LanesAcross, side: intents.Side | None) -> list[Arm]:
     """Return the arms from a side, or from any, straight and near ones first."""
     route, arms = lanes.route, list[Arm]()
     for connector in route.graph.lanes.values():
-        if not isinstance(connector, LaneConnector) or connector.from_lane is None:
+        if not isinstance(connector, entities.LaneConnector) or connector.from_lane is None:
             continue
         crossing = find_crossing(connector, route)
-        if crossing is None or connector.traffic_light is TrafficLight.GREEN:
+        if crossing is None or connector.traffic_light is entities.TrafficLight.GREEN:
             continue
         begin = route.locate(*connector.centerline.position(0.0))
         is_asked = side is None or (begin.left_m > 0.0) is (side is intents.Side.LEFT)
         if connector.from_lane in route.graph.lanes and is_asked:
             arm = Arm(
-                turns=connector.turn_type is not TurnType.STRAIGHT,
+                turns=connector.turn_type is not entities.TurnType.STRAIGHT,
                 ahead_m=route.locate(*crossing).ahead_m,
                 connector_id=connector.id,
                 lane_id=connector.from_lane,
@@ -416,7 +411,7 @@ def list_crosswalks(lanes: LanesAcross) -> list[tuple[float, float]]:
     line, ego_s_m, spans_m = lanes.route.line, lanes.route.ego_s_m, []
     way = shapely.LineString(line.between(ego_s_m, line.length_m).points_m)
     for area in lanes.route.scene.areas:
-        if area.kind is AreaKind.CROSSWALK:
+        if area.kind is entities.AreaKind.CROSSWALK:
             part = shapely.intersection(way, shapely.Polygon(area.boundary_m))
             # The way begins at the ego, so stations on it are metres ahead of it.
             points = shapely.points(shapely.get_coordinates(part))

@@ -8,7 +8,7 @@ from augment.checks.finding import Finding, FindingKind, Severity, find
 from augment.checks.ground import VEHICLES, ChangedScene, Ground, is_stopped
 from augment.checks.lanes_across import LanesAcross, find_place
 from augment.geometry.frames import Box, difference
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import STEERED, AgentType, TrafficAgent
 
 NAMED_WITHIN_M = 0.5
 """Beyond the lane's edge: whoever stands on the line may name either side."""
@@ -37,7 +37,6 @@ FAR_FROM_PATHS_M = 10.0
 Check = Callable[[ChangedScene], Iterator[Finding]]
 """A check yields what it measured, and nothing where there is nothing to measure."""
 
-_STEERED = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 _EDGE = frozenset({AgentType.TRAFFIC_CONE, AgentType.BARRIER})
 
 
@@ -97,7 +96,7 @@ def heading(situation: ChangedScene) -> Iterator[Finding]:
     """
     for agent in situation.changed:
         place = situation.under[agent.id] or situation.nearest[agent.id]
-        if agent.type not in _STEERED or place is None or place.off_m > ROADSIDE_M:
+        if agent.type not in STEERED or place is None or place.off_m > ROADSIDE_M:
             continue
         # Positive to the left of the lane, from -180 to 180.
         turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))

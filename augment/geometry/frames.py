@@ -84,15 +84,14 @@ class Overlap:
 
     Attributes:
         depth_m: The shortest push that would part them.
-        share_of_first, share_of_second: What they share as a part of each box, 0 to 1.
+        share: What they have in common as a part of the smaller box, 0 to 1.
     """
 
     depth_m: float
-    share_of_first: float
-    share_of_second: float
+    share: float
 
 
-APART = Overlap(depth_m=0.0, share_of_first=0.0, share_of_second=0.0)
+APART = Overlap(depth_m=0.0, share=0.0)
 
 
 def corners(pose: Pose, length_m: float, width_m: float) -> NDArray[np.float64]:
@@ -122,9 +121,5 @@ def overlap(first: Box, second: Box) -> Overlap:
         return APART
     # Without a grid, sides that coincide but for rounding can leave nothing of what is shared.
     shared = shapely.intersection(shapely.Polygon(one), shapely.Polygon(other), grid_size=1e-9)
-    area_m2 = float(shared.area)
-    return Overlap(
-        depth_m=depth_m,
-        share_of_first=min(1.0, area_m2 / (first.length_m * first.width_m)),
-        share_of_second=min(1.0, area_m2 / (second.length_m * second.width_m)),
-    )
+    smaller_m2 = min(box.length_m * box.width_m for box in (first, second))
+    return Overlap(depth_m=depth_m, share=min(1.0, float(shared.area) / smaller_m2))

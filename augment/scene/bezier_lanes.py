@@ -24,37 +24,17 @@ from augment.geometry.polyline import Polyline
 SHORTEST_PIECE_M = 1.0
 """Nothing is cut shorter: below it the points of a recorded line are its shape."""
 
+ALLOWED = np.array([0.092, math.radians(2.9)])
+"""How far off its centreline a piece may be, in metres and radians: as written, to the centimetre,
+it is then within 0.1 m and 3 degrees."""
+# What is within this share of it of a straight line is written as one.
+_STRAIGHT_SHARE = 0.75
 # Places of a cut that are tried in a row; samples of the parabola at an end.
 _CUTS_TRIED = 9
 _END_SAMPLES = 21
 _END_M = 2.0 * CHORD_REACH_M
 _FREE_ENDS = ((False, False), (False, True), (True, False))
 _Span = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """Allowed distance of a piece from its centreline.
-
-    As written, to the centimetre, it is then within 0.1 m and 3 degrees.
-    """
-
-    position_m: float = 0.092
-    heading_rad: float = math.radians(2.9)
-
-    def loosen(self, factor: float) -> "Tolerance":
-        """Return so many times as much."""
-        return Tolerance(factor * self.position_m, factor * self.heading_rad)
-
-    def used_by(self, *pieces: "LanePiece") -> float:
-        """Return the largest share that the errors of pieces use up; above 1 it is too large."""
-        limits = (self.position_m, self.heading_rad)
-        # (pieces, 2) metres and radians, each as a share of its limit.
-        return float((np.array([piece.error for piece in pieces]) / limits).max())
-
-
-STRAIGHT = Tolerance().loosen(0.75)
-"""What is within three quarters of it of a straight line is written as one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,20 +57,24 @@ class LanePiece:
         """The arc length of the part of the source centreline."""
         return self.end_m - self.start_m
 
+    @property
+    def is_astray(self) -> bool:
+        """True if a place of it is too far off its centreline, whatever the headings are."""
+        return self.error[0] > ALLOWED[0]
+
 
 @lru_cache(maxsize=4096)
-def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> tuple[LanePiece, ...]:
-    """Return pieces within the tolerance; a piece that is not is cut where that helps most.
+def bezier_lane(line: Polyline) -> tuple[LanePiece, ...]:
+    """Return pieces as near as is allowed; a piece that is not is cut where that helps most.
 
-    Pieces share their heading at a joint as long as that keeps to the tolerance; where a lane
+    Pieces share their heading at a joint as long as that keeps to what is allowed; where a lane
     turns on the spot they may meet at an angle within it. A line can be too restless even then:
     it is not cut below 1 m and keeps what error is left; every piece says its error.
 
     Fitting takes tens of milliseconds for a winding lane, and prompt and tool ask for the same
     lanes in every augmentation of a scene: what was fitted lately is remembered.
     """
-    allowed = tolerance or Tolerance()
-    return tuple(_cut(line, (0.0, line.length_m), allowed))
+    return tuple(_cut(line, (0.0, line.length_m)))
 
 
 def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
@@ -116,32 +100,36 @@ def _letters(number: int) -> str:
     return ("" if before == 0 else _letters(before - 1)) + chr(ord("a") + last)
 
 
-def _cut(line: Polyline, span: _Span, allowed: Tolerance) -> list[LanePiece]:
-    """The part of the line as the pieces that it takes to stay within the tolerance."""
+def _usage(*pieces: LanePiece) -> float:
+    """The largest share that the errors of pieces use up; above 1 it is too large."""
+    # (pieces, 2) metres and radians, each as a share of its limit.
+    return float((np.array([piece.error for piece in pieces]) / ALLOWED).max())
+
+
+def _cut(line: Polyline, span: _Span) -> list[LanePiece]:
+    """The part of the line as the pieces that it takes to stay within what is allowed."""
     # A straight piece first: its two ends are the shortest that can be written.
     straight = _straight_piece(line, span)
-    if STRAIGHT.used_by(straight) <= 1.0:
+    if _usage(straight) <= _STRAIGHT_SHARE:
         return [straight]
-    whole = _loose_piece(line, span, allowed)
-    if allowed.used_by(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
+    whole = _loose_piece(line, span)
+    if _usage(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
-    halves = _best_halves(line, span, allowed)
-    strays = whole.error[0] > allowed.position_m
+    halves = _best_halves(line, span)
     # A heading that no cut betters is the line's own unrest; a place off the line is cut on.
-    if not strays and allowed.used_by(*halves) >= allowed.used_by(whole):
+    if not whole.is_astray and _usage(*halves) >= _usage(whole):
         return [whole]
-    return [piece for half in halves for piece in _cut(line, (half.start_m, half.end_m), allowed)]
+    return [piece for half in halves for piece in _cut(line, (half.start_m, half.end_m))]
 
 
-def _best_halves(line: Polyline, span: _Span, allowed: Tolerance) -> tuple[LanePiece, LanePiece]:
+def _best_halves(line: Polyline, span: _Span) -> tuple[LanePiece, LanePiece]:
     """The two pieces whose worse one is best, over a coarse row of cuts and then a fine one.
 
     Above all none may be off its place, for it would have to be cut again.
     """
 
     def badness(halves: tuple[LanePiece, LanePiece]) -> tuple[bool, float]:
-        strays = any(half.error[0] > allowed.position_m for half in halves)
-        return strays, allowed.used_by(*halves)
+        return any(half.is_astray for half in halves), _usage(*halves)
 
     start_m, end_m = span
     low_m, high_m = start_m + SHORTEST_PIECE_M, end_m - SHORTEST_PIECE_M
@@ -157,12 +145,12 @@ def _best_halves(line: Polyline, span: _Span, allowed: Tolerance) -> tuple[LaneP
     return halves[best]
 
 
-def _loose_piece(line: Polyline, span: _Span, allowed: Tolerance) -> LanePiece:
+def _loose_piece(line: Polyline, span: _Span) -> LanePiece:
     """One cubic with the line's headings, or without where it comes closer so."""
     smooth = _piece(line, span)
-    if allowed.used_by(smooth) <= 1.0:
+    if _usage(smooth) <= 1.0:
         return smooth
-    return min([smooth, *(_piece(line, span, ends) for ends in _FREE_ENDS)], key=allowed.used_by)
+    return min([smooth, *(_piece(line, span, ends) for ends in _FREE_ENDS)], key=_usage)
 
 
 def _straight_piece(line: Polyline, span: _Span) -> LanePiece:

@@ -134,7 +134,7 @@ class EgoRoute:
         """The direction of travel so far ahead of the ego, in radians."""
         return self.line.heading_at(self.ego_s_m + ahead_m)
 
-    def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
+    def lane_position(self, ahead_m: float) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
         # The first lane that does not end before; at a joint that is the one before it.
         number = bisect_left(self.ends_m, ahead_m - _ROUNDED_M)
@@ -142,7 +142,7 @@ class EgoRoute:
             return None
         name = self.lane_ids[number]
         s_m = self.graph.lane(name).centerline.length_m - (self.ends_m[number] - ahead_m)
-        return self.graph.place(name, s_m, left_m)
+        return self.graph.place(name, s_m)
 
 
 def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:

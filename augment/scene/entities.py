@@ -14,21 +14,8 @@ from pydantic import Field
 
 from augment.errors import InvalidModification
 from augment.geometry.frames import Box, Pose
+from augment.scene import schema
 from augment.scene.planned_motion import PlannedMotion
-from augment.scene.schema import (
-    CLOSED,
-    Heading,
-    Id,
-    Limit,
-    Line,
-    Metres,
-    PointPair,
-    Ring,
-    Size,
-    Speed,
-    Text,
-    WorldMetres,
-)
 
 MOST_AGENTS = 5_000
 MOST_WAYS = 50_000
@@ -48,6 +35,10 @@ class AgentType(StrEnum):
     BARRIER = "BARRIER"
     CONSTRUCTION_SIGN = "CONSTRUCTION_SIGN"
     GENERIC_OBJECT = "GENERIC_OBJECT"
+
+
+STEERED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
+"""Who drives or rides, the ego apart; all of them are longer than wide."""
 
 
 class TrafficLight(StrEnum):
@@ -88,6 +79,10 @@ class AreaKind(StrEnum):
     CARPARK = "carpark"
 
 
+DRIVEN_ON = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
+"""Areas that are part of the road."""
+
+
 class TrafficSide(StrEnum):
     """On which side of the road people drive; it comes from the map, never from a guess."""
 
@@ -109,16 +104,16 @@ class TrafficAgent:
         motion: What it is made to do after t0; None to go on by itself. Never beside a walk.
     """
 
-    id: Id
+    id: schema.Id
     type: AgentType
-    x_m: Metres
-    y_m: Metres
-    heading_rad: Heading
-    width_m: Size
-    length_m: Size
-    speed_mps: Speed = 0.0
-    lane_id: Id | None = None
-    walk_to_m: PointPair | None = None
+    x_m: schema.Metres
+    y_m: schema.Metres
+    heading_rad: schema.Heading
+    width_m: schema.Size
+    length_m: schema.Size
+    speed_mps: schema.Speed = 0.0
+    lane_id: schema.Id | None = None
+    walk_to_m: schema.PointPair | None = None
     motion: PlannedMotion | None = None
 
     @property
@@ -138,11 +133,12 @@ class TrafficAgent:
 
 
 Agents = Annotated[tuple[TrafficAgent, ...], Field(fail_fast=True, max_length=MOST_AGENTS)]
-_Centerline = Annotated[Line, Field(alias="centerline_m")]
-_Left = Annotated[Line | None, Field(alias="left_boundary_m")]
-_Right = Annotated[Line | None, Field(alias="right_boundary_m")]
+_Centerline = Annotated[schema.Line, Field(alias="centerline_m")]
+_Left = Annotated[schema.Line | None, Field(alias="left_boundary_m")]
+_Right = Annotated[schema.Line | None, Field(alias="right_boundary_m")]
 _Ids = Annotated[
-    tuple[Id, ...], Field(fail_fast=True, max_length=MOST_WAYS, exclude_if=lambda names: not names)
+    tuple[schema.Id, ...],
+    Field(fail_fast=True, max_length=MOST_WAYS, exclude_if=lambda names: not names),
 ]
 _MOST = Field(fail_fast=True, max_length=MOST_WAYS)
 
@@ -160,14 +156,14 @@ class Lane:
         successors: Ids of the lanes that follow at its end with no intersection between.
     """
 
-    id: Id
+    id: schema.Id
     centerline: _Centerline
-    width_m: Size
-    speed_limit_mps: Limit | None = None
+    width_m: schema.Size
+    speed_limit_mps: schema.Limit | None = None
     left_boundary: _Left = None
     right_boundary: _Right = None
-    left_neighbor: Id | None = None
-    right_neighbor: Id | None = None
+    left_neighbor: schema.Id | None = None
+    right_neighbor: schema.Id | None = None
     successors: _Ids = ()
 
 
@@ -179,14 +175,14 @@ class LaneConnector:
         from_lane, to_lane: Ids of lanes or connectors; None where the map ends.
     """
 
-    id: Id
-    from_lane: Id | None = None
-    to_lane: Id | None = None
+    id: schema.Id
+    from_lane: schema.Id | None = None
+    to_lane: schema.Id | None = None
     centerline: _Centerline
-    width_m: Size
+    width_m: schema.Size
     traffic_light: TrafficLight = TrafficLight.NONE
     turn_type: TurnType = TurnType.STRAIGHT
-    speed_limit_mps: Limit | None = None
+    speed_limit_mps: schema.Limit | None = None
     left_boundary: _Left = None
     right_boundary: _Right = None
 
@@ -195,19 +191,19 @@ class LaneConnector:
 class Area:
     """A polygon given by its boundary points (P >= 3), not closed."""
 
-    id: Id
+    id: schema.Id
     kind: AreaKind
-    boundary_m: Ring
+    boundary_m: schema.Ring
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """Pose of the ego frame in the source's own world frame."""
 
-    frame: Annotated[Text, Field(min_length=1, max_length=200)]
-    x_m: WorldMetres
-    y_m: WorldMetres
-    heading_rad: Heading
+    frame: Annotated[schema.Text, Field(min_length=1, max_length=200)]
+    x_m: schema.WorldMetres
+    y_m: schema.WorldMetres
+    heading_rad: schema.Heading
 
     @classmethod
     def at(cls, pose: Pose, *, frame: str) -> Origin:
@@ -229,7 +225,7 @@ class InterplanRules:
             last get the ego's. None where nobody knows them.
     """
 
-    boxes_m: tuple[tuple[Size, Size], ...] | None = None
+    boxes_m: tuple[tuple[schema.Size, schema.Size], ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -245,7 +241,7 @@ class SceneOptions:
 
     density: TrafficDensity = TrafficDensity.NONE
     goal: TurnType | None = None
-    goal_m: PointPair | None = None
+    goal_m: schema.PointPair | None = None
     interplan: InterplanRules | None = None
 
 
@@ -261,10 +257,10 @@ class Scene:
         options: Set by a scenario; a stored scene has none unless its file names them.
     """
 
-    __pydantic_config__ = CLOSED
+    __pydantic_config__ = schema.CLOSED
 
-    name: Annotated[Text, Field(min_length=1, max_length=200)]
-    provenance: Annotated[Text, Field(min_length=1)]
+    name: Annotated[schema.Text, Field(min_length=1, max_length=200)]
+    provenance: Annotated[schema.Text, Field(min_length=1)]
     traffic_side: TrafficSide
     origin: Origin
     ego: TrafficAgent
@@ -309,12 +305,12 @@ class Modification:
         removed: Ids of the scene's agents that go.
     """
 
-    __pydantic_config__ = CLOSED
+    __pydantic_config__ = schema.CLOSED
 
     added: Annotated[Agents, Field(alias="add")] = ()
     moved: Annotated[Agents, Field(alias="move")] = ()
     removed: Annotated[
-        tuple[Id, ...], Field(alias="remove", fail_fast=True, max_length=MOST_AGENTS)
+        tuple[schema.Id, ...], Field(alias="remove", fail_fast=True, max_length=MOST_AGENTS)
     ] = ()
 
     @property

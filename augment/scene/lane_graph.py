@@ -220,23 +220,17 @@ class LaneGraph:
         return LanePosition(lane_id=lane_id, s_m=s_m, d_m=d_m, pose=pose)
 
     def along(
-        self,
-        lane_id: str,
-        start_m: float,
-        distance_m: float,
-        d_m: float = 0.0,
-        *,
-        turn: TurnType = TurnType.STRAIGHT,
+        self, lane_id: str, start_m: float, distance_m: float, d_m: float = 0.0
     ) -> LanePosition | None:
         """Return the place further (negative: back) along the lanes, None past the map.
 
-        Where the lanes part, the lane of that `turn` is taken, else the straightest.
+        Where the lanes part, the straightest is taken.
         """
         here, s_m = lane_id, start_m + distance_m
         # Lanes that lead in a ring end where they began.
         seen = {here}
         while s_m > self.lanes[here].centerline.length_m:
-            following = self._choose(here, turn)
+            following = self._choose(here, TurnType.STRAIGHT)
             if following is None or following in seen:
                 return None
             s_m -= self.lanes[here].centerline.length_m

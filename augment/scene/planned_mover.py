@@ -14,17 +14,9 @@ import numpy as np
 from augment.errors import InvalidModification
 from augment.geometry.frames import difference, wrap
 from augment.geometry.polyline import FloatArray, Polyline
+from augment.scene import planned_motion as planned
 from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, apply
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.planned_motion import (
-    EGO_ID,
-    AtPlace,
-    AtTime,
-    LanePath,
-    NearEgo,
-    PlannedMotion,
-    PointPath,
-)
 from augment.scene.schema import MOST_OBJECTS
 
 WALK_S = 15.0
@@ -113,7 +105,7 @@ class PlannedMover:
     def __init__(self, agent: TrafficAgent, graph: LaneGraph) -> None:
         acting = walk_as_motion(agent)
         assert acting.motion is not None
-        if isinstance(acting.motion.path, LanePath):
+        if isinstance(acting.motion.path, planned.LanePath):
             check_lane_path(graph, acting.motion.path)
         self.agent, self._motion, self._graph = agent, acting.motion, graph
         self._own_mps, self._held = acting.speed_mps, HeldCourse(agent, graph)
@@ -131,15 +123,15 @@ class PlannedMover:
         if path is None:
             return _row(self._held.pose_at(own_mps * self.started_s + gone_m), speed_mps)
         if self._line is None:  # its path ends where it is
-            stays = isinstance(path, PointPath) or gone_m == 0.0
+            stays = isinstance(path, planned.PointPath) or gone_m == 0.0
             return _row(self._held.pose_at(own_mps * self.started_s) if stays else None, 0.0)
         # Lanes lead off the map; at the last of some points somebody stands.
         if gone_m >= self._line.length_m:
-            if isinstance(path, LanePath):
+            if isinstance(path, planned.LanePath):
                 return np.full(4, np.nan)
             gone_m, speed_mps = self._line.length_m, 0.0
         pose = self._line.pose_at(gone_m)
-        keeps_heading = isinstance(path, PointPath) and path.keeps_heading
+        keeps_heading = isinstance(path, planned.PointPath) and path.keeps_heading
         heading_rad = self.agent.heading_rad if keeps_heading else pose.heading_rad
         return _row((pose.x_m, pose.y_m, heading_rad), speed_mps)
 
@@ -147,17 +139,17 @@ class PlannedMover:
         """Go on to a moment; a trigger by time fires on the way."""
         self._time_s = time_s
         trigger = self._motion.start
-        if isinstance(trigger, AtTime) and time_s >= trigger.after_s:
+        if isinstance(trigger, planned.AtTime) and time_s >= trigger.after_s:
             self._start(trigger.after_s)
 
     def react(self, places: Places) -> None:
         """Set out if the trigger fires, given where everybody is at this moment."""
         match self._motion.start:
-            case AtTime():
+            case planned.AtTime():
                 return
-            case NearEgo(within_m=within_m):
-                who, place = EGO_ID, tuple(self.state()[:2].tolist())
-            case AtPlace(agent_id=agent_id, x_m=x_m, y_m=y_m, within_m=within_m):
+            case planned.NearEgo(within_m=within_m):
+                who, place = planned.EGO_ID, tuple(self.state()[:2].tolist())
+            case planned.AtPlace(agent_id=agent_id, x_m=x_m, y_m=y_m, within_m=within_m):
                 who, place = agent_id, (x_m, y_m)
         if who in places and math.dist(places[who], place) <= within_m:
             self._start(self._time_s)
@@ -168,9 +160,9 @@ class PlannedMover:
         self.started_s, path = at_s, self._motion.path
         # The path begins where it is at that moment, not where it was at t0.
         here = self._held.pose_at(self._own_mps * at_s)
-        if here is not None and isinstance(path, PointPath):
+        if here is not None and isinstance(path, planned.PointPath):
             self._line = smooth_line([here[:2], *path.points_m])
-        elif here is not None and isinstance(path, LanePath):
+        elif here is not None and isinstance(path, planned.LanePath):
             self._line = lane_line(self._graph, path, here[:2])
 
 
@@ -184,22 +176,21 @@ def carry_out(agent: TrafficAgent, graph: LaneGraph, times_s: Iterable[float]) -
 
 
 def walk_as_motion(agent: TrafficAgent) -> TrafficAgent:
-    """Return an agent with its walk as a motion, straight to its end, once the ego is near."""
+    """Return an agent with its walk as a motion, straight to its end, once the ego is near.
+
+    At its own pace, or the whole way in `WALK_S`.
+    """
     if agent.walk_to_m is None or agent.motion is not None:
         return agent
-    motion = PlannedMotion(
-        path=PointPath(points_m=(agent.walk_to_m,)),
-        speeds=((0.0, walking_pace_mps(agent)),),
-        start=NearEgo(within_m=SETS_OUT_WITHIN_M),
+    pace_mps = agent.speed_mps
+    if pace_mps <= 0.0:
+        pace_mps = math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
+    motion = planned.PlannedMotion(
+        path=planned.PointPath(points_m=(agent.walk_to_m,)),
+        speeds=((0.0, pace_mps),),
+        start=planned.NearEgo(within_m=SETS_OUT_WITHIN_M),
     )
     return replace(agent, speed_mps=0.0, walk_to_m=None, motion=motion)
-
-
-def walking_pace_mps(agent: TrafficAgent) -> float:
-    """The pace of an agent with a walk: its own speed, or the whole way in `WALK_S`."""
-    if agent.walk_to_m is None or agent.speed_mps > 0.0:
-        return agent.speed_mps
-    return math.dist((agent.x_m, agent.y_m), agent.walk_to_m) / WALK_S
 
 
 def way_and_speed(
@@ -241,7 +232,7 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
         return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
-def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline | None:
+def lane_line(graph: LaneGraph, path: planned.LanePath, here: Point) -> Polyline | None:
     """Return the line that a path over lanes takes from a place, None where the lanes end there.
 
     It keeps its offset from the centreline until it changes lanes; a change ends in the centre.
@@ -267,7 +258,8 @@ def lane_line(graph: LaneGraph, path: LanePath, here: Point) -> Polyline | None:
             share = smooth_share((s_m - begins_m) / path.change_m)
             start = line.position(s_m, d_m)
             end = target.position(target.project(*start).s_m)
-            points.append(_between(start, end, share))
+            x_m, y_m = ((1.0 - share) * a + share * b for a, b in zip(start, end, strict=True))
+            points.append((x_m, y_m))
         line, d_m = target, 0.0
         at_m = target.project(*points[-1]).s_m
     points += [line.position(s_m, d_m) for s_m in _samples(at_m, line.length_m)]
@@ -299,19 +291,19 @@ def check_scene_motions(scene: Scene) -> None:
     graph, names = LaneGraph(scene), {agent.id for agent in scene.everyone}
     for agent, motion in motions:
         try:
-            if isinstance(motion.path, LanePath):
+            if isinstance(motion.path, planned.LanePath):
                 check_lane_path(graph, motion.path)
         except InvalidModification as fault:
             raise InvalidModification(f"{agent.id}: {fault}") from None
         start = motion.start
-        if isinstance(start, AtPlace) and start.agent_id not in names - {agent.id}:
+        if isinstance(start, planned.AtPlace) and start.agent_id not in names - {agent.id}:
             raise InvalidModification(
                 f"{agent.id}: it waits for {start.agent_id}, who is none of "
                 f"{', '.join(sorted(names - {agent.id})[:MOST_LISTED])}"
             )
 
 
-def check_lane_path(graph: LaneGraph, path: LanePath) -> None:
+def check_lane_path(graph: LaneGraph, path: planned.LanePath) -> None:
     """Do nothing where the lanes can be followed one after the other.
 
     Raises:
@@ -330,16 +322,16 @@ def check_lane_path(graph: LaneGraph, path: LanePath) -> None:
 
 def run_beside(graph: LaneGraph, lane_id: str, other_id: str) -> bool:
     """Return whether one can change from a lane to another: it runs near it the same way."""
-    if other_id in graph.abreast(lane_id):
+    if other_id == lane_id or other_id in graph.abreast(lane_id):
         return other_id != lane_id
     other = graph.lane(other_id).centerline
     line = graph.lane(lane_id).centerline
-    for s_m in np.linspace(0.0, line.length_m, 20):
-        pose = line.pose_at(float(s_m))
+    for s_m in np.linspace(0.0, line.length_m, 20).tolist():
+        pose = line.pose_at(s_m)
         place = other.project(pose.x_m, pose.y_m)
         turn_rad = abs(difference(place.heading_rad, pose.heading_rad))
         if place.distance_m <= BESIDE_WITHIN_M and turn_rad < _ALONG_BELOW_RAD:
-            return other_id != lane_id
+            return True
     return False
 
 
@@ -380,7 +372,3 @@ def _samples(start_m: float, end_m: float, *, most: int = MOST_SAMPLES) -> list[
     # 1e-9: a length that is rounded up gets no sample more.
     count = min(math.ceil((end_m - start_m) / SAMPLE_M - 1e-9), most)
     return np.linspace(start_m, end_m, count + 1)[1:].tolist() if count > 0 else []
-
-
-def _between(start: Point, end: Point, share: float) -> Point:
-    return ((1.0 - share) * start[0] + share * end[0], (1.0 - share) * start[1] + share * end[1])

@@ -13,18 +13,8 @@ from pydantic import TypeAdapter
 
 from augment.errors import CannotPlace, InvalidDocument
 from augment.geometry.frames import Pose, difference
-from augment.scene import planned_mover
+from augment.scene import entities, planned_mover
 from augment.scene.ego_route import EgoRoute, RoutePosition
-from augment.scene.entities import (
-    AgentType,
-    AreaKind,
-    LaneConnector,
-    Point,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-    TrafficSide,
-)
 from augment.scene.lane_graph import ONCOMING_ABOVE_RAD
 from augment.scene.planned_motion import (
     CHANGE_M,
@@ -48,7 +38,6 @@ TURN_RADIUS_M = 4.5
 _MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _NUMBERS = ("braking_mps2", "speed_mps", "duration_s")
 _SPEEDING_UP_MPS2 = 3.0
-_DRIVEN = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 _STANDS_BELOW_MPS = 0.5
 _STARTS_WALKING_S = 0.5
 _KERB_M = 1.0
@@ -106,10 +95,10 @@ Whoever drives faster than the usual speed keeps its own.
 
 def with_preset(
     preset: MotionPreset,
-    scene: Scene,
-    agent: TrafficAgent,
+    scene: entities.Scene,
+    agent: entities.TrafficAgent,
     numbers: PresetNumbers = PresetNumbers(),
-) -> TrafficAgent:
+) -> entities.TrafficAgent:
     """Return the agent with the preset's motion; for a door the door, a new agent without an id.
 
     Args:
@@ -148,7 +137,7 @@ def preset_numbers(preset: MotionPreset) -> tuple[str, ...]:
     return tuple(name for name in _NUMBERS if getattr(USUAL[preset], name) is not None)
 
 
-def find_crossing(connector: LaneConnector, route: EgoRoute) -> Point | None:
+def find_crossing(connector: entities.LaneConnector, route: EgoRoute) -> entities.Point | None:
     """Return where a connector crosses the ego's way ahead, None where it doesn't."""
     ahead = route.line.between(route.ego_s_m, route.line.length_m)
     line = connector.centerline
@@ -175,7 +164,7 @@ def find_bend_end(route: EgoRoute) -> float | None:
     return next((s for s in after if turns_rad(s, _BEND_OVER_M / 2.0) < _STRAIGHT_RAD), None)
 
 
-def ego_pace_mps(scene: Scene) -> float:
+def ego_pace_mps(scene: entities.Scene) -> float:
     """Return how fast the ego comes, for timing; one that stands sets out some time."""
     return max(scene.ego.speed_mps, _SLOWEST_EGO_MPS)
 
@@ -189,7 +178,7 @@ class _Case:
 
     preset: MotionPreset
     route: EgoRoute
-    agent: TrafficAgent
+    agent: entities.TrafficAgent
     lane_id: str | None
     place: RoutePosition
     numbers: PresetNumbers
@@ -202,7 +191,7 @@ class _Case:
         path: Path | None,
         speeds: tuple[tuple[float, float], ...],
         start: Trigger | None = None,
-    ) -> TrafficAgent:
+    ) -> entities.TrafficAgent:
         motion = PlannedMotion(
             path=path,
             speeds=speeds,
@@ -226,7 +215,9 @@ class _Case:
 
     def require(self, *, ahead: bool = True, drives: bool | None = None) -> None:
         walks = self.preset is MotionPreset.LATE_PEDESTRIAN
-        if self.agent.type not in ((AgentType.PEDESTRIAN,) if walks else _DRIVEN):
+        if self.agent.type not in (
+            (entities.AgentType.PEDESTRIAN,) if walks else entities.STEERED
+        ):
             kind = self.agent.type.lower().replace("_", " ")
             raise self.refusal(f"it is not what a {kind} does.")
         if ahead and self.place.ahead_m <= 0.0:
@@ -246,7 +237,7 @@ class _Case:
         return abs(self.place.left_m) <= width_m / 2.0
 
 
-def _cut_in(case: _Case) -> TrafficAgent:
+def _cut_in(case: _Case) -> entities.TrafficAgent:
     case.require(drives=True)
     own = case.own_lane()
     if case.is_in_ego_lane():
@@ -260,7 +251,7 @@ def _cut_in(case: _Case) -> TrafficAgent:
     return case.moving(path, _ramp(case.agent.speed_mps, case.reached_mps))
 
 
-def _hard_braking(case: _Case) -> TrafficAgent:
+def _hard_braking(case: _Case) -> entities.TrafficAgent:
     case.require(drives=True)
     if not case.is_in_ego_lane():
         raise case.refusal("it has to be in the ego's lane.")
@@ -273,7 +264,7 @@ def _hard_braking(case: _Case) -> TrafficAgent:
     return case.moving(None, speeds)
 
 
-def _late_pedestrian(case: _Case) -> TrafficAgent:
+def _late_pedestrian(case: _Case) -> entities.TrafficAgent:
     case.require()
     if case.is_in_ego_lane():
         raise case.refusal("who starts late stands beside the ego's lane before.")
@@ -289,7 +280,7 @@ def _late_pedestrian(case: _Case) -> TrafficAgent:
     return replace(case, agent=waiting).moving(path, ((_STARTS_WALKING_S, speed_mps),))
 
 
-def _door_opening(case: _Case) -> TrafficAgent:
+def _door_opening(case: _Case) -> entities.TrafficAgent:
     case.require(drives=False)
     car, left_m = case.agent, case.place.left_m
     if case.is_in_ego_lane() or abs(left_m) > _DOOR_WITHIN_M:
@@ -305,9 +296,9 @@ def _door_opening(case: _Case) -> TrafficAgent:
     closed_m = car.width_m / 2.0 + DOOR_WIDTH_M / 2.0 + _DOOR_GAP_M
     local = [(_DOOR_AHEAD_M, side * across) for across in (closed_m, closed_m + DOOR_REACH_M)]
     closed, opened = map(_round, car.pose.to_parent(np.array(local)).tolist())
-    door = TrafficAgent(
+    door = entities.TrafficAgent(
         id="",
-        type=AgentType.GENERIC_OBJECT,
+        type=entities.AgentType.GENERIC_OBJECT,
         x_m=closed[0],
         y_m=closed[1],
         heading_rad=car.heading_rad,
@@ -321,7 +312,7 @@ def _door_opening(case: _Case) -> TrafficAgent:
     return replace(case, agent=door).moving(path, speeds)
 
 
-def _u_turn(case: _Case) -> TrafficAgent:
+def _u_turn(case: _Case) -> entities.TrafficAgent:
     case.require()
     agent, turn_mps = case.agent, case.number("speed_mps")
     start, gone_m = case.numbers.start, 0.0
@@ -342,10 +333,10 @@ def _u_turn(case: _Case) -> TrafficAgent:
     return case.moving(path, _ramp(agent.speed_mps, turn_mps), start)
 
 
-def _turn_points(case: _Case, begin: Pose) -> list[Point]:
+def _turn_points(case: _Case, begin: Pose) -> list[entities.Point]:
     """Half a circle to the oncoming lane, back to its centre if it was too narrow, and on."""
     graph, scene = case.route.graph, case.route.scene
-    side = -1.0 if scene.traffic_side is TrafficSide.LEFT else 1.0
+    side = -1.0 if scene.traffic_side is entities.TrafficSide.LEFT else 1.0
     oncoming = [
         (side * lane.d_m, lane.lane_id)
         for lane in graph.beside(begin.x_m, begin.y_m)
@@ -378,15 +369,15 @@ def _turn_points(case: _Case, begin: Pose) -> list[Point]:
     return points
 
 
-def _red_light(case: _Case) -> TrafficAgent:
+def _red_light(case: _Case) -> entities.TrafficAgent:
     case.require(ahead=False)
     for lane_ids in _ways(case):
         connector = case.route.graph.lane(lane_ids[-1])
-        assert isinstance(connector, LaneConnector)
+        assert isinstance(connector, entities.LaneConnector)
         crossing = find_crossing(connector, case.route)
         if crossing is None:
             continue
-        if connector.traffic_light is TrafficLight.GREEN:
+        if connector.traffic_light is entities.TrafficLight.GREEN:
             raise case.refusal(f"its light at {connector.id} is green.")
         path = LanePath(lane_ids=(*lane_ids, *case.route.graph.successors(connector.id)[:1]))
         own_mps = case.agent.speed_mps
@@ -416,14 +407,14 @@ def _ways(case: _Case) -> Iterator[tuple[str, ...]]:
     at_m = graph.lane(case.lane_id).centerline.project(case.agent.x_m, case.agent.y_m).s_m
     ways: list[tuple[tuple[str, ...], float]] = [((case.lane_id,), -at_m)]
     for way, before_m in ways:
-        if isinstance(graph.lane(way[-1]), LaneConnector):
+        if isinstance(graph.lane(way[-1]), entities.LaneConnector):
             yield way
         ends_m = before_m + graph.lane(way[-1]).centerline.length_m
         if ends_m <= _JUNCTION_WITHIN_M and len(way) < 10:
             ways += [((*way, name), ends_m) for name in graph.successors(way[-1])]
 
 
-def _emergency_stop(case: _Case) -> TrafficAgent:
+def _emergency_stop(case: _Case) -> entities.TrafficAgent:
     case.require(drives=True)
     if not case.is_in_ego_lane():
         raise case.refusal("it has to be in the ego's lane.")
@@ -441,7 +432,7 @@ def _emergency_stop(case: _Case) -> TrafficAgent:
     return case.moving(None, speeds, start)
 
 
-def _pull_out(case: _Case) -> TrafficAgent:
+def _pull_out(case: _Case) -> entities.TrafficAgent:
     case.require(drives=False)
     own = case.own_lane()
     turned_rad = abs(difference(case.agent.heading_rad, case.place.tangent_rad))
@@ -490,10 +481,11 @@ def _road(route: EgoRoute) -> shapely.Geometry:
         shapely.LineString(lane.centerline.points_m).buffer(lane.width_m / 2.0 + _OFF_ROAD_M)
         for lane in route.graph.lanes.values()
     ]
-    kinds = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
-    areas = [shapely.Polygon(a.boundary_m) for a in route.scene.areas if a.kind in kinds]
+    areas = [
+        shapely.Polygon(a.boundary_m) for a in route.scene.areas if a.kind in entities.DRIVEN_ON
+    ]
     return shapely.union_all([*lanes, *(shapely.make_valid(a).buffer(_OFF_ROAD_M) for a in areas)])
 
 
-def _round(point: Sequence[float]) -> Point:
+def _round(point: Sequence[float]) -> entities.Point:
     return round(point[0], 3) + 0.0, round(point[1], 3) + 0.0

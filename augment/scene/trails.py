@@ -3,6 +3,7 @@
 Frame: ego frame of t0. P points.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -66,37 +67,33 @@ def find_trails(
         return ()
     after = apply(scene, modification)
     motion = find_motion(with_movers_alone(after, driving_on), recording=recording)
-    started = {
-        movement.agent.id: _trail_since(
-            0.0 if movement.agent.id in driving_on else movement.started_s, movement.states
-        )
+    starts_s = {
+        movement.agent.id: math.inf if movement.started_s is None else movement.started_s
         for movement in motion.others
-    }
-    waiting = {name for name, trail in started.items() if trail is None}
-    at_once = replace(
-        after,
-        agents=tuple(
-            replace(agent, motion=replace(agent.motion, start=AtTime()))
-            for agent in after.agents
-            if agent.motion is not None and agent.id in waiting
-        ),
+    } | dict.fromkeys(driving_on, 0.0)
+    late = {name for name, start_s in starts_s.items() if start_s > HORIZON_S}
+    at_once = tuple(
+        replace(agent, motion=replace(agent.motion, start=AtTime()))
+        for agent in after.agents
+        if agent.motion is not None and agent.id in late
     )
-    would = {
-        movement.agent.id: movement.states[: _STEPS + 1, :2]
-        for movement in find_motion(at_once).others
-    }
+    movements = (*motion.others, *find_motion(replace(after, agents=at_once)).others)
+    states = {movement.agent.id: movement.states for movement in movements}
     trails = []
     for agent in modification.changed:
         if agent.motion is None and agent.id not in driving_on:
             continue
-        states = started[agent.id]
-        if states is None:
-            way_m = would[agent.id]
-            trails.append(Trail(agent=agent, way_m=_there(way_m), spots=(), sets_out=False))
-        else:
-            way_m, spots_at = states
-            spots = _spots(agent, spots_at)
-            trails.append(Trail(agent=agent, way_m=_there(way_m), spots=spots, sets_out=True))
+        sets_out, way = agent.id not in late, states[agent.id]
+        start = round(starts_s[agent.id] / STEP_S) if sets_out else 0
+        # The way counts from t0, the outlines since it set out.
+        way_m, spots_at = way[: start + _STEPS + 1, :2], way[start : start + _STEPS + 1 : _EVERY]
+        trail = Trail(
+            agent=agent,
+            way_m=way_m[~np.isnan(way_m).any(axis=1)],
+            spots=_spots(agent, spots_at) if sets_out else (),
+            sets_out=sets_out,
+        )
+        trails.append(trail)
     return tuple(trails)
 
 
@@ -108,21 +105,6 @@ def ego_spots(scene: Scene, recording: Recording | None = None) -> tuple[Traffic
 
 
 # Private
-
-
-def _trail_since(
-    started_s: float | None, states: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    """The way (P, 2) and the states (K, 4) every second, None where it sets out too late."""
-    if started_s is None or started_s > HORIZON_S:
-        return None
-    start = round(started_s / STEP_S)
-    # The way counts from t0, the outlines since it set out.
-    return states[: start + _STEPS + 1, :2], states[start : start + _STEPS + 1 : _EVERY]
-
-
-def _there(points_m: FloatArray) -> FloatArray:
-    return points_m[~np.isnan(points_m).any(axis=1)]
 
 
 def _spots(agent: TrafficAgent, states: FloatArray) -> tuple[TrafficAgent, ...]:

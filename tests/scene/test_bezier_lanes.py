@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.bezier_lanes import LanePiece, Tolerance, bezier_lane, piece_ids
+from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids
 from tests.scenes import curve, scene
 
 WINDING = Polyline([(x, 12.0 * math.sin(x / 18.0)) for x in np.linspace(0.0, 200.0, 201).tolist()])
@@ -33,11 +33,6 @@ def test_a_lane_that_one_cubic_cannot_follow_is_cut_and_joined_smoothly() -> Non
         assert before.curve.control_m[3].tolist() == after.curve.control_m[0].tolist()
         turn = after.curve.headings(np.zeros(1)) - before.curve.headings(np.ones(1))
         assert np.cos(turn) == pytest.approx(1.0, abs=1e-9)
-
-
-def test_a_wider_tolerance_takes_fewer_pieces() -> None:
-    wide = bezier_lane(WINDING, Tolerance(position_m=2.0, heading_rad=math.radians(10.0)))
-    assert len(wide) < len(bezier_lane(WINDING))
 
 
 def test_a_restless_line_keeps_its_error_and_says_so() -> None:

@@ -11,22 +11,7 @@ from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.geometry.polyline import Polyline
-from augment.scene.codec import (
-    modification_from_document,
-    modification_to_document,
-    recording_from_document,
-    recording_to_document,
-    scene_from_document,
-    scene_to_document,
-)
-from augment.scene.entities import (
-    AgentType,
-    Modification,
-    SceneOptions,
-    TrafficAgent,
-    TrafficDensity,
-    TurnType,
-)
+from augment.scene import codec, entities
 from augment.scene.recording import Recording, Track
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
@@ -37,9 +22,11 @@ LINES = st.lists(st.integers(-9_000, 9_000), min_size=2, max_size=5, unique=True
     lambda numbers: Polyline([(number / 7.0, number**2 / 3e5) for number in numbers])
 )
 AGENTS = st.builds(
-    TrafficAgent,
+    entities.TrafficAgent,
     id=st.just("Agent2"),
-    type=st.sampled_from([kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE]),
+    type=st.sampled_from(
+        [kind for kind in entities.AgentType if kind is not entities.AgentType.EGO_VEHICLE]
+    ),
     x_m=METRES,
     y_m=METRES,
     heading_rad=st.floats(-math.pi, math.pi),
@@ -50,21 +37,21 @@ AGENTS = st.builds(
     walk_to_m=st.none() | POINTS,
 )
 OPTIONS = st.builds(
-    SceneOptions,
-    density=st.sampled_from(TrafficDensity),
-    goal=st.sampled_from([None, TurnType.LEFT, TurnType.STRAIGHT]),
+    entities.SceneOptions,
+    density=st.sampled_from(entities.TrafficDensity),
+    goal=st.sampled_from([None, entities.TurnType.LEFT, entities.TurnType.STRAIGHT]),
     goal_m=st.none() | POINTS,
 )
 
 
 @given(AGENTS, LINES, st.none() | LINES, SIZES, st.none() | SIZES, OPTIONS)
 def test_a_scene_survives_the_way_through_json_exactly(
-    agent: TrafficAgent,
+    agent: entities.TrafficAgent,
     line: Polyline,
     boundary: Polyline | None,
     width_m: float,
     limit_mps: float | None,
-    options: SceneOptions,
+    options: entities.SceneOptions,
 ) -> None:
     drawn: dict[str, Any] = {"centerline": line, "left_boundary": boundary, "width_m": width_m}
     first, *lanes = junction().lanes
@@ -76,24 +63,24 @@ def test_a_scene_survives_the_way_through_json_exactly(
         areas=scene().areas,
         options=options,
     )
-    text = json.dumps(scene_to_document(given_scene), allow_nan=False)
-    assert scene_from_document(json.loads(text)) == given_scene
+    text = json.dumps(codec.scene_to_document(given_scene), allow_nan=False)
+    assert codec.scene_from_document(json.loads(text)) == given_scene
 
 
 @given(AGENTS, AGENTS)
 def test_a_modification_survives_the_way_through_json_exactly(
-    first: TrafficAgent, second: TrafficAgent
+    first: entities.TrafficAgent, second: entities.TrafficAgent
 ) -> None:
     moved = replace(second, id="Agent3")
-    change = Modification(added=(first,), moved=(moved,), removed=("Agent4",))
-    text = json.dumps(modification_to_document(change), allow_nan=False)
-    assert modification_from_document(json.loads(text)) == change
+    change = entities.Modification(added=(first,), moved=(moved,), removed=("Agent4",))
+    text = json.dumps(codec.modification_to_document(change), allow_nan=False)
+    assert codec.modification_from_document(json.loads(text)) == change
 
 
 def document() -> dict[str, Any]:
     busy = scene(agents=(vehicle("Agent2", 20.0, 0.0), cone("Agent3", 5.0, 1.0)))
-    made = scene_to_document(busy)
-    made["connectors"] = scene_to_document(junction())["connectors"][:1]
+    made = codec.scene_to_document(busy)
+    made["connectors"] = codec.scene_to_document(junction())["connectors"][:1]
     return deepcopy(made)
 
 
@@ -141,7 +128,7 @@ def test_every_fault_is_named_with_its_place(
     place: list[Any], value: object, sentence: str
 ) -> None:
     with pytest.raises(InvalidDocument) as caught:
-        scene_from_document(put(document(), place, value))
+        codec.scene_from_document(put(document(), place, value))
     assert sentence in str(caught.value)
 
 
@@ -149,27 +136,27 @@ def test_a_missing_field_is_named() -> None:
     made = document()
     del made["lanes"][0]["width_m"]
     with pytest.raises(InvalidDocument) as caught:
-        scene_from_document(made)
+        codec.scene_from_document(made)
     assert caught.value.problems == [("lanes[0].width_m", "is missing")]
 
 
 @pytest.mark.parametrize("thing", [None, 3, "scene", [], [{}]])
 def test_what_is_no_object_is_no_scene(thing: object) -> None:
     with pytest.raises(InvalidDocument, match="expected an object"):
-        scene_from_document(thing)
+        codec.scene_from_document(thing)
 
 
 def test_all_faults_are_named_at_once() -> None:
     made = put(put(document(), ["ego", "width_m"], -1), ["agents", 0, "x_m"], None)
     with pytest.raises(InvalidDocument) as caught:
-        scene_from_document(made)
+        codec.scene_from_document(made)
     assert [place for place, _ in caught.value.problems] == ["ego.width_m", "agents[0].x_m"]
 
 
 def test_a_list_tells_its_first_fault() -> None:
     made = put(document(), ["lanes", 0, "centerline_m"], [["x", "y"]] * 1000)
     with pytest.raises(InvalidDocument) as caught:
-        scene_from_document(made)
+        codec.scene_from_document(made)
     assert [place for place, _ in caught.value.problems] == [
         "lanes[0].centerline_m[0][0]",
         "lanes[0].centerline_m[0][1]",
@@ -178,36 +165,38 @@ def test_a_list_tells_its_first_fault() -> None:
 
 @pytest.mark.parametrize(("number", "is_read"), [(5_000, True), (5_001, False)])
 def test_a_modification_has_at_most_5000_agents(number: int, is_read: bool) -> None:
-    one = modification_to_document(Modification(added=(cone("Agent2", 1.0, 0.0),)))
+    one = codec.modification_to_document(entities.Modification(added=(cone("Agent2", 1.0, 0.0),)))
     made = one | {"add": [one["add"][0] | {"id": f"Agent{n}"} for n in range(number)]}
     if is_read:
-        assert len(modification_from_document(made).added) == number
+        assert len(codec.modification_from_document(made).added) == number
     else:
         with pytest.raises(InvalidDocument, match="add: List should have at most 5000 items"):
-            modification_from_document(made)
+            codec.modification_from_document(made)
 
 
 def test_what_could_not_be_read_is_not_written() -> None:
     with pytest.raises(InvalidDocument, match=r"agents\[0\]\.x_m"):
-        scene_to_document(scene(agents=(vehicle("Agent2", math.nan, 0.0),)))
+        codec.scene_to_document(scene(agents=(vehicle("Agent2", math.nan, 0.0),)))
 
 
 def test_a_modification_names_each_agent_once() -> None:
-    change = Modification(added=(cone("Agent2", 1.0, 0.0),), removed=("Agent2",))
+    change = entities.Modification(added=(cone("Agent2", 1.0, 0.0),), removed=("Agent2",))
     with pytest.raises(InvalidDocument, match=r"remove\[0\]: 'Agent2' is taken already by add"):
-        modification_to_document(change)
+        codec.modification_to_document(change)
 
 
 def test_nobody_adds_a_second_ego() -> None:
-    change = modification_to_document(Modification(added=(cone("Agent2", 1.0, 0.0),)))
+    change = codec.modification_to_document(
+        entities.Modification(added=(cone("Agent2", 1.0, 0.0),))
+    )
     change["add"][0]["type"] = "EGO_VEHICLE"
     with pytest.raises(InvalidDocument, match=r"add\[0\]\.type"):
-        modification_from_document(change)
+        codec.modification_from_document(change)
 
 
 def test_documents_say_their_units() -> None:
-    change = Modification(added=(pedestrian("Agent2", 12.0, -4.0, (12.0, 4.0)),))
-    assert modification_to_document(change)["add"] == [
+    change = entities.Modification(added=(pedestrian("Agent2", 12.0, -4.0, (12.0, 4.0)),))
+    assert codec.modification_to_document(change)["add"] == [
         {
             "id": "Agent2",
             "type": "PEDESTRIAN",
@@ -231,7 +220,7 @@ def recording() -> Recording:
         tracks=(
             Track(
                 agent_id="Agent2",
-                type=AgentType.VEHICLE,
+                type=entities.AgentType.VEHICLE,
                 length_m=4.8,
                 width_m=2.0,
                 states=np.array([[9.0, 1.0, 3.1, 2.0], unseen, [8.6, 1.0, 3.1, 2.0]]),
@@ -242,8 +231,8 @@ def recording() -> Recording:
 
 def test_a_recording_survives_the_way_through_json_exactly() -> None:
     given = recording()
-    text = json.dumps(recording_to_document(given), allow_nan=False)
-    back = recording_from_document(json.loads(text))
+    text = json.dumps(codec.recording_to_document(given), allow_nan=False)
+    back = codec.recording_from_document(json.loads(text))
     assert np.array_equal(back.times_s, given.times_s)
     assert np.array_equal(back.ego, given.ego)
     assert np.array_equal(back.tracks[0].states, given.tracks[0].states, equal_nan=True)
@@ -264,7 +253,7 @@ def test_a_recording_survives_the_way_through_json_exactly() -> None:
 )
 def test_a_broken_recording_names_the_place(fields: dict[str, object], place: str) -> None:
     with pytest.raises(InvalidDocument) as caught:
-        recording_from_document(recording_to_document(recording()) | fields)
+        codec.recording_from_document(codec.recording_to_document(recording()) | fields)
     assert place in [where for where, _ in caught.value.problems]
 
 
@@ -272,4 +261,4 @@ def test_half_a_state_is_no_state() -> None:
     given = recording()
     given.tracks[0].states[0, 1] = np.nan
     with pytest.raises(InvalidDocument, match=r"tracks\[0\]\.states\[0\]\[1\]"):
-        recording_to_document(given)
+        codec.recording_to_document(given)

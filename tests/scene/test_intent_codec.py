@@ -4,88 +4,69 @@ from typing import Any
 import pytest
 
 from augment.errors import InvalidDocument
+from augment.scene import intent as wish
 from augment.scene.codec import INTENT, intent_from_document, intent_to_document
 from augment.scene.entities import TurnType
-from augment.scene.intent import (
-    Bearing,
-    Body,
-    ConesRequest,
-    CrashedCar,
-    CrashRequest,
-    DoorRequest,
-    Facing,
-    Intent,
-    LaneChoice,
-    Lateral,
-    LateralTarget,
-    MapPlace,
-    Move,
-    Nearness,
-    Pick,
-    Post,
-    Purpose,
-    Relation,
-    Setting,
-    Shape,
-    Side,
-    Sight,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
 from augment.scene.intent_parts import Amount, MotionWish, StartWish
 from augment.scene.intent_statements import list_statements
 from augment.scene.planned_motion import MotionPreset
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
 from tests.intents import metres
 
-FULL = Intent(
+FULL = wish.Intent(
     requests=(
-        VehicleRequest(
+        wish.VehicleRequest(
             name="bus",
-            spot=Spot(
+            spot=wish.Spot(
                 distance=metres(3.0, 4.5, about=True),
-                relation=Relation.BEHIND,
-                lane=LaneChoice.LEFT,
-                lateral=Lateral(
-                    target=LateralTarget.KERB, nearness=Nearness.AT_EDGE, on_shoulder=True
+                relation=wish.Relation.BEHIND,
+                lane=wish.LaneChoice.LEFT,
+                lateral=wish.Lateral(
+                    target=wish.LateralTarget.KERB,
+                    nearness=wish.Nearness.AT_EDGE,
+                    on_shoulder=True,
                 ),
-                settings=(Setting.IN_BEND,),
+                settings=(wish.Setting.IN_BEND,),
             ),
-            body=Body.BUS,
-            facing=Facing.AGAINST_LANE,
+            body=wish.Body.BUS,
+            facing=wish.Facing.AGAINST_LANE,
             turn_deg=-12.5,
             speed_mps=3.25,
             count=2,
             spacing=metres(9.0),
         ),
-        WalkRequest(
-            spot=Spot(anchor="bus"),
+        wish.WalkRequest(
+            spot=wish.Spot(anchor="bus"),
             drift_m=-4.0,
             is_file=True,
             behind=(metres(2.0),),
             on_road=True,
             motion=MotionWish(
                 preset=MotionPreset.LATE_PEDESTRIAN,
-                start=StartWish(mark=MapPlace.CROSSWALK, ego_distance=metres(10.0, 12.0)),
+                start=StartWish(mark=wish.MapPlace.CROSSWALK, ego_distance=metres(10.0, 12.0)),
                 speed_mps=Amount(low=2.0, high=2.0),
             ),
         ),
-        DoorRequest(spot=Spot(anchor="bus")),
-        ConesRequest(
-            spot=Spot(mark=MapPlace.CROSSWALK),
-            shape=Shape.TAPER,
-            start=Side.LEFT,
+        wish.DoorRequest(spot=wish.Spot(anchor="bus")),
+        wish.ConesRequest(
+            spot=wish.Spot(mark=wish.MapPlace.CROSSWALK),
+            shape=wish.Shape.TAPER,
+            start=wish.Side.LEFT,
             has_worker=True,
-            post=Post.BEHIND,
-            post_side=Side.RIGHT,
+            post=wish.Post.BEHIND,
+            post_side=wish.Side.RIGHT,
         ),
-        CrashRequest(others=(CrashedCar(gap=metres(4.0), bearing=Bearing.LEFT, turn_deg=40.0),)),
+        wish.CrashRequest(
+            others=(wish.CrashedCar(gap=metres(4.0), bearing=wish.Bearing.LEFT, turn_deg=40.0),)
+        ),
     ),
     moves=(
-        Move(who=Pick(kind=Sight.PARKED, ordinal=2), spot=Spot(lane=LaneChoice.OWN)),
-        Move(
-            who=Pick(kind=Sight.MOVING),
+        wish.Move(
+            who=wish.Pick(kind=wish.Sight.PARKED, ordinal=2),
+            spot=wish.Spot(lane=wish.LaneChoice.OWN),
+        ),
+        wish.Move(
+            who=wish.Pick(kind=wish.Sight.MOVING),
             motion=MotionWish(
                 preset=MotionPreset.HARD_BRAKING,
                 start=StartWish(after_s=Amount(low=1.0, high=2.5)),
@@ -93,8 +74,8 @@ FULL = Intent(
             ),
         ),
     ),
-    removals=(Pick(kind=Sight.BUS, side=Side.LEFT, every=True),),
-    purpose=Purpose(
+    removals=(wish.Pick(kind=wish.Sight.BUS, side=wish.Side.LEFT, every=True),),
+    purpose=wish.Purpose(
         sight=metres(8.0, 14.0),
         passage=metres(3.0),
         braking_mps2=Amount(low=3.0, high=8.0),
@@ -120,7 +101,9 @@ def test_an_intent_comes_back_from_its_document_and_can_be_said() -> None:
 
 
 def test_what_is_open_is_absent() -> None:
-    assert intent_to_document(Intent(requests=(WalkRequest(),)))["requests"] == [{"kind": "walk"}]
+    assert intent_to_document(wish.Intent(requests=(wish.WalkRequest(),)))["requests"] == [
+        {"kind": "walk"}
+    ]
 
 
 @pytest.mark.parametrize(

@@ -68,9 +68,8 @@ def test_a_distance_runs_on_over_connectors() -> None:
 
 def test_a_turn_can_be_asked_for_and_a_distance_can_run_back() -> None:
     graph = LaneGraph(junction())
-    ahead = graph.along("Lane1", 50.0, 40.0, turn=TurnType.LEFT)
-    assert ahead is not None
-    assert ahead.lane_id == "Lane3"
+    ahead = graph.route("Lane1", 100.0, turn=TurnType.LEFT)
+    assert ahead == ["Lane1", "Connector2", "Lane3"]
     back = graph.along("Lane2", 4.0, -40.0)
     assert back is not None
     assert back.lane_id == "Lane1"

@@ -9,14 +9,7 @@ import pytest
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import (
-    AgentType,
-    Lane,
-    LaneConnector,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-)
+from augment.scene import entities
 from augment.scene.motion import Movement, find_motion
 from augment.scene.planned_motion import (
     AtPlace,
@@ -30,23 +23,25 @@ from augment.scene.presets import PresetNumbers, with_preset
 from tests.scenes import curve, pedestrian, scene, vehicle
 
 
-def lanes(*lefts_m: float, oncoming_m: tuple[float, ...] = ()) -> tuple[Lane, ...]:
+def lanes(*lefts_m: float, oncoming_m: tuple[float, ...] = ()) -> tuple[entities.Lane, ...]:
     """Lanes 3.5 m wide along the ego's, so far left of it; the ego's own is Lane1."""
     east, west = np.array([(-50.0, 0.0), (200.0, 0.0)]), np.array([(200.0, 0.0), (-50.0, 0.0)])
     ways = [(east, left_m) for left_m in lefts_m] + [(west, left_m) for left_m in oncoming_m]
     return tuple(
-        Lane(id=f"Lane{number}", centerline=Polyline(np.add(way, (0.0, left_m))), width_m=3.5)
+        entities.Lane(
+            id=f"Lane{number}", centerline=Polyline(np.add(way, (0.0, left_m))), width_m=3.5
+        )
         for number, (way, left_m) in enumerate(ways, start=1)
     )
 
 
-def crossing(light: TrafficLight = TrafficLight.RED) -> Scene:
+def crossing(light: entities.TrafficLight = entities.TrafficLight.RED) -> entities.Scene:
     """A way from the right that crosses the ego's at x = 40 m, and turns into nothing else."""
     arms = (
-        Lane(id="Lane8", centerline=Polyline([(40, -60), (40, -10)]), width_m=3.5),
-        Lane(id="Lane9", centerline=Polyline([(40, 10), (40, 60)]), width_m=3.5),
+        entities.Lane(id="Lane8", centerline=Polyline([(40, -60), (40, -10)]), width_m=3.5),
+        entities.Lane(id="Lane9", centerline=Polyline([(40, 10), (40, 60)]), width_m=3.5),
     )
-    way = LaneConnector(
+    way = entities.LaneConnector(
         id="Connector1",
         from_lane="Lane8",
         to_lane="Lane9",
@@ -57,7 +52,7 @@ def crossing(light: TrafficLight = TrafficLight.RED) -> Scene:
     return scene(lanes=(*lanes(0.0), *arms), connectors=(way,))
 
 
-def bend() -> Scene:
+def bend() -> entities.Scene:
     """The ego's lane turns left on 40 m round (10, 40) and goes straight on from (50, 40)."""
     (lane,) = curve(40.0).lanes
     line = Polyline(np.vstack([lane.centerline.points_m, [(50.0, 140.0)]]))
@@ -66,11 +61,11 @@ def bend() -> Scene:
 
 def car(
     x_m: float, y_m: float, *, speed_mps: float = 0.0, heading_rad: float = 0.0
-) -> TrafficAgent:
+) -> entities.TrafficAgent:
     return replace(vehicle("Agent2", x_m, y_m, heading_rad), speed_mps=speed_mps)
 
 
-def driven(base: Scene, agent: TrafficAgent) -> Movement:
+def driven(base: entities.Scene, agent: entities.TrafficAgent) -> Movement:
     return find_motion(replace(base, agents=(agent,))).others[0]
 
 
@@ -122,7 +117,7 @@ def test_a_pedestrian_who_starts_late_waits_and_crosses_both_lanes() -> None:
 def test_a_door_slides_out_towards_the_ego_and_stays_shut_before(heading_rad: float) -> None:
     parked = car(30.0, -3.0, heading_rad=heading_rad)
     door = with_preset(MotionPreset.DOOR_OPENING, scene(), parked)
-    assert (door.id, door.type) == ("", AgentType.GENERIC_OBJECT)
+    assert (door.id, door.type) == ("", entities.AgentType.GENERIC_OBJECT)
     assert overlap(door.box, parked.box).depth_m == 0.0
     moved = driven(scene(), replace(door, id="Agent3"))
     start, end = moved.states[0], moved.states[-1]
@@ -163,7 +158,7 @@ def test_who_runs_a_red_light_meets_the_ego_in_the_crossing() -> None:
     apart = both.ego.states[:, :2] - both.others[0].states[:, :2]
     assert np.nanmin(np.hypot(*apart.T)) < 1.5
     with pytest.raises(CannotPlace, match="its light at Connector1 is green"):
-        with_preset(MotionPreset.RED_LIGHT, crossing(TrafficLight.GREEN), waiting)
+        with_preset(MotionPreset.RED_LIGHT, crossing(entities.TrafficLight.GREEN), waiting)
 
 
 def test_a_leader_stops_behind_the_bend() -> None:
@@ -203,7 +198,7 @@ def test_a_parked_car_pulls_out_into_the_egos_lane() -> None:
     ],
 )
 def test_a_refusal_says_what_is_missing(
-    preset: MotionPreset, agent: TrafficAgent, why: str
+    preset: MotionPreset, agent: entities.TrafficAgent, why: str
 ) -> None:
     with pytest.raises(CannotPlace, match=f"{preset.label}: .*{why}"):
         with_preset(preset, scene(), agent)
