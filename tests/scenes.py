@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from augment.geometry.frames import Pose, wrap
 from augment.geometry.polyline import Polyline
@@ -58,6 +59,38 @@ def pedestrian(
     )
 
 
+def lane(name: str, points_m: ArrayLike, **parts: Any) -> entities.Lane:
+    """A lane 3.5 m wide."""
+    return entities.Lane(id=name, centerline=Polyline(points_m), width_m=3.5, **parts)
+
+
+def lanes(
+    *lefts_m: float,
+    oncoming_m: Sequence[float] = (),
+    ends_m: tuple[float, float] = (-50.0, 200.0),
+    **parts: Any,
+) -> tuple[entities.Lane, ...]:
+    """Neighbours along the ego's way, so far left of it, its own first; then oncoming ones."""
+    begin_m, end_m = ends_m
+    names = [f"Lane{number}" for number in range(1, len(lefts_m) + 1)]
+    beside = zip(names, lefts_m, [*names[1:], None], [None, *names[:-1]], strict=True)
+    made = [
+        lane(
+            name, [(begin_m, y_m), (end_m, y_m)], left_neighbor=left, right_neighbor=right, **parts
+        )
+        for name, y_m, left, right in beside
+    ]
+    for y_m in oncoming_m:
+        made.append(lane(f"Lane{len(made) + 1}", [(end_m, y_m), (begin_m, y_m)], **parts))
+    return tuple(made)
+
+
+def strip(name: str, kind: entities.AreaKind, low_m: float, high_m: float) -> entities.Area:
+    """An area along the ego's way, from x = -50 to 100 m."""
+    boundary_m = ((-50.0, low_m), (100.0, low_m), (100.0, high_m), (-50.0, high_m))
+    return entities.Area(id=name, kind=kind, boundary_m=boundary_m)
+
+
 def scene(**changes: object) -> entities.Scene:
     """A straight two-way street, right-hand traffic: Lane1 is the ego's, Lane2 comes towards it.
 
@@ -69,36 +102,11 @@ def scene(**changes: object) -> entities.Scene:
         traffic_side=entities.TrafficSide.RIGHT,
         origin=entities.Origin(frame="test", x_m=0.0, y_m=0.0, heading_rad=0.0),
         provenance="made for a test",
-        lanes=(
-            entities.Lane(
-                id="Lane1",
-                centerline=Polyline([(-50.0, 0.0), (100.0, 0.0)]),
-                width_m=3.5,
-                speed_limit_mps=13.9,
-            ),
-            entities.Lane(
-                id="Lane2",
-                centerline=Polyline([(100.0, 3.5), (-50.0, 3.5)]),
-                width_m=3.5,
-                speed_limit_mps=13.9,
-            ),
-        ),
+        lanes=lanes(0.0, oncoming_m=(3.5,), ends_m=(-50.0, 100.0), speed_limit_mps=13.9),
         areas=(
-            entities.Area(
-                id="Area1",
-                kind=entities.AreaKind.DRIVABLE,
-                boundary_m=((-50.0, -1.75), (100.0, -1.75), (100.0, 5.25), (-50.0, 5.25)),
-            ),
-            entities.Area(
-                id="Area2",
-                kind=entities.AreaKind.WALKWAY,
-                boundary_m=((-50.0, -4.25), (100.0, -4.25), (100.0, -1.75), (-50.0, -1.75)),
-            ),
-            entities.Area(
-                id="Area3",
-                kind=entities.AreaKind.WALKWAY,
-                boundary_m=((-50.0, 5.25), (100.0, 5.25), (100.0, 7.75), (-50.0, 7.75)),
-            ),
+            strip("Area1", entities.AreaKind.DRIVABLE, -1.75, 5.25),
+            strip("Area2", entities.AreaKind.WALKWAY, -4.25, -1.75),
+            strip("Area3", entities.AreaKind.WALKWAY, 5.25, 7.75),
         ),
     )
     return replace(made, **changes)  # type: ignore[arg-type]
@@ -111,12 +119,8 @@ def curve(radius_m: float = 40.0) -> entities.Scene:
     """
     angles = np.linspace(0.0, math.pi / 2.0, 91)
     bend = np.column_stack([10.0 + radius_m * np.sin(angles), radius_m * (1.0 - np.cos(angles))])
-    line = Polyline(np.vstack([[[-50.0, 0.0], [0.0, 0.0]], bend]))
-    return scene(
-        name="curve",
-        lanes=(entities.Lane(id="Lane1", centerline=line, width_m=3.5, speed_limit_mps=8.3),),
-        areas=(),
-    )
+    points = np.vstack([[[-50.0, 0.0], [0.0, 0.0]], bend])
+    return scene(name="curve", lanes=(lane("Lane1", points, speed_limit_mps=8.3),), areas=())
 
 
 def junction() -> entities.Scene:
@@ -127,9 +131,9 @@ def junction() -> entities.Scene:
     return scene(
         name="junction",
         lanes=(
-            entities.Lane(id="Lane1", centerline=Polyline([(-50, 0), (20, 0)]), width_m=3.5),
-            entities.Lane(id="Lane2", centerline=Polyline([(36, 0), (100, 0)]), width_m=3.5),
-            entities.Lane(id="Lane3", centerline=Polyline([(28, 8), (28, 60)]), width_m=3.5),
+            lane("Lane1", [(-50, 0), (20, 0)]),
+            lane("Lane2", [(36, 0), (100, 0)]),
+            lane("Lane3", [(28, 8), (28, 60)]),
         ),
         connectors=(
             entities.LaneConnector(

@@ -163,10 +163,8 @@ def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
 
 def _wishes(change: Modification, scene: Scene) -> _Wishes:
     cars = [agent for agent in apply(scene, change).agents if is_stopped(agent)]
-    wishes = {agent.id: find_wish(agent, scene, cars) for agent in change.changed}
-    return {
-        name: wish_or_none for name, wish_or_none in wishes.items() if wish_or_none is not None
-    }
+    found = ((agent.id, find_wish(agent, scene, cars)) for agent in change.changed)
+    return {name: asked for name, asked in found if asked is not None}
 
 
 def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iterator[wish.Request]:
@@ -244,8 +242,9 @@ def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
 
 
 def _lateral(place: LanePlace) -> wish.Lateral:
+    sides = wish.LateralTarget
     return wish.Lateral(
-        target=_boundary(place.left_m),
+        target=sides.LEFT_BOUNDARY if place.left_m > 0.0 else sides.RIGHT_BOUNDARY,
         nearness=wish.Nearness.OUTSIDE if place.off_m > 0.0 else None,
         offset=_length(abs(place.left_m)),
     )
@@ -264,10 +263,6 @@ def _spot(place: LanePlace) -> wish.Spot:
 def _length(metres: float) -> wish.Length:
     # To a decimetre: sentences say no more.
     return wish.Length(low_m=round(metres, 1), high_m=round(metres, 1))
-
-
-def _boundary(left_m: float) -> wish.LateralTarget:
-    return wish.LateralTarget.LEFT_BOUNDARY if left_m > 0.0 else wish.LateralTarget.RIGHT_BOUNDARY
 
 
 def _vehicle(

@@ -22,12 +22,11 @@ from augment.checks.wish_motion import measure_placed
 from augment.checks.wish_patterns import Chain, Link, Pattern, find_step_m
 from augment.checks.wish_places import ACROSS_M, Place, Span, find_across, list_stations
 from augment.checks.wish_shapes import find_nearest_cones, find_worker_ground
-from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene import intent as wish
 from augment.scene.entities import Modification, Point, TrafficAgent
 from augment.scene.planned_motion import MotionPreset
-from augment.scene.presets import find_road_edge_m
+from augment.scene.presets import find_door_side, find_road_edge_m
 
 ABREAST_M = 3.0
 """From one to the next of those who walk side by side, at most."""
@@ -374,10 +373,7 @@ class _Fitting:
         car = self.find_car(request)
         if car is None:
             return point
-        here = self._lanes.route.locate_agent(car)
-        # From the car to the ego's way, then as a side of the car: 1 left, -1 right.
-        toward_rad = here.tangent_rad - math.copysign(math.pi / 2.0, here.left_m)
-        side = math.copysign(1.0, difference(toward_rad, car.heading_rad))
+        side = find_door_side(car, self._lanes.route.locate_agent(car))
         near_m, far_m = car.width_m / 2.0, car.width_m / 2.0 + _DOOR_OFF_M
         half_m = car.length_m / 2.0
         # Ahead and out of that side, in the car's frame.

@@ -85,6 +85,14 @@ class MotionCase:
         times_s = np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist()
         return self.whole.carry_out(agent, times_s)
 
+    def give(
+        self, path: planned_motion.Path | None, speeds: Speeds, after_s: float
+    ) -> TrafficAgent:
+        """Return the agent with a motion that starts then, at its admissible place."""
+        start = planned_motion.AtTime(after_s=after_s)
+        motion = planned_motion.PlannedMotion(path=path, speeds=speeds, start=start)
+        return replace(self.placed, walk_to_m=None, motion=motion)
+
     def find_offsets(self, agent: TrafficAgent) -> FloatArray:
         """Return from an agent to the answer (T, 2), in m; NaN where one is past the map."""
         states = self.carry_out(agent)
@@ -162,61 +170,54 @@ class _Search:
     """The nearest admissible motion, or the nearest of all until one is admissible."""
 
     def __init__(self, case: MotionCase, wish: MotionWish) -> None:
-        self._case, self._wish, self._best = case, wish, planned_motion.PlannedMotion()
+        self._case, self._wish = case, wish
+        # Path, speeds and start.
+        self._best: tuple[planned_motion.Path | None, Speeds, float] = (None, (), 0.0)
         self._best_m, self._fits = math.inf, False
 
     def run(self) -> TrafficAgent:
         """Return the agent with the nearest motion."""
         case, wish = self._case, self._wish
         for speeds in _list_speeds(case, wish):
-            for span in _list_starts(case, wish, case.placed, speeds):
+            for span in _list_starts(case, wish, speeds):
                 after_s = _shift(case.own_start_s, 0.0, span)
                 for path in _list_paths(case, wish, after_s, speeds):
                     self._try(path, speeds, after_s)
         for share in _SHARES:
             self._vary(share)
-        return self._give(self._best)
-
-    def _give(self, motion: planned_motion.PlannedMotion) -> TrafficAgent:
-        return replace(self._case.placed, walk_to_m=None, motion=motion)
+        return self._case.give(*self._best)
 
     def _try(self, path: planned_motion.Path | None, speeds: Speeds, after_s: float) -> None:
         if self._fits and self._best_m <= _NONE_M:
             return
-        motion = planned_motion.PlannedMotion(
-            path=path, speeds=speeds, start=planned_motion.AtTime(after_s=after_s)
-        )
-        agent = self._give(motion)
+        agent = self._case.give(path, speeds, after_s)
         mean_m = self._case.measure(agent)
         # Admissibility is the dear part: it is asked only of what is nearer than the best.
         if self._fits and mean_m >= self._best_m:
             return
         fits = _is_admissible(self._case, agent, self._wish, after_s)
         if fits or (not self._fits and mean_m < self._best_m):
-            self._best_m, self._best, self._fits = mean_m, motion, fits
+            self._best_m, self._best, self._fits = mean_m, (path, speeds, after_s), fits
 
     def _vary(self, share: float) -> None:
         """Vary the ramp, the start and the length of a lane change of the nearest, in turn."""
         steps = [share * step for step in (-3, -2, -1, 1, 2, 3)]
         ramp = _find_ramp(self._case, self._wish)
-        for step in steps if self._best.speeds else ():
-            takes_s = _shift(self._best.speeds[-1][0], step, (ramp.least_s, ramp.most_s))
+        for step in steps if self._best[1] else ():
+            takes_s = _shift(self._best[1][-1][0], step, (ramp.least_s, ramp.most_s))
             self._try_from(((takes_s, ramp.to_mps),), 0.0)
         for step in steps:
-            self._try_from(self._best.speeds, step)
+            self._try_from(self._best[1], step)
         for step in () if self._wish.duration_s else steps:
-            path, start = self._best.path, self._best.start
-            if isinstance(path, planned_motion.LanePath) and isinstance(
-                start, planned_motion.AtTime
-            ):
+            path, speeds, after_s = self._best
+            if isinstance(path, planned_motion.LanePath):
                 changed = replace(path, change_m=_shift(path.change_m, step, _CHANGES_M))
-                self._try(changed, self._best.speeds, start.after_s)
+                self._try(changed, speeds, after_s)
 
     def _try_from(self, speeds: Speeds, step: float) -> None:
-        start = self._best.start
-        assert isinstance(start, planned_motion.AtTime)
-        for span in _list_starts(self._case, self._wish, self._case.placed, speeds):
-            self._try(self._best.path, speeds, _shift(start.after_s, step, span))
+        path, _, after_s = self._best
+        for span in _list_starts(self._case, self._wish, speeds):
+            self._try(path, speeds, _shift(after_s, step, span))
 
 
 def _shift(value: float, share: float, span: Span) -> float:
@@ -244,9 +245,7 @@ def _is_admissible(
     return sideways <= limits.sideways and curvature <= 1.0 / limits.radius_m
 
 
-def _list_starts(
-    case: MotionCase, wish: MotionWish, placed: TrafficAgent, speeds: Speeds
-) -> Iterator[Span]:
+def _list_starts(case: MotionCase, wish: MotionWish, speeds: Speeds) -> Iterator[Span]:
     """Yield from when to when a motion may begin, once for each reading of the sentence."""
     start, times_s = wish.start, case.motion.times_s
     if start is None:
@@ -258,8 +257,7 @@ def _list_starts(
         if start.may_end and high_s >= takes_s:
             yield max(low_s - takes_s, 0.0), high_s - takes_s
     else:
-        waits = planned_motion.PlannedMotion(start=planned_motion.AtTime(after_s=math.inf))
-        places = case.carry_out(replace(placed, walk_to_m=None, motion=waits), times_s[-1])[:, :2]
+        places = case.carry_out(case.give(None, (), math.inf), times_s[-1])[:, :2]
         mark_m = find_mark(case.whole.lanes, start.mark) if start.mark else None
         if mark_m is not None:
             places[:] = case.whole.route.position(mark_m)
@@ -338,12 +336,7 @@ def _list_paths(
     if own is not None:
         yield own
     if isinstance(own, planned_motion.PointPath):
-        waits = replace(
-            case.placed,
-            walk_to_m=None,
-            motion=planned_motion.PlannedMotion(start=planned_motion.AtTime(after_s=math.inf)),
-        )
-        here = case.carry_out(waits, min(after_s, HORIZON_S))[-1, :2]
+        here = case.carry_out(case.give(None, (), math.inf), min(after_s, HORIZON_S))[-1, :2]
         began_s = min(case.own_start_s, HORIZON_S)
         # (P, 2) from its beginning, moved there and widened where they turn too narrowly.
         ways_m = own.points_m - case.answer.states[round(began_s / STEP_S), :2]
@@ -374,9 +367,8 @@ def _find_scale(case: MotionCase) -> float:
 def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterator[TrafficAgent]:
     """Yield doors in the car's side, along it or across it, that come out on the ego's side."""
     door, own, place = case.answer.agent, case.own, case.whole.route.locate_agent(car)
-    toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
     # (2,) turns the car's frame over, so that out of the door's side is positive.
-    side = np.array([1.0, math.copysign(1.0, math.sin(toward_rad - car.heading_rad))])
+    side = np.array([1.0, presets.find_door_side(car, place)])
     at_once = replace(door, motion=replace(own, start=planned_motion.AtTime()))
     local = car.pose.to_local(case.carry_out(at_once)[[0, -1], :2]) * side  # shut, open
     half_m, slab_m, reach_m = car.width_m / 2.0, presets.DOOR_WIDTH_M, presets.DOOR_LENGTH_M
@@ -392,13 +384,11 @@ def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterat
         (x_m, y_m), end = car.pose.to_parent(np.array([closed, closed + way]) * side).tolist()
         way_m = float(np.hypot(*way))
         takes_s = _shift(_takes_s(own.speeds, way_m), 0.0, opens_s)
-        speeds, placed = ((0.0, way_m / takes_s),), replace(door, x_m=x_m, y_m=y_m)
+        at_door = replace(case, placed=replace(door, x_m=x_m, y_m=y_m))
+        speeds = ((0.0, way_m / takes_s),)
         path = planned_motion.PointPath(points_m=((end[0], end[1]),), keeps_heading=True)
-        for span in _list_starts(case, wish, placed, speeds):
-            start = planned_motion.AtTime(after_s=_shift(case.own_start_s, 0.0, span))
-            yield replace(
-                placed, motion=planned_motion.PlannedMotion(path=path, speeds=speeds, start=start)
-            )
+        for span in _list_starts(at_door, wish, speeds):
+            yield at_door.give(path, speeds, _shift(case.own_start_s, 0.0, span))
 
 
 def _takes_s(speeds: Sequence[tuple[float, float]], way_m: float) -> float:

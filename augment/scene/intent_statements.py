@@ -75,17 +75,14 @@ def list_motion_facts(wish: MotionWish) -> Iterator[str]:
 
 
 def _name_thing(request: intents.Request) -> str:
-    match request:
-        case intents.VehicleRequest():
-            thing = str(request.body)
-        case intents.WalkRequest():
-            thing = "pedestrian"
-        case intents.ConesRequest():
-            thing = "cones"
-        case intents.CrashRequest():
-            thing = f"crashed {request.body}"
-        case intents.DoorRequest():
-            thing = f"door of {request.spot.anchor or request.spot.landmark}"
+    body = getattr(request, "body", "")
+    thing = {
+        "vehicles": str(body),
+        "walk": "pedestrian",
+        "cones": "cones",
+        "crash": f"crashed {body}",
+        "door": f"door of {request.spot.anchor or request.spot.landmark}",
+    }[request.kind]
     return f"{thing} “{request.name}”" if request.name else thing
 
 

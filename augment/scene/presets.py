@@ -164,6 +164,12 @@ def find_bend_end(route: EgoRoute) -> float | None:
     return next((s for s in after if turns_rad(s, _BEND_OVER_M / 2.0) < _STRAIGHT_RAD), None)
 
 
+def find_door_side(car: entities.TrafficAgent, place: RoutePosition) -> float:
+    """Return the side of a car on which the ego comes past, 1 left, -1 right."""
+    toward_rad = place.tangent_rad - math.copysign(math.pi / 2.0, place.left_m)
+    return math.copysign(1.0, difference(toward_rad, car.heading_rad))
+
+
 def ego_pace_mps(scene: entities.Scene) -> float:
     """Return how fast the ego comes, for timing; one that stands sets out some time."""
     return max(scene.ego.speed_mps, _SLOWEST_EGO_MPS)
@@ -288,9 +294,7 @@ def _door_opening(case: _Case) -> entities.TrafficAgent:
             "the car has to stand beside the ego's lane, within "
             f"{_DOOR_WITHIN_M:g} m of its centre."
         )
-    # The side on which the ego comes past.
-    toward_rad = case.place.tangent_rad - math.copysign(math.pi / 2.0, left_m)
-    side = 1.0 if difference(toward_rad, car.heading_rad) > 0.0 else -1.0
+    side = find_door_side(car, case.place)
     if abs(math.cos(difference(case.place.tangent_rad, car.heading_rad))) < math.cos(_BEND_RAD):
         raise case.refusal("the car has to stand along the ego's lane.")
     closed_m = car.width_m / 2.0 + DOOR_WIDTH_M / 2.0 + _DOOR_GAP_M

@@ -10,22 +10,17 @@ from augment.baselines.rule_placer import place
 from augment.checks import FindingKind
 from augment.errors import CannotPlace
 from augment.scene.codec import INTENT, intent_from_document
-from augment.scene.entities import AgentType, Area, AreaKind, Modification, Scene, TrafficAgent
+from augment.scene.entities import AgentType, AreaKind, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion
 from tests.checks.worlds import faults_against
-from tests.scene.test_presets import bend, crossing, lanes
-from tests.scenes import pedestrian, scene, vehicle
+from tests.scene.test_presets import bend, crossing
+from tests.scenes import lanes, pedestrian, scene, strip, vehicle
 
 WIDE = scene(lanes=lanes(0.0, 3.5, oncoming_m=(7.0, 10.5)), areas=())
 LEADER = replace(vehicle("Agent2", 25.0, 0.0), speed_mps=8.0, lane_id="Lane1")
 FOLLOWED = replace(WIDE, agents=(LEADER, pedestrian("Agent3", 30.0, -3.0)))
-KERB = Area(
-    id="Area1",
-    kind=AreaKind.DRIVABLE,
-    boundary_m=((-50.0, -5.0), (100.0, -5.0), (100.0, 5.25), (-50.0, 5.25)),
-)
-STREET = scene(areas=(KERB,))
+STREET = scene(areas=(strip("Area1", AreaKind.DRIVABLE, -5.0, 5.25),))
 PARKED = replace(STREET, agents=(vehicle("Agent2", 30.0, -3.0),))
 
 

@@ -12,7 +12,7 @@ from augment.geometry.frames import Pose, corners
 from augment.metrics.fault_guess import first_guess
 from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from tests.checks.worlds import found_in, of_kind, severities
-from tests.scenes import EGO, cone, pedestrian, scene, vehicle
+from tests.scenes import EGO, cone, pedestrian, scene, strip, vehicle
 
 BUS = replace(vehicle("Agent2", 40.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
 
@@ -116,22 +116,12 @@ FACT, DOUBTFUL, WRONG = Severity.FACT, Severity.DOUBTFUL, Severity.WRONG
 
 
 def road() -> Scene:
-    strips = (
-        (AreaKind.DRIVABLE, -4.0, 4.0),
-        (AreaKind.WALKWAY, 4.0, 6.0),
-        (AreaKind.WALKWAY, -6.0, -4.0),
+    areas = (
+        strip("Area1", AreaKind.DRIVABLE, -4.0, 4.0),
+        strip("Area2", AreaKind.WALKWAY, 4.0, 6.0),
+        strip("Area3", AreaKind.WALKWAY, -6.0, -4.0),
     )
-    return scene(
-        lanes=scene().lanes[:1],
-        areas=tuple(
-            Area(
-                id=f"Area{number}",
-                kind=kind,
-                boundary_m=((-50.0, low), (100.0, low), (100.0, high), (-50.0, high)),
-            )
-            for number, (kind, low, high) in enumerate(strips, start=1)
-        ),
-    )
+    return scene(lanes=scene().lanes[:1], areas=areas)
 
 
 CAR = vehicle("Agent2", 30.0, 0.0)

@@ -7,10 +7,10 @@ import pytest
 from augment.errors import UnknownName
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Lane, LaneConnector, Scene, TrafficSide, TurnType
+from augment.scene.entities import LaneConnector, Scene, TrafficSide, TurnType
 from augment.scene.lane_graph import LaneGraph, classify_turn, find_traffic_side
 from augment.variants.pose_tool import PoseTool
-from tests.scenes import EGO, curve, junction, scene
+from tests.scenes import EGO, curve, junction, lane, scene
 
 
 def test_the_lane_under_a_point_fits_its_heading() -> None:
@@ -26,9 +26,8 @@ def test_the_lane_under_a_point_fits_its_heading() -> None:
 def test_a_lane_reaches_half_its_width_to_either_side(
     sign: float, off_m: float, is_on: bool
 ) -> None:
-    lane = replace(scene().lanes[0], width_m=3.5)
-    graph = LaneGraph(scene(lanes=(lane,)))
-    assert graph.under(20.0, sign * off_m) == (lane.id if is_on else None)
+    graph = LaneGraph(scene(lanes=scene().lanes[:1]))
+    assert graph.under(20.0, sign * off_m) == ("Lane1" if is_on else None)
 
 
 @pytest.mark.parametrize("turn", [TurnType.LEFT, TurnType.RIGHT, TurnType.U_TURN])
@@ -119,15 +118,7 @@ def merge(side: float, *, side_first: bool, connectors: bool) -> Scene:
     ]
     return scene(
         areas=(),
-        lanes=tuple(
-            Lane(
-                id=name,
-                centerline=Polyline(lanes[name]),
-                width_m=3.5,
-                successors=after.get(name, ()),
-            )
-            for name in order
-        ),
+        lanes=tuple(lane(name, lanes[name], successors=after.get(name, ())) for name in order),
         connectors=tuple(ways[::-1] if side_first else ways) if connectors else (),
     )
 
@@ -174,8 +165,8 @@ def test_people_drive_where_oncoming_lanes_are_on_the_other_side() -> None:
     lanes = scene().lanes
     assert find_traffic_side(lanes) is TrafficSide.RIGHT
     mirrored = [
-        replace(lane, centerline=Polyline(lane.centerline.points_m * np.array([1.0, -1.0])))
-        for lane in lanes
+        replace(one, centerline=Polyline(one.centerline.points_m * np.array([1.0, -1.0])))
+        for one in lanes
     ]
     assert find_traffic_side(mirrored) is TrafficSide.LEFT
 
@@ -190,13 +181,6 @@ def route_of(where: Scene) -> EgoRoute:
     return route
 
 
-def straight_lane(
-    name: str, start_m: float, end_m: float, *successors: str, y_m: float = 0.0
-) -> Lane:
-    line = Polyline([(start_m, y_m), (end_m, y_m)])
-    return Lane(id=name, centerline=line, width_m=3.5, successors=successors)
-
-
 @pytest.mark.parametrize("ahead_m", [-5.0, 0.0, 12.5, 40.0])
 @pytest.mark.parametrize("left_m", [-2.0, 0.0, 1.5])
 def test_a_position_is_located_where_it_was_asked_for(ahead_m: float, left_m: float) -> None:
@@ -207,9 +191,9 @@ def test_a_position_is_located_where_it_was_asked_for(ahead_m: float, left_m: fl
 
 def test_a_route_goes_back_and_on_over_what_joins_the_ego_s_lane() -> None:
     lanes = (
-        straight_lane("Before", -60.0, -10.0, "Own"),
-        straight_lane("Own", -10.0, 30.0, "After"),
-        straight_lane("After", 30.0, 80.0),
+        lane("Before", [(-60.0, 0.0), (-10.0, 0.0)], successors=("Own",)),
+        lane("Own", [(-10.0, 0.0), (30.0, 0.0)], successors=("After",)),
+        lane("After", [(30.0, 0.0), (80.0, 0.0)]),
     )
     route = route_of(scene(ego=EGO, lanes=lanes, agents=(), connectors=(), areas=()))
     assert route.lane_ids == ("Before", "Own", "After")
@@ -219,7 +203,10 @@ def test_a_route_goes_back_and_on_over_what_joins_the_ego_s_lane() -> None:
 
 
 def test_the_lane_that_the_ego_names_counts_before_the_one_under_it() -> None:
-    lanes = (straight_lane("Under", -10.0, 80.0), straight_lane("Named", -10.0, 80.0, y_m=1.0))
+    lanes = (
+        lane("Under", [(-10.0, 0.0), (80.0, 0.0)]),
+        lane("Named", [(-10.0, 1.0), (80.0, 1.0)]),
+    )
     here = scene(ego=replace(EGO, lane_id="Named"), lanes=lanes, agents=(), areas=())
     assert route_of(here).lane_id == "Named"
     gone = replace(here, ego=replace(here.ego, lane_id="Elsewhere"))

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from augment.geometry.polyline import Polyline
 from augment.scene.density import fit_boxes, keep_clear, spawn_traffic, usual_size_m
 from augment.scene.entities import (
     InterplanRules,
-    Lane,
     Modification,
     Scene,
     SceneOptions,
@@ -21,7 +19,7 @@ from augment.scene.entities import (
 )
 from augment.scene.motion import MotionSource, find_motion
 from tests.formats.cells import recorded_street
-from tests.scenes import EGO, curve, junction, pedestrian, scene, vehicle
+from tests.scenes import EGO, curve, junction, lane, lanes, pedestrian, scene, vehicle
 
 
 def test_without_a_recording_people_hold_their_speed_along_the_lane() -> None:
@@ -85,25 +83,8 @@ def test_nobody_sets_out_where_the_ego_never_comes() -> None:
 
 def two_way(speed_mps: float = 8.0) -> Scene:
     """Lane1 (the ego's) and Lane2 side by side along x, Lane3 towards them, 400 m long."""
-    lines = [[(-100.0, y), (300.0, y)] for y in (0.0, 3.5)] + [[(300.0, 7.0), (-100.0, 7.0)]]
-    beside = [("Lane2", None), (None, "Lane1"), (None, None)]
-    return scene(
-        ego=replace(EGO, speed_mps=speed_mps),
-        areas=(),
-        lanes=tuple(
-            Lane(
-                id=f"Lane{number}",
-                centerline=Polyline(line),
-                width_m=3.5,
-                speed_limit_mps=10.0,
-                left_neighbor=left,
-                right_neighbor=right,
-            )
-            for number, (line, (left, right)) in enumerate(
-                zip(lines, beside, strict=True), start=1
-            )
-        ),
-    )
+    ways = lanes(0.0, 3.5, oncoming_m=(7.0,), ends_m=(-100.0, 300.0), speed_limit_mps=10.0)
+    return scene(ego=replace(EGO, speed_mps=speed_mps), areas=(), lanes=ways)
 
 
 def spawned(
@@ -158,15 +139,10 @@ def test_spawned_traffic_drives_as_fast_as_the_ego_was_and_a_standing_ego_gets_a
 
 def test_lanes_are_lengthened_while_less_than_50_m_remain_from_the_ego() -> None:
     """Lane1 ends 40 m ahead of the ego, Lane2 follows it: filled to its end, but not beyond."""
-    lines = [(-100.0, 40.0), (40.0, 90.0), (90.0, 300.0)]
-    chained = tuple(
-        Lane(
-            id=f"Lane{n}",
-            centerline=Polyline([(begin, 0.0), (end, 0.0)]),
-            width_m=3.5,
-            successors=() if n == 3 else (f"Lane{n + 1}",),
-        )
-        for n, (begin, end) in enumerate(lines, start=1)
+    chained = (
+        lane("Lane1", [(-100.0, 0.0), (40.0, 0.0)], successors=("Lane2",)),
+        lane("Lane2", [(40.0, 0.0), (90.0, 0.0)], successors=("Lane3",)),
+        lane("Lane3", [(90.0, 0.0), (300.0, 0.0)]),
     )
     for seed in range(20):
         agents = spawned(TrafficDensity.HIGH, str(seed), scene(areas=(), lanes=chained))

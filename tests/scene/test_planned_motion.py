@@ -7,13 +7,12 @@ import pytest
 from scipy.integrate import quad
 
 from augment.errors import InvalidDocument, InvalidModification
-from augment.geometry.polyline import Polyline
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
     scene_to_document,
 )
-from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.motion import MotionSource, Movement, find_motion
 from augment.scene.planned_motion import (
     AtPlace,
@@ -24,24 +23,12 @@ from augment.scene.planned_motion import (
     PointPath,
 )
 from augment.scene.planned_mover import check_motions, smooth_line
-from tests.scenes import junction, pedestrian, scene, vehicle
+from tests.scenes import junction, lane, lanes, pedestrian, scene, vehicle
 
 
 def two_lanes() -> Scene:
     """Lane1 under the ego, who drives at 8 m/s; Lane2 left of it, the same way."""
-    own = Lane(
-        id="Lane1",
-        centerline=Polyline([(-50.0, 0.0), (400.0, 0.0)]),
-        width_m=3.5,
-        left_neighbor="Lane2",
-    )
-    left = Lane(
-        id="Lane2",
-        centerline=Polyline([(-50.0, 3.5), (400.0, 3.5)]),
-        width_m=3.5,
-        right_neighbor="Lane1",
-    )
-    return scene(lanes=(own, left))
+    return scene(lanes=lanes(0.0, 3.5, ends_m=(-50.0, 400.0)))
 
 
 def with_motion(
@@ -182,12 +169,9 @@ def test_paths_without_an_end_and_rings_of_lanes_are_bounded() -> None:
     )
     assert moved(two_lanes(), car).is_present.all()
     # Two lanes of 1 mm that follow each other: one time around, and the car is past the map.
-    ring = tuple(
-        Lane(id=name, centerline=Polyline(points), width_m=3.5, successors=(follower,))
-        for name, follower, points in (
-            ("Lane1", "Lane2", [(0.0, 0.0), (0.001, 0.0)]),
-            ("Lane2", "Lane1", [(0.001, 0.0), (0.0, 0.0)]),
-        )
+    ring = (
+        lane("Lane1", [(0.0, 0.0), (0.001, 0.0)], successors=("Lane2",)),
+        lane("Lane2", [(0.001, 0.0), (0.0, 0.0)], successors=("Lane1",)),
     )
     path = LanePath(lane_ids=("Lane1", "Lane2") * 10)
     goes_round = with_motion(

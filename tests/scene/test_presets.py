@@ -20,27 +20,12 @@ from augment.scene.planned_motion import (
     PointPath,
 )
 from augment.scene.presets import PresetNumbers, with_preset
-from tests.scenes import curve, pedestrian, scene, vehicle
-
-
-def lanes(*lefts_m: float, oncoming_m: tuple[float, ...] = ()) -> tuple[entities.Lane, ...]:
-    """Lanes 3.5 m wide along the ego's, so far left of it; the ego's own is Lane1."""
-    east, west = np.array([(-50.0, 0.0), (200.0, 0.0)]), np.array([(200.0, 0.0), (-50.0, 0.0)])
-    ways = [(east, left_m) for left_m in lefts_m] + [(west, left_m) for left_m in oncoming_m]
-    return tuple(
-        entities.Lane(
-            id=f"Lane{number}", centerline=Polyline(np.add(way, (0.0, left_m))), width_m=3.5
-        )
-        for number, (way, left_m) in enumerate(ways, start=1)
-    )
+from tests.scenes import curve, lane, lanes, pedestrian, scene, vehicle
 
 
 def crossing(light: entities.TrafficLight = entities.TrafficLight.RED) -> entities.Scene:
     """A way from the right that crosses the ego's at x = 40 m, and turns into nothing else."""
-    arms = (
-        entities.Lane(id="Lane8", centerline=Polyline([(40, -60), (40, -10)]), width_m=3.5),
-        entities.Lane(id="Lane9", centerline=Polyline([(40, 10), (40, 60)]), width_m=3.5),
-    )
+    arms = lane("Lane8", [(40, -60), (40, -10)]), lane("Lane9", [(40, 10), (40, 60)])
     way = entities.LaneConnector(
         id="Connector1",
         from_lane="Lane8",
@@ -54,9 +39,9 @@ def crossing(light: entities.TrafficLight = entities.TrafficLight.RED) -> entiti
 
 def bend() -> entities.Scene:
     """The ego's lane turns left on 40 m round (10, 40) and goes straight on from (50, 40)."""
-    (lane,) = curve(40.0).lanes
-    line = Polyline(np.vstack([lane.centerline.points_m, [(50.0, 140.0)]]))
-    return scene(lanes=(replace(lane, centerline=line),), areas=())
+    (bent,) = curve(40.0).lanes
+    line = Polyline(np.vstack([bent.centerline.points_m, [(50.0, 140.0)]]))
+    return scene(lanes=(replace(bent, centerline=line),), areas=())
 
 
 def car(
