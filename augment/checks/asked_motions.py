@@ -11,13 +11,10 @@ from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import find_mark
 from augment.checks.parties import MARK_M, Bounds, Case, apart_m, hold, motion_bounds
 from augment.geometry.frames import difference
-from augment.geometry.polyline import FloatArray
 from augment.scene import planned_motion as planned
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import Spot
-from augment.scene.intent_parts import MotionWish, Side, StartWish
-from augment.scene.motion import STEP_S
-from augment.scene.planned_motion import AtPlace, AtTime, MotionPreset, NearEgo, PlannedMotion
+from augment.scene.intent import MotionWish, Side, Spot, StartWish
+from augment.scene.motion import STEP_S, FloatArray
 from augment.scene.planned_mover import walk_as_motion
 from augment.scene.presets import find_bend_end
 
@@ -45,7 +42,7 @@ def check_course(case: Case) -> Iterator[Finding]:
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
             motion = agent.motion
             if motion is None and agent.speed_mps > 0.0:
-                motion = PlannedMotion()  # it goes on as its scene has it
+                motion = planned.PlannedMotion()  # it goes on as its scene has it
             if motion is None:
                 words = f"{{agents[0]}} has no motion; asked for: {wish.preset.label.lower()}."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
@@ -65,10 +62,10 @@ def check_course(case: Case) -> Iterator[Finding]:
 
 
 def _start(
-    case: Case, agent: TrafficAgent, motion: PlannedMotion, wish: StartWish
+    case: Case, agent: TrafficAgent, motion: planned.PlannedMotion, wish: StartWish
 ) -> Iterator[Finding]:
     start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
-    if wish.after_s is not None and isinstance(start, AtTime):
+    if wish.after_s is not None and isinstance(start, planned.AtTime):
         wanted = motion_bounds("after_s", wish.after_s.low, wish.after_s.high)
         what, value_s = "The start of {agents[0]}", start.after_s
         ends_s = value_s + (motion.speeds[-1][0] if motion.speeds else 0.0)
@@ -76,11 +73,11 @@ def _start(
             what, value_s = "The end of the motion of {agents[0]}", ends_s
         yield hold(kind, [agent], what, value_s, wanted, unit="s")
         return
-    is_at_mark = isinstance(start, AtPlace) and start.agent_id == planned.EGO_ID
-    if wish.after_s is None and (is_at_mark if wish.mark else isinstance(start, NearEgo)):
-        assert not isinstance(start, AtTime)
+    is_at_mark = isinstance(start, planned.AtPlace) and start.agent_id == planned.EGO_ID
+    if wish.after_s is None and (is_at_mark if wish.mark else isinstance(start, planned.NearEgo)):
+        assert not isinstance(start, planned.AtTime)
         mark_m = find_mark(case.lanes, wish.mark) if wish.mark else None
-        if mark_m is not None and isinstance(start, AtPlace):
+        if mark_m is not None and isinstance(start, planned.AtPlace):
             off_m = case.route.locate(start.x_m, start.y_m).ahead_m - mark_m
             what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
             yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
@@ -95,9 +92,9 @@ def _start(
     yield find(kind, False, [agent], words)
 
 
-def _carry_out(case: Case, agent: TrafficAgent, motion: PlannedMotion) -> FloatArray:
+def _carry_out(case: Case, agent: TrafficAgent, motion: planned.PlannedMotion) -> FloatArray:
     """States (T, 4) of the motion alone, from its start on; only its own seconds are waited."""
-    begins = motion.start if isinstance(motion.start, AtTime) else AtTime()
+    begins = motion.start if isinstance(motion.start, planned.AtTime) else planned.AtTime()
     alone = agent.motion and replace(agent, motion=replace(motion, start=begins))
     times_s = np.arange(begins.after_s, begins.after_s + _CARRIED_OUT_S, STEP_S).tolist()
     # (T, 4), without the steps past the map.
@@ -112,15 +109,15 @@ def check_path(
     places = [case.route.locate(x, y) for x, y in states[:, :2].tolist()]
     first, last = places[0], places[-1]
     match wish.preset:
-        case MotionPreset.CUT_IN | MotionPreset.PULL_OUT:
+        case planned.MotionPreset.CUT_IN | planned.MotionPreset.PULL_OUT:
             what = "The offset of {agents[0]} in the end to the left of the ego's lane's centre"
             wanted = Bounds(0.0, 0.0, case.tolerances.middle_m)
             yield hold(FindingKind.ASKED_ACROSS, [agent], what, last.left_m, wanted)
-        case MotionPreset.U_TURN:
+        case planned.MotionPreset.U_TURN:
             turned_deg = math.degrees(abs(difference(states[-1, 2], states[0, 2])))
             what, kind = "The turn of {agents[0]} in the end", FindingKind.ASKED_HEADING
             yield hold(kind, [agent], what, turned_deg, _TURNS_ROUND, unit="degrees")
-        case MotionPreset.LATE_PEDESTRIAN | MotionPreset.RED_LIGHT:
+        case planned.MotionPreset.LATE_PEDESTRIAN | planned.MotionPreset.RED_LIGHT:
             words = "{agents[0]} is to cross the ego's way ahead of it"
             # Between two steps on different sides of the ego's way, it was on it.
             meets = (b.ahead_m for a, b in pairwise(places) if a.left_m * b.left_m <= 0.0)
@@ -131,29 +128,33 @@ def check_path(
                 yield find(
                     FindingKind.ASKED_SIDE, fits, [agent], f"{words}, from the {wish.side}."
                 )
-        case MotionPreset.EMERGENCY_STOP:
+        case planned.MotionPreset.EMERGENCY_STOP:
             bend_m = find_bend_end(case.route) or 0.0
             words = (
                 f"{{agents[0]}} stops {last.ahead_m:.1f} m ahead; the bend ends at {bend_m:.1f} m."
             )
             yield find(FindingKind.ASKED_DISTANCE, last.ahead_m >= bend_m, [agent], words)
-        case MotionPreset.DOOR_OPENING:
+        case planned.MotionPreset.DOOR_OPENING:
             toward_m = abs(first.left_m) - abs(last.left_m)
             what = "How far {agents[0]} comes towards the ego's way"
             yield hold(FindingKind.ASKED_MOTION, [agent], what, toward_m, DOOR)
 
 
 def _numbers(
-    case: Case, agent: TrafficAgent, motion: PlannedMotion, wish: MotionWish, states: FloatArray
+    case: Case,
+    agent: TrafficAgent,
+    motion: planned.PlannedMotion,
+    wish: MotionWish,
+    states: FloatArray,
 ) -> Iterator[Finding]:
     # Speeds are linear from pair to pair, so each leg has one deceleration.
     profile = [(0.0, agent.speed_mps), *motion.speeds]
-    slows = wish.preset in (MotionPreset.HARD_BRAKING, MotionPreset.EMERGENCY_STOP)
+    slows = wish.preset in (planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP)
     braking = [
         (a - b) / (end - begin) for (begin, a), (end, b) in pairwise(profile) if end > begin
     ]
     moves = states[:, 3] > 0.0
-    if wish.preset is MotionPreset.CUT_IN:
+    if wish.preset is planned.MotionPreset.CUT_IN:
         lefts_m = np.array([case.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])
         # (T,): a cut-in lasts until it is in its new lane, not until it stands.
         moves = np.abs(lefts_m - lefts_m[-1]) > _THERE_M

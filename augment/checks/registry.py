@@ -11,41 +11,34 @@ Adding a check is adding one function to `CHECKS`, which never ask what was want
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from augment.checks.asked_crash import check_crash
-from augment.checks.asked_motions import check_course
-from augment.checks.asked_places import check_across, check_distance, check_spacing
-from augment.checks.asked_things import (
-    check_changes,
-    check_count,
-    check_heading,
-    check_motion,
-    check_type,
-    check_walk,
+from augment.checks import (
+    asked_crash,
+    asked_motions,
+    asked_places,
+    asked_things,
+    bodies,
+    motions,
+    places,
+    purpose,
 )
-from augment.checks.bodies import overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import ChangedScene, Ground
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.motions import (
-    motion_blocked,
-    motion_limits,
-    motion_off_road,
-    motion_start,
-    motion_trigger,
-)
 from augment.checks.parties import USUAL, AskedCheck, Case, Tolerances, assign_parties
-from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
-from augment.checks.purpose import check_purpose
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, VehicleRequest
 
-CHECKS: tuple[Check, ...] = (
-    *(lane, lane_named, heading, walk_heading, walk_blocked, off_road, overlap, size, speed),
-    *(motion_trigger, motion_start, motion_limits, motion_off_road, motion_blocked),
+CHECKS: tuple[places.Check, ...] = (
+    *(places.lane, places.lane_named, places.heading, places.walk_heading, bodies.walk_blocked),
+    *(places.off_road, bodies.overlap, bodies.size, bodies.speed, motions.motion_trigger),
+    *(motions.motion_start, motions.motion_limits, motions.motion_off_road),
+    motions.motion_blocked,
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
-    *(check_count, check_type, check_distance, check_across, check_heading, check_crash),
-    *(check_walk, check_motion, check_spacing, check_changes, check_course, check_purpose),
+    *(asked_things.check_count, asked_things.check_type, asked_places.check_distance),
+    *(asked_places.check_across, asked_things.check_heading, asked_crash.check_crash),
+    *(asked_things.check_walk, asked_things.check_motion, asked_places.check_spacing),
+    *(asked_things.check_changes, asked_motions.check_course, purpose.check_purpose),
 )
 _OF_PLACE = frozenset(
     {

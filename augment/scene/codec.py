@@ -18,8 +18,7 @@ from augment.errors import InvalidModification
 from augment.scene import entities
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
 from augment.scene.intent_parts import Aim, Amount
-from augment.scene.planned_motion import EGO_ID as EGO_ID
-from augment.scene.planned_motion import MotionPreset
+from augment.scene.planned_motion import EGO_ID, MotionPreset
 from augment.scene.planned_mover import check_scene_motions
 from augment.scene.recording import Recording
 from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path, remember

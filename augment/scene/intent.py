@@ -16,12 +16,14 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
+from augment.scene.intent_parts import Amount as Amount
 from augment.scene.intent_parts import Length as Length
 from augment.scene.intent_parts import MapPlace as MapPlace
 from augment.scene.intent_parts import MotionWish as MotionWish
 from augment.scene.intent_parts import Purpose as Purpose
 from augment.scene.intent_parts import Setting as Setting
 from augment.scene.intent_parts import Side as Side
+from augment.scene.intent_parts import StartWish as StartWish
 from augment.scene.planned_motion import MotionPreset
 from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from augment.scene import intent as intents
 from augment.scene.entities import TurnType
-from augment.scene.intent_parts import MotionWish
 
 _ROUTES = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.U_TURN: "back"}
 _FACTS = {
@@ -59,7 +58,7 @@ def list_statements(intent: intents.Intent) -> tuple[str, ...]:
     return tuple(statements)
 
 
-def list_motion_facts(wish: MotionWish) -> Iterator[str]:
+def list_motion_facts(wish: intents.MotionWish) -> Iterator[str]:
     """Yield what somebody is to do after t0."""
     yield f"then: {wish.preset.label.lower()}"
     if wish.start is not None:
@@ -148,7 +147,7 @@ def _list_pose_facts(request: intents.Request | intents.Move) -> Iterator[str]:
     speed_mps = getattr(request, "speed_mps", None)
     if speed_mps is not None:
         yield f"moves at {speed_mps:g} m/s" if speed_mps else "stands"
-    wish: MotionWish | None = getattr(request, "motion", None)
+    wish: intents.MotionWish | None = getattr(request, "motion", None)
     if wish is not None:
         yield from list_motion_facts(wish)
 

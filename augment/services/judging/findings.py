@@ -19,13 +19,13 @@ from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace, InvalidDocument, InvalidModification, UnknownName
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario, Simulation
-from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import (
     intent_from_document,
     modification_from_document,
     modification_to_document,
 )
 from augment.scene.intent import Intent
+from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.services.judging.measures import Measure, rows_by_scenario
 from augment.services.scenarios import editing
 from augment.services.scenarios.scenes import LoadedScenario
