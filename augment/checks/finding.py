@@ -45,11 +45,6 @@ class FindingKind(StrEnum):
     UNASKED = "unasked"
     PURPOSE = "purpose"
 
-    @property
-    def fault(self) -> FaultClass:
-        """The class of fault that such a finding speaks for if it is more than a fact."""
-        return _FAULTS.get(self, FaultClass.LOGIC)
-
 
 _FAULTS = {
     FindingKind.LANE: FaultClass.POSITION,
@@ -102,7 +97,7 @@ class Finding:
     @property
     def fault(self) -> FaultClass:
         """The class of fault that it speaks for if it is more than a fact."""
-        return self.kind.fault
+        return _FAULTS.get(self.kind, FaultClass.LOGIC)
 
     def sentence(self, names: Mapping[str, str] | None = None) -> str:
         """Return the finding in words.

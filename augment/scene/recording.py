@@ -10,11 +10,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field
 
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.schema import CLOSED, Id, Real, Size
+from augment.scene.schema import CLOSED, Id, Listed, Real, Size
 
 # Of one recording, so that a file of strangers does not fill the memory.
 MOST_TRACKS = 50_000
@@ -22,20 +21,6 @@ MOST_TRACKS = 50_000
 _Number = Annotated[Real, Field(ge=-1e6, le=1e6)]
 _State = tuple[_Number, _Number, _Number, _Number]
 _UNSEEN = (np.nan,) * 4
-
-
-class _NumberList:
-    """Array as a document has it: a list; a state of NaN alone is null."""
-
-    def __init__(self, item: Any, least: int = 0) -> None:
-        self._items = Annotated[list[item], Field(fail_fast=True, min_length=least)]
-
-    def __get_pydantic_core_schema__(self, _: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_after_validator_function(
-            _array,
-            handler.generate_schema(self._items),
-            serialization=core_schema.plain_serializer_function_ser_schema(_rows),
-        )
 
 
 def _array(rows: list[Any]) -> NDArray[np.float64]:
@@ -49,9 +34,11 @@ def _rows(array: NDArray[np.float64]) -> list[Any]:
     return [None if np.isnan(row).all() else row.tolist() for row in array]
 
 
-_Times = Annotated[NDArray[np.float64], _NumberList(_Number, least=1)]
+_Moments = Annotated[list[_Number], Field(fail_fast=True, min_length=1)]
+_Times = Annotated[NDArray[np.float64], Listed(_Moments, _array, _rows)]
 _Columns = tuple[Literal["x_m"], Literal["y_m"], Literal["heading_rad"], Literal["speed_mps"]]
-_States = Annotated[NDArray[np.float64], _NumberList(_State | None)]
+_Rows = Annotated[list[_State | None], Field(fail_fast=True)]
+_States = Annotated[NDArray[np.float64], Listed(_Rows, _array, _rows)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -57,23 +57,32 @@ Ring = Annotated[
 ]
 
 
-class _PointList:
-    """`Polyline` as a document has it: a list of its points."""
+@dataclass(frozen=True)
+class Listed:
+    """A value that stands as a list in a document.
 
-    @staticmethod
-    def __get_pydantic_core_schema__(_: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        limits = Field(fail_fast=True, min_length=2, max_length=MOST_POINTS)
-        points = handler.generate_schema(Annotated[list[PointPair], limits])
+    Attributes:
+        items: Type of the list.
+        make, to_list: From the list to the value and back.
+    """
+
+    items: Any
+    make: Callable[[Any], Any]
+    to_list: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(self, _: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_after_validator_function(
-            Polyline,
-            points,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda line: line.points_m.tolist()
-            ),
+            self.make,
+            handler.generate_schema(self.items),
+            serialization=core_schema.plain_serializer_function_ser_schema(self.to_list),
         )
 
 
-Line = Annotated[Polyline, _PointList]
+_SOME = Field(fail_fast=True, min_length=2, max_length=MOST_POINTS)
+Line = Annotated[
+    Polyline,
+    Listed(Annotated[list[PointPair], _SOME], Polyline, lambda line: line.points_m.tolist()),
+]
 
 
 class Document(BaseModel):
