@@ -1,22 +1,30 @@
-"""Distances, places across the road and gaps against those that were asked for."""
+"""Distances, places across the road, gaps and crashes against those that were asked for."""
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 from statistics import median
 
-from augment.checks.asked_crash import in_order
 from augment.checks.bodies import end_of_walk
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
-from augment.checks.parties import CRASH_M, Bounds, Case, Party, apart_m, hold, meets_route
+from augment.checks.parties import CRASH_M, USUAL, Bounds, Case, Party, apart_m, hold, meets_route
+from augment.checks.wish_patterns import MOST_ORDERED
 from augment.checks.wish_places import EVERYWHERE, find_across, find_off, list_stations
 from augment.checks.wish_shapes import CONE_M, WORKER_M
+from augment.geometry.frames import difference
 from augment.scene import intent as wish
 from augment.scene.entities import TrafficAgent
 
 _TAPER_M = 1.0
 """Cones of which the last is this far across from the first run from one side to the other."""
+_MISPLACED = 10.0
+"""An order with somebody on the wrong side of the one before is only taken for want of another."""
+_ROUGHLY_DEG = 2.0 * USUAL.heading_deg
+"""A car that has spun stands "crosswise" only roughly."""
+
+_Pair = tuple[TrafficAgent, TrafficAgent, wish.CrashedCar]
+"""A vehicle of a crash, the one named after it, and what is said of that one."""
 
 
 def check_distance(case: Case) -> Iterator[Finding]:
@@ -64,7 +72,7 @@ def _measure_ahead(case: Case, party: Party, wanted: Bounds) -> tuple[TrafficAge
     if _is_ring(party):
         return first, sum(value for value, _ in ahead) / len(ahead)
     if isinstance(request, wish.CrashRequest) and party.is_exact:
-        first = in_order(party, request, case.route)[0]
+        first = in_order(case, party, request)[0]
         return first, case.ahead_m(first)
     if isinstance(request, wish.WalkRequest):
         meetings = [(meets_route(case.route, agent), agent) for agent in party.placed]
@@ -107,7 +115,7 @@ def check_across(case: Case) -> Iterator[Finding]:
             isinstance(request, wish.CrashRequest) and not party.missing
         ):  # else the nearest may be missing, and the others lie anywhere
             if party.is_exact:
-                first = in_order(party, request, case.route)[0]
+                first = in_order(case, party, request)[0]
             others = [agent for agent in party.everyone if agent is not first]
             left_m = case.left_m(first) - band.left_m
             yield _across([first, *others], left_m, _bounds(case, None, band, 0.0))
@@ -212,3 +220,109 @@ def _in_row(case: Case, party: Party, spacing: wish.Length | None) -> Iterator[F
     gap_m = min(straight_m, along_m, key=wanted.off)
     what = "The gap between neighbours in the row of {agents[0]}"
     yield hold(FindingKind.ASKED_SPACING, things, what, gap_m, wanted)
+
+
+def in_order(case: Case, party: Party, request: wish.CrashRequest) -> tuple[TrafficAgent, ...]:
+    """Return the vehicles of a party in the order in which the request names them."""
+    if not 2 <= len(party.agents) <= MOST_ORDERED:
+        return party.agents
+    return min(
+        permutations(party.agents),
+        key=lambda order: (round(_misfit(case, order, request), 6), [agent.id for agent in order]),
+    )
+
+
+def _pairs(order: Sequence[TrafficAgent], request: wish.CrashRequest) -> list[_Pair]:
+    """Neighbours in that order, with what is said of each further one."""
+    cars = [*request.others, *[wish.CrashedCar()] * (len(order) - 1 - len(request.others))]
+    return [(*two, car) for two, car in zip(pairwise(order), cars, strict=False)]
+
+
+def _turn_deg(agent: TrafficAgent, other: TrafficAgent, car: wish.CrashedCar) -> float:
+    """The turn of the second against the first, to the side that is asked for if it is open."""
+    turn_deg = math.degrees(difference(other.heading_rad, agent.heading_rad))
+    if car.turn_deg is None:
+        return turn_deg
+    if not car.is_signed:
+        return math.copysign(turn_deg, car.turn_deg)
+    # The same turn, as the number nearest to the one that is said.
+    return car.turn_deg + math.remainder(turn_deg - car.turn_deg, 360.0)
+
+
+def _misfit(case: Case, order: Sequence[TrafficAgent], request: wish.CrashRequest) -> float:
+    places = {agent.id: case.route.locate_agent(agent) for agent in order}
+    # Each part is divided by its tolerance, so that metres and degrees add up.
+    misfit, span_m = 0.0, request.spot.span_m
+    if span_m is not None:
+        misfit = Bounds(*span_m, 0.0).off(places[order[0].id].ahead_m) / USUAL.distance_m
+    for leader, other, car in _pairs(order, request):
+        gap_m = apart_m(leader, other)
+        misfit += gap_m / 100.0  # the nearest neighbours, where nothing is said
+        if car.gap is not None:
+            misfit += Bounds(car.gap.low_m, car.gap.high_m, 0.0).off(gap_m) / USUAL.spacing_m
+        if car.turn_deg is not None:
+            misfit += abs(_turn_deg(leader, other, car) - car.turn_deg) / USUAL.heading_deg
+        here, there = places[leader.id], places[other.id]
+        further_m = {
+            wish.Bearing.AHEAD: there.ahead_m - here.ahead_m,
+            wish.Bearing.BEHIND: here.ahead_m - there.ahead_m,
+            wish.Bearing.LEFT: there.left_m - here.left_m,
+            wish.Bearing.RIGHT: here.left_m - there.left_m,
+        }[car.bearing or wish.Bearing.AHEAD]
+        misfit += _MISPLACED if further_m < 0.0 else 0.0
+    return misfit
+
+
+def check_crash(case: Case) -> Iterator[Finding]:
+    """Angles (heading) and gaps (position) between neighbours, and a first one that lies across.
+
+    Nothing is found where the number of vehicles is wrong or where they lie on each other, which
+    are faults of their own: then nobody knows which of them is which.
+    """
+    for party in case.parties:
+        request = party.request
+        if not isinstance(request, wish.CrashRequest) or not party.is_exact:
+            continue
+        order = in_order(case, party, request)
+        pairs = _pairs(order, request)
+        if any(apart_m(agent, other) < agent.width_m for agent, other, _ in pairs):
+            continue
+        yield from _facing(case, request, order[0])
+        for pair in pairs:
+            yield from _neighbours(case, *pair)
+
+
+def _neighbours(
+    case: Case, agent: TrafficAgent, other: TrafficAgent, car: wish.CrashedCar
+) -> Iterator[Finding]:
+    """As far apart as said, else near enough to have run into each other; turned as said."""
+    wanted = Bounds(0.0, max(CRASH_M, agent.length_m, other.length_m), 0.0)
+    if car.gap is not None:
+        wanted = case.gap(car.gap)
+    what, pair = "The distance of {agents[0]} from {agents[1]}", [other, agent]
+    yield hold(FindingKind.ASKED_SPACING, pair, what, apart_m(agent, other), wanted)
+    if car.turn_deg is None:
+        return
+    yield hold(
+        FindingKind.ASKED_HEADING,
+        pair,
+        "The turn of {agents[0]} to the left of the heading of {agents[1]}",
+        _turn_deg(agent, other, car),
+        Bounds(car.turn_deg, car.turn_deg, case.tolerances.heading_deg),
+        unit="degrees",
+    )
+
+
+def _facing(case: Case, request: wish.CrashRequest, first: TrafficAgent) -> Iterator[Finding]:
+    band = case.lanes.band(request.spot.lane or wish.LaneChoice.OWN, case.ahead_m(first))
+    if band is None or request.facing in (None, wish.Facing.WITH_LANE):
+        return
+    wanted_deg = 90.0 if request.facing is wish.Facing.ACROSS else 180.0
+    yield hold(
+        FindingKind.ASKED_HEADING,
+        [first],
+        "The turn of {agents[0]} from its lane's direction, to either side,",
+        abs(math.degrees(difference(first.heading_rad, band.tangent_rad))),
+        Bounds(wanted_deg, wanted_deg, _ROUGHLY_DEG),
+        unit="degrees",
+    )

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from augment.checks import (
-    asked_crash,
     asked_motions,
     asked_places,
     asked_things,
@@ -36,7 +35,7 @@ CHECKS: tuple[places.Check, ...] = (
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(asked_things.check_count, asked_things.check_type, asked_places.check_distance),
-    *(asked_places.check_across, asked_things.check_heading, asked_crash.check_crash),
+    *(asked_places.check_across, asked_things.check_heading, asked_places.check_crash),
     *(asked_things.check_walk, asked_things.check_motion, asked_places.check_spacing),
     *(asked_things.check_changes, asked_motions.check_course, purpose.check_purpose),
 )
