@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from augment.baselines.placed_motions import give_motion
-from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
+from augment.baselines.placing_ground import PlacingGround, build_agent
 from augment.checks.wish_shapes import Placement, lay_out, ring_radius_m
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
@@ -61,15 +61,15 @@ def _walker(
     place = ground.along(distance_m)
     from_m = _left_m(request.spot.lateral, ground)
     if from_m is None:
-        from_m = SIGNS[start] * ground.lane(place).width_m / 4.0
+        from_m = start.sign * ground.lane(place).width_m / 4.0
         if not request.on_road:
-            from_m = SIGNS[start] * (ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M)
+            from_m = start.sign * (ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M)
     arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose
     to_m = _left_m(request.end, ground)
     if to_m is None:
         edge_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
-        to_m = -SIGNS[start] * edge_m
-    begin = np.array(place.pose.beside(from_m + SIGNS[start] * behind_m))
+        to_m = -start.sign * edge_m
+    begin = np.array(place.pose.beside(from_m + start.sign * behind_m))
     end = np.array(arrives.beside(to_m))
     length_m = walked_m = math.dist(begin, end)
     if request.end is None:
@@ -143,7 +143,7 @@ def _places(
     if request.shape is Shape.LINE:
         from_m = edge_m * (1.0 if request.both_sides else ground.side_sign(request.spot.lateral))
     elif request.shape is Shape.TAPER:
-        from_m = SIGNS[request.start or ground.kerb] * edge_m
+        from_m = (request.start or ground.kerb).sign * edge_m
         to = 0.0 if request.ends_in_middle else -from_m
     elif is_oblong:
         to = min(spacing_m / 2.0, edge_m)
@@ -157,7 +157,7 @@ def _worker(request: ConesRequest, ground: PlacingGround, places: list[Placement
         return sum(s for s, _ in places) / len(places), 0.0
     if request.post is Post.AT_LAST or request.post_side is not None:
         near = places[-2:] if request.post is Post.AT_LAST else places
-        side = SIGNS[request.post_side or request.start or ground.kerb]
+        side = (request.post_side or request.start or ground.kerb).sign
         middle_m = sum(s for s, _ in near) / len(near)
         return middle_m, sum(d for _, d in near) / len(near) + side * _WORKER_GAP_M
     if request.shape is Shape.ROW:
@@ -168,13 +168,13 @@ def _worker(request: ConesRequest, ground: PlacingGround, places: list[Placement
         if length_m == 0.0:
             return first_s + _WORKER_GAP_M, first_d
         along, across = (last_s - first_s) / length_m, abs(last_d - first_d) / length_m
-        sign = SIGNS[request.start or ground.kerb]
+        sign = (request.start or ground.kerb).sign
         middle_s, middle_d = (first_s + last_s) / 2.0, (first_d + last_d) / 2.0
         return middle_s + across * _WORKER_GAP_M, middle_d + sign * along * _WORKER_GAP_M
     if request.post is Post.BEHIND:
         return last_s + _WORKER_GAP_M, last_d
     # Beside the middle of a line: off the road if the line's outer side is, else in its lane.
     middle_m = (first_s + last_s) / 2.0
-    gap_m = math.copysign(_WORKER_GAP_M, first_d or SIGNS[ground.kerb])
+    gap_m = math.copysign(_WORKER_GAP_M, first_d or ground.kerb.sign)
     outside = _at(ground, request.spot.lane, (middle_m, first_d + gap_m))
     return middle_m, first_d + (gap_m if ground.lane_at(outside.pose) is None else -gap_m)

@@ -25,7 +25,6 @@ _GAP_M = 1.5
 _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
-SIGNS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 
 
 def build_agent(
@@ -160,7 +159,7 @@ class PlacingGround:
         end_m = across_m = start_m
         while across_m - end_m < _GAP_M and across_m < _WIDEST_M:
             across_m += _STEP_M
-            point = pose.beside(SIGNS[side] * across_m)
+            point = pose.beside(side.sign * across_m)
             if _covers(self._walkways, point):
                 break
             if is_road(point):
