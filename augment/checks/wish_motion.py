@@ -18,7 +18,8 @@ from augment.checks.lanes_across import find_mark
 from augment.checks.motions import LIMITS, measure_bends
 from augment.checks.parties import Case
 from augment.errors import CannotPlace
-from augment.scene import planned_motion, presets
+from augment.scene import planned_motion as planned
+from augment.scene import presets
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.intent import MotionWish, Request, Spot, VehicleRequest
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
@@ -41,7 +42,7 @@ _HINGED_M = 0.15
 _OPENS_S = 0.3, 3.0
 _WIDER = 1.05
 """Bends are measured by chords, so a little more than what is needed."""
-_SLOWS = planned_motion.MotionPreset.HARD_BRAKING, planned_motion.MotionPreset.EMERGENCY_STOP
+_SLOWS = planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP
 
 Speeds = tuple[tuple[float, float], ...]
 Span = tuple[float, float]
@@ -68,14 +69,14 @@ class MotionCase:
     car: TrafficAgent | None = None
 
     @property
-    def own(self) -> planned_motion.PlannedMotion:
+    def own(self) -> planned.PlannedMotion:
         """The answer's motion, its walk as one, else one that changes nothing."""
-        return walk_as_motion(self.answer.agent).motion or planned_motion.PlannedMotion()
+        return walk_as_motion(self.answer.agent).motion or planned.PlannedMotion()
 
     @property
     def own_start_s(self) -> float:
         """When the answer sets out, infinite where it never does."""
-        if self.own == planned_motion.PlannedMotion():
+        if self.own == planned.PlannedMotion():
             return 0.0
         return math.inf if self.answer.started_s is None else self.answer.started_s
 
@@ -85,12 +86,10 @@ class MotionCase:
         times_s = np.arange(0.0, until_s + STEP_S / 2.0, STEP_S).tolist()
         return self.whole.carry_out(agent, times_s)
 
-    def give(
-        self, path: planned_motion.Path | None, speeds: Speeds, after_s: float
-    ) -> TrafficAgent:
+    def give(self, path: planned.Path | None, speeds: Speeds, after_s: float) -> TrafficAgent:
         """Return the agent with a motion that starts then, at its admissible place."""
-        start = planned_motion.AtTime(after_s=after_s)
-        motion = planned_motion.PlannedMotion(path=path, speeds=speeds, start=start)
+        start = planned.AtTime(after_s=after_s)
+        motion = planned.PlannedMotion(path=path, speeds=speeds, start=start)
         return replace(self.placed, walk_to_m=None, motion=motion)
 
     def find_offsets(self, agent: TrafficAgent) -> FloatArray:
@@ -172,7 +171,7 @@ class _Search:
     def __init__(self, case: MotionCase, wish: MotionWish) -> None:
         self._case, self._wish = case, wish
         # Path, speeds and start.
-        self._best: tuple[planned_motion.Path | None, Speeds, float] = (None, (), 0.0)
+        self._best: tuple[planned.Path | None, Speeds, float] = (None, (), 0.0)
         self._best_m, self._fits = math.inf, False
 
     def run(self) -> TrafficAgent:
@@ -187,7 +186,7 @@ class _Search:
             self._vary(share)
         return self._case.give(*self._best)
 
-    def _try(self, path: planned_motion.Path | None, speeds: Speeds, after_s: float) -> None:
+    def _try(self, path: planned.Path | None, speeds: Speeds, after_s: float) -> None:
         if self._fits and self._best_m <= _NONE_M:
             return
         agent = self._case.give(path, speeds, after_s)
@@ -210,7 +209,7 @@ class _Search:
             self._try_from(self._best[1], step)
         for step in () if self._wish.duration_s else steps:
             path, speeds, after_s = self._best
-            if isinstance(path, planned_motion.LanePath):
+            if isinstance(path, planned.LanePath):
                 changed = replace(path, change_m=_shift(path.change_m, step, _CHANGES_M))
                 self._try(changed, speeds, after_s)
 
@@ -265,7 +264,7 @@ def _list_starts(case: MotionCase, wish: MotionWish, speeds: Speeds) -> Iterator
         apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
         near = start.ego_distance
         # The ego comes within the farther end first: that is the earliest start.
-        reaches_m = (near.high_m, near.low_m) if near else (planned_motion.REACHED_M,) * 2
+        reaches_m = (near.high_m, near.low_m) if near else (planned.REACHED_M,) * 2
         steps = (np.flatnonzero(apart_m <= reach_m) for reach_m in reaches_m)
         first_s, last_s = (float(times_s[at[0]]) if len(at) else math.inf for at in steps)
         yield first_s, last_s
@@ -321,21 +320,21 @@ def _list_speeds(case: MotionCase, wish: MotionWish) -> Iterator[Speeds]:
 
 def _list_paths(
     case: MotionCase, wish: MotionWish, after_s: float, speeds: Speeds
-) -> Iterator[planned_motion.Path | None]:
+) -> Iterator[planned.Path | None]:
     """Yield the answer's path, the same from where it has to begin, and the usual one."""
     own = case.own.path
-    if wish.preset in (*_SLOWS, planned_motion.MotionPreset.RED_LIGHT):
+    if wish.preset in (*_SLOWS, planned.MotionPreset.RED_LIGHT):
         yield None
     if wish.preset in _SLOWS:
         return
-    if isinstance(own, planned_motion.LanePath) and wish.duration_s is not None:
+    if isinstance(own, planned.LanePath) and wish.duration_s is not None:
         # The sentence has seconds, a path has metres.
         mean_mps = (case.placed.speed_mps + _find_ramp(case, wish).to_mps) / 2.0
         span = wish.duration_s.low * mean_mps, wish.duration_s.high * mean_mps
         own = replace(own, change_m=_shift(own.change_m, 0.0, span))
     if own is not None:
         yield own
-    if isinstance(own, planned_motion.PointPath):
+    if isinstance(own, planned.PointPath):
         here = case.carry_out(case.give(None, (), math.inf), min(after_s, HORIZON_S))[-1, :2]
         began_s = min(case.own_start_s, HORIZON_S)
         # (P, 2) from its beginning, moved there and widened where they turn too narrowly.
@@ -344,7 +343,7 @@ def _list_paths(
             points = here + scale * ways_m
             if not np.isnan(points).any():
                 yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
-    numbers = presets.PresetNumbers(start=planned_motion.AtTime(after_s=min(after_s, HORIZON_S)))
+    numbers = presets.PresetNumbers(start=planned.AtTime(after_s=min(after_s, HORIZON_S)))
     if speeds and "speed_mps" in presets.preset_numbers(wish.preset):
         numbers = replace(numbers, speed_mps=speeds[-1][1])
     try:
@@ -369,7 +368,7 @@ def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterat
     door, own, place = case.answer.agent, case.own, case.whole.route.locate_agent(car)
     # (2,) turns the car's frame over, so that out of the door's side is positive.
     side = np.array([1.0, presets.find_door_side(car, place)])
-    at_once = replace(door, motion=replace(own, start=planned_motion.AtTime()))
+    at_once = replace(door, motion=replace(own, start=planned.AtTime()))
     local = car.pose.to_local(case.carry_out(at_once)[[0, -1], :2]) * side  # shut, open
     half_m, slab_m, reach_m = car.width_m / 2.0, presets.DOOR_WIDTH_M, presets.DOOR_LENGTH_M
     ends_m = (car.length_m - reach_m) / 2.0
@@ -386,7 +385,7 @@ def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterat
         takes_s = _shift(_takes_s(own.speeds, way_m), 0.0, opens_s)
         at_door = replace(case, placed=replace(door, x_m=x_m, y_m=y_m))
         speeds = ((0.0, way_m / takes_s),)
-        path = planned_motion.PointPath(points_m=((end[0], end[1]),), keeps_heading=True)
+        path = planned.PointPath(points_m=((end[0], end[1]),), keeps_heading=True)
         for span in _list_starts(at_door, wish, speeds):
             yield at_door.give(path, speeds, _shift(case.own_start_s, 0.0, span))
 
