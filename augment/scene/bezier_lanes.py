@@ -60,7 +60,7 @@ class LanePiece:
     @property
     def is_astray(self) -> bool:
         """True if a place of it is too far off its centreline, whatever the headings are."""
-        return self.error[0] > ALLOWED[0]
+        return bool(self.error[0] > ALLOWED[0])
 
 
 @lru_cache(maxsize=4096)
