@@ -5,14 +5,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-from augment.scene.codec import (
-    intent_from_document,
-    intent_to_document,
-    modification_to_document,
-    scene_to_document,
-)
+from augment.scene.codec import intent_to_document, modification_to_document, scene_to_document
 from augment.scene.entities import Modification, Scene
-from augment.scene.intent import Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
+from augment.scene.intent import Body, Intent
+from tests.intents import parked
 from tests.scenes import scene, vehicle
 
 TYPE = "nudge_around_parked_vehicle"
@@ -25,10 +21,7 @@ def wish(ahead_m: int) -> str:
 
 def asked(ahead_m: int) -> dict[str, Any]:
     """What the wish asks for."""
-    length = Length(low_m=float(ahead_m), high_m=float(ahead_m))
-    spot = Spot(distance=length, relation=Relation.AHEAD, lane=LaneChoice.OWN)
-    request = VehicleRequest(spot=spot, speed_mps=0.0, count=1)
-    return intent_to_document(Intent(requests=(request,)))
+    return intent_to_document(parked(float(ahead_m), body=Body.VEHICLE))
 
 
 def reference(ahead_m: int) -> dict[str, Any]:
@@ -38,7 +31,7 @@ def reference(ahead_m: int) -> dict[str, Any]:
 def known(instruction: str) -> list[tuple[Scene, Intent]]:
     """What the stand-in's models know of an instruction."""
     found = WISH.search(instruction)
-    return [] if found is None else [(scene(), intent_from_document(asked(int(found[1]))))]
+    return [(scene(), parked(float(found[1]), body=Body.VEHICLE))] if found else []
 
 
 def write_street(folder: Path) -> Path:

@@ -16,7 +16,7 @@ from augment.geometry import frames
 from augment.geometry.frames import Box, Pose
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import AgentType
-from augment.scene.motion import MotionSource, Movement
+from augment.scene.motion import STEP_S, MotionSource, Movement
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime
 
 COMES_WITHIN_M = 15.0
@@ -112,14 +112,13 @@ def motion_limits(situation: ChangedScene) -> Iterator[Finding]:
     Together they bound the yaw rate. Doubtful above the limits of `LIMITS`; wrong above what
     friction holds, and for a radius by the factor `FAR_OFF` below.
     """
-    step_s = situation.motion.step_s if situation.planned else 0.0
     for mover in situation.planned.values():
         limits, first = LIMITS.get(mover.agent.type), _first_step(situation, mover)
         if limits is None or first is None:
             continue
-        window = min(round(WINDOW_S / step_s), len(mover.states) - 1)
+        window = min(round(WINDOW_S / STEP_S), len(mover.states) - 1)
         # (T - window,) mean accelerations in m/s^2.
-        gained = (mover.states[window:, 3] - mover.states[:-window, 3]) / (window * step_s)
+        gained = (mover.states[window:, 3] - mover.states[:-window, 3]) / (window * STEP_S)
         sideways, curvature = measure_bends(mover.states[first:])
         kind = name_type(mover.agent.type)
         for words, most, limit in (

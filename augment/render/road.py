@@ -13,6 +13,7 @@ from augment.render.palette import Colour
 from augment.render.shapes import lane_ring, long_axis, offset, resample_line, runs, sides, stripes
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
+    DRIVEN_ON,
     AreaKind,
     Lane,
     LaneConnector,
@@ -29,7 +30,6 @@ Corner = tuple[bool, bool]
 Strip = tuple[AnyLane, FloatArray, FloatArray]
 """A lane in the picture with its two sides (P, 2), worked out once."""
 
-_ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _ROAD_COLOURS = (palette.ROAD, palette.CARPARK, palette.INTERSECTION)
 _CHEVRON_EVERY_M = 12.0
 # (3, 2) ahead and left: its tip lies ahead.
@@ -223,7 +223,7 @@ def _surface(
         ground.stroke(polygon, palette.WALKWAY_EDGE, 1.5, closed=True)
     for polygon in walkways:
         ground.fill(polygon, palette.WALKWAY)
-    roads = [ground.px(ring) for kind, ring in areas if kind in _ROAD_AREAS]
+    roads = [ground.px(ring) for kind, ring in areas if kind in DRIVEN_ON]
     roads += [ground.px(lane_ring(left, right)) for _, left, right in strips]
     for polygon in roads:
         ground.stroke(polygon, palette.ROAD_EDGE, 4.0, closed=True)
