@@ -30,8 +30,8 @@ from augment.scene.entities import (
     apply,
 )
 from augment.scene.lane_graph import AnyLane
+from augment.scene.motion import find_trails
 from augment.scene.recording import Recording
-from augment.scene.trails import find_trails
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named for reviewers, and lie over the boxes."""

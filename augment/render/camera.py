@@ -23,8 +23,7 @@ from augment.geometry.polyline import FloatArray
 from augment.render.shapes import lane_ring, sides
 from augment.scene.entities import Modification, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
-from augment.scene.motion import Expectation
-from augment.scene.trails import ego_spots, find_trails
+from augment.scene.motion import Expectation, ego_spots, find_trails
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0

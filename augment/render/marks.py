@@ -17,7 +17,7 @@ from augment.render.canvas import Canvas
 from augment.render.palette import Colour, MarkStyle
 from augment.render.shapes import stripes
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.trails import Trail
+from augment.scene.motion import Trail
 
 # The body of a person: on the smallest screen without scrolling, half as many.
 PERSON_PX = 28.0

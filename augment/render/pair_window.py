@@ -20,8 +20,7 @@ from augment.render.canvas import Box, overlap
 from augment.render.road import scale_box, scale_corner
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent, MapPlace, Setting
-from augment.scene.motion import HORIZON_S, STEP_S, Movement
-from augment.scene.trails import find_trails
+from augment.scene.motion import HORIZON_S, STEP_S, Movement, find_trails
 
 AROUND_M = 10.0
 # Both pictures of a pair have so many pixels in a window of 1280 x 720.

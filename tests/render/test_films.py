@@ -14,9 +14,8 @@ from augment.render.bev import draw
 from augment.render.camera import PASSED_WIDTH_M, camera_for
 from augment.render.film import STEPS, make_film
 from augment.scene.entities import Modification, Scene, TrafficAgent
-from augment.scene.motion import find_motion
+from augment.scene.motion import ego_spots, find_motion, find_trails
 from augment.scene.planned_motion import AtTime, NearEgo, PlannedMotion, PointPath
-from augment.scene.trails import ego_spots, find_trails
 from tests.moving import cutting_in
 from tests.render.pictures import opened
 from tests.scenes import cone, pedestrian, scene, vehicle

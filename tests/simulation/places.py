@@ -8,7 +8,7 @@ import numpy as np
 from augment.checks import Ground
 from augment.render.camera import camera_for
 from augment.render.film import make_film
-from augment.scene.trails import find_trails
+from augment.scene.motion import find_trails
 from augment.simulation.expected import expect_recording
 from augment.simulation.road import Road
 from augment.simulation.shapes import move_ahead
