@@ -16,9 +16,8 @@ from augment.geometry.frames import Pose
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
 from augment.scene.intent import ConesRequest, LaneChoice, Lateral, Post, Shape, WalkRequest
 from augment.scene.lane_graph import LanePosition
+from augment.scene.planned_mover import WALK_S
 
-WALK_S = 15.0
-"""How long a walk takes in interPlan, whatever its length: 0.5 to 1.9 m/s."""
 SHORTEST_M, LONGEST_M = 7.0, 29.0
 """interPlan's walks are 7 to 29 m long."""
 _BEYOND_EDGE_M = 0.5
