@@ -206,17 +206,6 @@ def _by_schema(text: str) -> str:
 _good = _as(playing.GOOD)
 
 
-def _knows_json_object(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
-    """Answer to OpenAI's form of a schema as llama-cpp-python does."""
-    if request.response_format is not None and request.response_format.type == "json_schema":
-        return wire.error(500, "('body', 'response_format', 'type'): should be 'json_object'")
-    return _good(request, server)
-
-
-def _ignores_schema(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
-    return _good(request.model_copy(update={"response_format": None}), server)
-
-
 def _no_vision(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     if any(message.images for message in request.messages):
         return wire.error(400, "This model does not support image input.")
@@ -267,8 +256,6 @@ MODELS: dict[str, Behaviour] = {
     "fake-qa-never": _as(playing.STUBBORN),
     "fake-tool-loop": _as(playing.LOOPING),
     "fake-garbage": _garbage,
-    "fake-json-object": _knows_json_object,
-    "fake-ignores-schema": _ignores_schema,
     "fake-no-vision": _no_vision,
     "fake-cuts-context": _cuts_context,
     SLOW: _good,
