@@ -255,12 +255,6 @@ def test_another_server_never_receives_a_key(
     assert "sk-very-secret" not in row.reason
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[FakeServer]:
-    with running(known=known) as serving:
-        yield serving
-
-
 @contextmanager
 def wire(endpoint: Endpoint) -> Iterator[ChatClient]:
     with OpenAIWire(base_url=endpoint.base_url, api_key=None) as client:

@@ -119,12 +119,10 @@ def test_images_count_by_themselves_and_not_by_their_bytes() -> None:
 LONG = 'Lane7: [7, "Eastwards", 3.50, [[-12.25, 1.75], [-7.25, 1.75]]]\n' * 300
 
 
-def asking(text: str = LONG, max_tokens: int = 1000) -> Request:
-    message = Message(speaker=Speaker.USER, text=text)
-    return Request(model="m", messages=(message,), max_tokens=max_tokens)
+WINDOWS = (2048, 4096, 8192)
 
 
-def reply(prompt: int | None, completion: int | None = 10, finish: str = "stop") -> Reply:
+def reply(prompt: int, completion: int | None, finish: str) -> Reply:
     return Reply(
         text="x", prompt_tokens=prompt, completion_tokens=completion, finish_reason=finish
     )
@@ -147,47 +145,34 @@ def test_a_text_has_at_least_so_many_tokens(text: str, least: int) -> None:
     assert least_tokens(text) == least
 
 
-def test_a_count_far_below_what_was_sent_is_a_cut_prompt_at_a_window_alone() -> None:
-    assert least_tokens(LONG) > 6000
-    assert find_cut(asking(), reply(1200)) is None
-    cut = find_cut(asking(), reply(4096))
-    assert cut is not None
-    assert not cut.retryable
-
-
-@pytest.mark.parametrize("window", [2048, 4096, 8192])
-def test_a_finished_answer_to_a_prompt_of_exactly_a_window_is_sound(window: int) -> None:
-    assert find_cut(asking("Hello"), reply(window)) is None
-    assert find_cut(asking("Hello"), reply(window), context_tokens=window) is None
-
-
 @pytest.mark.parametrize(
-    ("words", "known", "is_cut"),
-    [(4096, None, False), (4097, None, True), (4097, 4096, True), (4097, 8192, False)],
-)
-def test_a_count_at_the_window_below_the_least_is_a_cut(
-    words: int, known: int | None, is_cut: bool
-) -> None:
-    cut = find_cut(asking("word " * words), reply(4096), context_tokens=known)
-    assert (cut is not None) == is_cut
-
-
-@pytest.mark.parametrize(
-    ("prompt", "completion", "finish", "is_cut"),
+    ("text", "counted", "known", "is_cut"),
     [
-        (4000, 96, "length", True),
-        (4000, 96, "", True),
-        (4000, 96, "stop", False),
-        (3000, 1096, "length", False),
-        (4000, 95, "length", False),
-        (4000, None, "length", False),
+        # Far below what was sent: a cut prompt at a window alone.
+        (LONG, (1200, 10, "stop"), None, False),
+        (LONG, (4096, 10, "stop"), None, True),
+        # A finished answer to a prompt of exactly a window is sound.
+        *(("Hello", (w, 10, "stop"), known, False) for w in WINDOWS for known in (None, w)),
+        # At the window, and below the least that the prompt has.
+        ("word " * 4096, (4096, 10, "stop"), None, False),
+        ("word " * 4097, (4096, 10, "stop"), None, True),
+        ("word " * 4097, (4096, 10, "stop"), 4096, True),
+        ("word " * 4097, (4096, 10, "stop"), 8192, False),
+        # An answer that runs into the window.
+        ("Hello", (4000, 96, "length"), None, True),
+        ("Hello", (4000, 96, ""), None, True),
+        ("Hello", (4000, 96, "stop"), None, False),
+        ("Hello", (3000, 1096, "length"), None, False),
+        ("Hello", (4000, 95, "length"), None, False),
+        ("Hello", (4000, None, "length"), None, False),
     ],
 )
-def test_an_answer_that_runs_into_the_window_shows_a_cut(
-    prompt: int, completion: int | None, finish: str, is_cut: bool
+def test_a_cut_prompt_shows_in_the_endpoints_count_of_tokens(
+    text: str, counted: tuple[int, int | None, str], known: int | None, is_cut: bool
 ) -> None:
-    cut = find_cut(asking("Hello"), reply(prompt, completion, finish))
+    cut = find_cut(request(text, max_tokens=1000), reply(*counted), context_tokens=known)
     assert (cut is not None) == is_cut
+    assert cut is None or not cut.retryable
 
 
 def fault(*, retryable: bool = True, retry_after_s: float | None = None) -> ModelFault:

@@ -3,13 +3,23 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Speaker
 from augment.prompts.fill import prompt_version
-from augment.variants.pipeline import EditTask, OutcomeStatus, run
+from augment.variants.pipeline import EditTask, OutcomeStatus
 from augment.variants.recipes import OTM
 from augment.variants.respondents import RespondentClient
 from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
-from tests.variants.playing import GOOD, MemoryTranscript, Play, agent, answer, block, call, native
+from tests.variants.playing import (
+    GOOD,
+    MemoryTranscript,
+    Play,
+    agent,
+    answer,
+    block,
+    call,
+    native,
+    play,
+)
 
 
 def test_one_good_answer_is_one_call_and_a_modification() -> None:
@@ -113,13 +123,9 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
             raise KeyboardInterrupt
 
     client = ScriptedClient(["nothing that could be read"])
+    task = EditTask(scene=scene(), instruction="Add a parked car.")
     with pytest.raises(KeyboardInterrupt):
-        run(
-            OTM,
-            EditTask(scene=scene(), instruction="Add a parked car."),
-            modifier=RespondentClient(client=client, model="m"),
-            transcript=Stops(),
-        )
+        play(OTM, task, RespondentClient(client=client, model="m"), Stops())
     assert len(client.requests) == 1
 
 
