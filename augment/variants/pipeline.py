@@ -12,14 +12,13 @@ broken wire is nobody's outcome and is raised.
 """
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property, partial
 
 from augment.checks import Ground
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
-from augment.llm.client import ChatClient, Patience
+from augment.llm.client import ChatClient
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
 from augment.prompts.blocks import names_changes, refuses
@@ -37,7 +36,6 @@ from augment.variants.respondents import (
     NoteKind,
     RespondentClient,
     Respondents,
-    Sampling,
     Transcript,
     ask_alone,
 )
@@ -96,39 +94,20 @@ class EditTask:
     begun: Messages = ()
 
 
-def run(
-    recipe: Recipe,
-    task: EditTask,
-    *,
-    modifier: RespondentClient,
-    transcript: Transcript,
-    patience: Patience | None = None,
-    others: Mapping[ModelRole, RespondentClient] | None = None,
-    sampling: Sampling | None = None,
-) -> Outcome:
+def run(recipe: Recipe, task: EditTask, respondents: Respondents) -> Outcome:
     """Let a model modify a scene as the recipe says.
 
     Args:
-        recipe: The variant, within whatever limits.
+        recipe: The variant, within whatever limits, which hold for all who are asked.
         task: The scene and the instruction.
-        modifier: Who modifies.
-        transcript: Is handed every raw answer before it is read.
-        patience: How faults that may pass are waited out; by default three attempts.
-        others: Who plays the reviewers' roles; by default the modifier's model does.
-        sampling: What every request is sent with.
+        respondents: Who is asked, and what is handed every raw answer before it is read.
 
     Raises:
         ModelFault: The wire or the endpoint broke; the same run may succeed later if it says so.
     """
-    respondents = Respondents(
-        clients={**(others or {}), ModelRole.MODIFIER: modifier},
-        transcript=transcript,
-        patience=patience or Patience(),
-        sampling=sampling or Sampling(),
-        max_tokens=recipe.limits.max_output_tokens,
-        re_asks=recipe.limits.re_asks,
-    )
-    return _Work(recipe=recipe, task=task, respondents=respondents).outcome()
+    limits = recipe.limits
+    asked = replace(respondents, max_tokens=limits.max_output_tokens, re_asks=limits.re_asks)
+    return _Work(recipe=recipe, task=task, respondents=asked).outcome()
 
 
 def ask_for_intent(

@@ -139,7 +139,7 @@ def review_text(answer: ReviewedAnswer) -> Verdict:
     reader = partial(read_ratings, accepted_from=accepted_from)
     with _unusable("the reviewer"):
         review, _, _ = answer.respondents.read(ModelRole.REVIEWER, messages, reader)
-    ratings = review.ratings
+    ratings, document = review.ratings, review.model_dump()
     accepted = ratings.mean >= accepted_from
     return Verdict(
         is_accepted=accepted,
@@ -149,15 +149,7 @@ def review_text(answer: ReviewedAnswer) -> Verdict:
             f"mean rating {ratings.mean:.2f} (compliance {ratings.compliance}, realism "
             f"{ratings.realism}, logical consistency {ratings.logical_consistency})"
         ),
-        document={
-            "ratings": ratings.model_dump(),
-            "mean": round(ratings.mean, 4),
-            "feedback": [entry.model_dump() for entry in review.feedback],
-            "remarks": list(review.remarks),
-            "summary": review.summary,
-            "questions": review.questions,
-            "answers": review.answers,
-        },
+        document={"ratings": document.pop("ratings"), "mean": round(ratings.mean, 4), **document},
     )
 
 
@@ -192,8 +184,7 @@ def review_picture(answer: ReviewedAnswer) -> Verdict:
             "questions": list(questions),
             "answers": {str(number): seen[number] for number in sorted(seen)},
             "accepted": accepted,
-            "feedback": [entry.model_dump() for entry in verdict.feedback],
-            "remarks": list(verdict.remarks),
+            **verdict.model_dump(exclude={"verdict"}),
         },
     )
 

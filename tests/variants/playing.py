@@ -15,7 +15,13 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pipeline import EditTask, Outcome, run
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.respondents import ModelRole, NoteKind, RespondentClient, Transcript
+from augment.variants.respondents import (
+    ModelRole,
+    NoteKind,
+    RespondentClient,
+    Respondents,
+    Transcript,
+)
 from augment.variants.reviews import BlockForm
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
@@ -117,10 +123,12 @@ def play(
     others: Others | None = None,
 ) -> Outcome:
     """A run that waits for nothing."""
-    patience = Patience(sleep=lambda _: None, rng=random.Random(0))
-    return run(
-        recipe, task, modifier=modifier, transcript=transcript, patience=patience, others=others
+    asked = Respondents(
+        clients={**(others or {}), ModelRole.MODIFIER: modifier},
+        transcript=transcript,
+        patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
     )
+    return run(recipe, task, asked)
 
 
 @contextmanager

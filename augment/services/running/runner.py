@@ -39,7 +39,7 @@ from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.pipeline import Outcome, OutcomeStatus
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import ModelRole, RespondentClient
+from augment.variants.respondents import ModelRole, RespondentClient, Respondents
 
 logger = logging.getLogger(__name__)
 
@@ -262,7 +262,6 @@ def _ask_model(
             )
             for role, respondent in respondents.items()
         }
-        modifier = playing.pop(ModelRole.MODIFIER)
         return pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
             pipeline.EditTask(
@@ -271,8 +270,9 @@ def _ask_model(
                 intent=loaded.intent,
                 begun=begun,
             ),
-            modifier=modifier,
-            transcript=RowTranscript(held, row, respondents, key=options.key(row.sample)),
-            others=playing,
-            sampling=options.sampling(row.sample),
+            Respondents(
+                clients=playing,
+                transcript=RowTranscript(held, row, respondents, key=options.key(row.sample)),
+                sampling=options.sampling(row.sample),
+            ),
         )
