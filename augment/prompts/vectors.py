@@ -47,16 +47,8 @@ _WITH_IDS = (
     *(entities.Lane, entities.LaneConnector, PlannedMotion, LanePath, AtPlace),
 )
 _OF_AGENTS = frozenset({"agent_id", "removed"})
-_OF_LANES = frozenset(
-    {
-        "lane_id",
-        "lane_ids",
-        "left_neighbor",
-        "right_neighbor",
-        "successors",
-        "from_lane",
-        "to_lane",
-    }
+_OF_LANES = frozenset({"lane_id", "lane_ids", "left_neighbor", "right_neighbor"}) | frozenset(
+    {"successors", "from_lane", "to_lane"}
 )
 """Fields that name agents, or lanes and connectors, besides the `id` of each."""
 # The end of a whole number; ids and words of ours have no dot.

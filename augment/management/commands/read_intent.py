@@ -39,27 +39,27 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Do one of the three, and print the statements of what was read or counts now."""
         endpoint, model, slug = options["endpoint"], options["model"], options["scenario"]
-        asks = bool(endpoint and model)
-        if asks + options["accept"] + (options["enter"] is not None) != 1:
+        asks, file = bool(endpoint and model), options["enter"]
+        if asks + options["accept"] + (file is not None) != 1:
             raise CommandError("Give one of: --endpoint with --model, --accept, --enter FILE.")
         if asks:
             reading = read_intent(scenario=slug, endpoint=endpoint, model=model)
             if reading.state != IntentReading.State.READ:
                 raise CommandError(f"Nothing was read: {reading.reason}")
-            document = reading.document
-            sentence = (
+            self._say(reading.document)
+            self.stdout.write(
                 "It does not count yet. Hold each statement against the sentence, then accept "
                 f"it:\n  manage.py read_intent {slug} --accept"
             )
+            return
+        refuse_handed_out(slug, [Split.PRACTICE])
+        if file is None:
+            row = accept_reading(scenario=slug)
         else:
-            refuse_handed_out(slug, [Split.PRACTICE])
-            if options["accept"]:
-                row = accept_reading(scenario=slug)
-            else:
-                entered = read_json(options["enter"], what="intent")
-                row = enter_intent(scenario=slug, document=entered)
-            document = row.intent
-            sentence = f"This is the intent of {slug} now ({row.intent_origin})."
+            row = enter_intent(scenario=slug, document=read_json(file, what="intent"))
+        self._say(row.intent)
+        self.stdout.write(f"This is the intent of {slug} now ({row.intent_origin}).")
+
+    def _say(self, document: object) -> None:
         for statement in list_statements(intent_from_document(document)):
             self.stdout.write(f"- {statement}")
-        self.stdout.write(sentence)
