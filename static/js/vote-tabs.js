@@ -3,10 +3,13 @@
 // A page that is being left may still hold it.
 const PATIENCE_MS = 600;
 
-// Whether this tab may vote now; lost() is called when another tab takes over.
+// Whether this tab may vote now; lost() is called when another tab takes over. A browser that is
+// slow to answer says nothing of other tabs: only who holds it does.
 export function hold(name, lost, { steal = false } = {}) {
-  if (!navigator.locks) return Promise.resolve(true);
-  const how = steal ? { steal } : { signal: AbortSignal.timeout(PATIENCE_MS) };
+  const { locks } = navigator;
+  if (!locks) return Promise.resolve(true);
+  const waiting = new AbortController();
+  const isTaken = async () => (await locks.query()).held.some((lock) => lock.name === name);
   return new Promise((resolve) => {
     let isHeld = false;
     const tillTheEnd = () => {
@@ -14,6 +17,8 @@ export function hold(name, lost, { steal = false } = {}) {
       resolve(true);
       return new Promise(() => {});
     };
-    navigator.locks.request(name, how, tillTheEnd).catch(() => (isHeld ? lost() : resolve(false)));
+    locks.request(name, steal ? { steal } : { signal: waiting.signal }, tillTheEnd).catch(() => (isHeld ? lost() : resolve(false)));
+    // Who holds it by then keeps it: an abort is too late for a lock that is given.
+    if (!steal) isTaken().then(() => setTimeout(async () => (await isTaken()) && waiting.abort(), PATIENCE_MS));
   });
 }

@@ -13,6 +13,14 @@ from tests.held_lock import kept_busy
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 VOTES = "**/api/v1/votes"
+BUSY = """
+const { request } = LockManager.prototype;
+LockManager.prototype.request = async function (...how) {
+  await new Promise((done) => setTimeout(done, 1500));
+  return request.apply(this, how);
+};
+"""
+"""What a browser on a busy machine does: it says late that nobody else votes."""
 
 
 def refuse(route: Route) -> None:
@@ -118,6 +126,15 @@ def test_one_tab_votes_at_a_time(booth: Booth) -> None:
     press(second, "3")
     all_sent(second, 2)
     assert booth.outcomes() == ["equal", "right"]
+
+
+def test_a_browser_that_is_slow_to_answer_is_no_other_tab(booth: Booth) -> None:
+    page = booth.enter()
+    page.add_init_script(BUSY)
+    page.reload()
+    ready(page)
+    press(page, "1")
+    all_sent(page, 1)
 
 
 def test_back_and_forward_show_the_pair_that_is_open(booth: Booth) -> None:
