@@ -13,15 +13,18 @@ from django.http.response import HttpResponseBase
 from django.utils.http import url_has_allowed_host_and_scheme
 
 from arena.config import faults
-from arena.errors import DatabaseBusy
+from arena.errors import DatabaseBusy, NotYours
 from arena.voting.services.turns import is_transient, limit_waiting
 from augment.errors import MediaFault
 
 logger = logging.getLogger(__name__)
 
 
-class BusyMiddleware:
-    """Answer 503 while the database can't be written or the picture storage is unreachable."""
+class FaultMiddleware:
+    """Answer 404 for what is somebody else's, as for what does not exist.
+
+    And 503 while the database can't be written or the picture storage is unreachable.
+    """
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
@@ -30,7 +33,9 @@ class BusyMiddleware:
         return self.get_response(request)
 
     def process_exception(self, request: HttpRequest, exception: Exception) -> HttpResponse | None:
-        """Return the 503 answer, or None for any other exception."""
+        """Return the answer, or None for any other exception."""
+        if isinstance(exception, NotYours):
+            return faults.answer_missing(request, exception)
         if isinstance(exception, DatabaseBusy) or is_transient(exception):
             logger.warning("%s", exception.__cause__ or exception)
             return faults.answer_busy(request)

@@ -103,7 +103,7 @@ MIDDLEWARE = [
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
-    "arena.config.middleware.BusyMiddleware",
+    "arena.config.middleware.FaultMiddleware",
 ]
 ROOT_URLCONF = "arena.config.urls"
 TEMPLATES = [

@@ -3,6 +3,7 @@
 Every step can be repeated: what is there already is used again, so a second run changes nothing.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -35,7 +36,7 @@ from augment.services.endpoints import (
     paper_variants,
 )
 from augment.services.endpoints.contestants import REFERENCE, contestant_slug
-from augment.services.judging.displacement import of_rows
+from augment.services.judging import pairs_apart
 from augment.services.running import JobRequest, count_rows
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import cancel, launch, retry_failed
@@ -223,7 +224,8 @@ def vote_and_rate(
         contestants += own.contestants
     study = demo.hold_study(scenarios=scenarios, name=name, contestants=contestants)
     if own is not None:
-        open_to_try(OPEN_STUDY_WITH_MODEL, contestants, scenarios)
+        # Of a few pairs most are decided already.
+        open_to_try(OPEN_STUDY_WITH_MODEL, contestants, scenarios, 2 * len(scenarios))
     else:
         open_to_try(OPEN_STUDY, *choose_visible(scenarios))
     table = leaderboard_table(study.snapshots.latest("made_at"))
@@ -235,37 +237,52 @@ def vote_and_rate(
     return plain_text(table), files
 
 
-def choose_visible(scenarios: list[str]) -> tuple[tuple[str, ...], list[str]]:
-    """Return three contestants and the scenarios where each two differ by VISIBLE_M or more.
+def choose_visible(scenarios: list[str]) -> tuple[tuple[str, ...], list[str], int]:
+    """Return contestants, scenarios on which each two are VISIBLE_M apart, and so many pairs.
 
-    Two whose distances from the reference differ by so much are at least that far apart.
+    Those three or four with most pairs up to YOUR_VOTES, if possible with something that moves;
+    then those with the reference, and the fewest.
     """
     rows = models.Augmentation.objects.filter(scenario__slug__in=scenarios, state=State.DONE)
-    errors_m: dict[str, dict[str, float]] = {slug: {} for slug in scenarios}
-    for line in of_rows(rows.values_list("pk", flat=True)):
-        if line.displacement is not None:
-            at = errors_m[line.row.scenario.slug]
-            at[line.row.contestant.slug] = line.displacement.error_m
+    cells = {
+        (row.scenario.slug, row.contestant.slug): row
+        for row in rows.select_related("scenario", "contestant")
+    }
+    apart = set(pairs_apart(cells, VISIBLE_M))
+    moving = set(demo.list_slugs(None, "moving"))
+    slugs = sorted({slug for _, slug in cells})
 
-    def list_apart(slugs: tuple[str, ...]) -> list[str]:
+    def list_apart(chosen: tuple[str, ...]) -> list[str]:
+        pairs = list(combinations(chosen, 2))
         return [
-            scenario
-            for scenario, at in errors_m.items()
-            if at.keys() >= set(slugs)
-            and all(abs(at[a] - at[b]) >= VISIBLE_M for a, b in combinations(slugs, 2))
+            one for one in scenarios if all((one, first, other) in apart for first, other in pairs)
         ]
 
-    others = sorted({slug for at in errors_m.values() for slug in at} - {REFERENCE})
-    trios = [(REFERENCE, *pair) for pair in combinations(others, 2)]
-    trio = max(trios, key=lambda slugs: len(list_apart(slugs)), default=demo.RATED)
-    return trio, list_apart(trio) or scenarios
+    def rank(chosen: tuple[str, ...]) -> tuple[int, bool, bool, int]:
+        shown = list_apart(chosen)
+        pairs = min(math.comb(len(chosen), 2) * len(shown), YOUR_VOTES)
+        return pairs, not moving.isdisjoint(shown), REFERENCE in chosen, -len(chosen)
+
+    sets = (chosen for size in (3, 4) for chosen in combinations(slugs, size))
+    best = max(sets, key=rank, default=demo.RATED)
+    shown = list_apart(best)
+    if not shown:
+        return best, scenarios, 2 * len(scenarios)
+    return best, shown, math.comb(len(best), 2) * len(shown)
 
 
-def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str]) -> None:
-    """Open a study for the expert, with a film among the first three pairs if it has any."""
+def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pairs: int) -> None:
+    """Open a study for the expert, with a film among the first three pairs if it has any.
+
+    Args:
+        name: Of the study.
+        contestants: Who is compared.
+        scenarios: On what.
+        pairs: At least so many can be shown.
+    """
     if Study.objects.filter(name=name).exists():
         return
-    votes = min(YOUR_VOTES, 2 * len(scenarios))  # of a few pairs most are decided already
+    votes = min(YOUR_VOTES, pairs)
     values = demo.study_asked(name, scenarios, contestants) | {"experts": ["expert"]}
     moves = models.Scenario.objects.filter(slug__in=scenarios, catalogue_set="moving").exists()
     seeds = range(demo.SEED, demo.SEED + (SEEDS_TRIED if moves else 1))

@@ -15,7 +15,7 @@ from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
 from arena.jobs import queries
-from arena.models import Study
+from arena.models import Person, Study
 from arena.people.pages import keep_language
 from arena.people.services import keep_preference
 from arena.scenarios.queries import count_waiting, submissions_for
@@ -27,7 +27,7 @@ from arena.shell.listing import read_listing, read_page
 from arena.shell.steps import first_steps
 from arena.site import demo
 from arena.site.language import use_english
-from arena.site.queries import actors, count_failed, distinct, read_gauges
+from arena.site.queries import count_failed, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
 from arena.voting.queries.blinding import ResultsAccess, results_access
@@ -150,13 +150,20 @@ def _back(request: HttpRequest) -> HttpResponse:
 @page_for(ADMIN)
 def audit_page(request: HttpRequest) -> HttpResponse:
     """A page of acts, the newest first."""
-    people: list[tuple[str, object]] = [
-        (str(user.person.code), user.person.pseudonym) for user in actors()
-    ]
-    verbs = [(verb, label_of("verb_label", verb)) for verb in distinct("verb")]
-    kinds = [(kind, kind) for kind in distinct("object_kind")]
+    acts = Event.objects.order_by()
+    actors = Person.objects.filter(user__in=acts.values("actor")).order_by("pseudonym")
+    people = [(str(code), name) for code, name in actors.values_list("code", "pseudonym")]
+    verbs, kinds = (
+        sorted(acts.values_list(column, flat=True).distinct())
+        for column in ("verb", "object_kind")
+    )
     listing = read_listing(
-        request, {"actor": ("By", people), "verb": ("What", verbs), "object_kind": ("To", kinds)}
+        request,
+        {
+            "actor": ("By", people),
+            "verb": ("What", [(verb, label_of("verb_label", verb)) for verb in verbs]),
+            "object_kind": ("To", [(kind, kind) for kind in kinds]),
+        },
     )
     rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
     if actor := listing.find_choice("actor"):

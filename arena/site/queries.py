@@ -1,10 +1,9 @@
-"""Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
+"""Reads of the whole site: gauges for monitoring, and what failed."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from django.apps import apps
-from django.contrib.auth.models import User
 from django.db.models import Count, QuerySet, Sum
 from prometheus_client.core import GaugeMetricFamily
 
@@ -14,22 +13,6 @@ from augment.services.running import workforce
 
 NANO = 1e9
 """Money is counted in whole nano-dollars."""
-
-# --- The log of acts ---------------------------------------------------------------------------
-
-
-def actors() -> list[User]:
-    """Return everybody who ever did something, by pseudonym."""
-    who = User.objects.filter(pk__in=models.Event.objects.exclude(actor=None).values("actor"))
-    return list(who.select_related("person").order_by("person__pseudonym"))
-
-
-def distinct(column: str) -> list[str]:
-    """Return every value of a column of the log."""
-    return sorted(models.Event.objects.order_by().values_list(column, flat=True).distinct())
-
-
-# --- Monitoring --------------------------------------------------------------------------------
 
 
 def read_gauges() -> Iterator[GaugeMetricFamily]:
@@ -81,9 +64,6 @@ def _by_state(name: str, text: str, numbers: Mapping[Any, int]) -> GaugeMetricFa
     for state, number in numbers.items():
         family.add_metric([str(state)], number)
     return family
-
-
-# --- Counts ----------------------------------------------------------------------------------
 
 
 def count_failed() -> int:

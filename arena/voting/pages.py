@@ -1,9 +1,6 @@
 """The page on which an expert votes. It tells nothing of who made what."""
 
 import uuid
-from collections.abc import Callable
-from functools import wraps
-from typing import Any
 
 from django.contrib import messages
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
@@ -12,7 +9,7 @@ from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
 
-from arena.errors import InvalidVote, NotYours, StudyNotOpen
+from arena.errors import InvalidVote, StudyNotOpen
 from arena.models import Study, Vote
 from arena.shell.access import ADMIN, EXPERT, form_for, get_user, page_for
 from arena.shell.pictures import send_picture
@@ -22,21 +19,6 @@ from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import drives_of_pair, picture_shown
 from arena.voting.screen import no_pair_context, vote_context
 from arena.voting.services.practice import answer_practice, is_due, practice_pairs, skip_practice
-
-View = Callable[..., HttpResponseBase]
-
-
-def strangers_find_nothing(view: View) -> View:
-    """Answer 404 for what is somebody else's, as for what does not exist."""
-
-    @wraps(view)
-    def answer(*args: Any, **named: Any) -> HttpResponseBase:
-        try:
-            return view(*args, **named)
-        except NotYours as error:
-            raise Http404 from error
-
-    return answer
 
 
 @page_for(EXPERT)
@@ -69,14 +51,12 @@ def list_skipped_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @page_for(EXPERT, ADMIN)
-@strangers_find_nothing
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     """One side of a matchup or its film, by a token that says nothing."""
     return send_picture(request, picture_shown(user=get_user(request), token=token))
 
 
 @page_for(EXPERT, ADMIN)
-@strangers_find_nothing
 def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Return a planner's drives of both scenes of a pair, for the script that plays them."""
     drives = drives_of_pair(user=get_user(request), code=code)

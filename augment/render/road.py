@@ -152,6 +152,8 @@ def draw_ticks(ground: Canvas, scene: Scene) -> None:
     if route is None:
         return
     for ahead_m in ground.camera.ticks_m:
+        if route.ego_s_m + ahead_m > route.line.length_m:
+            continue  # nobody knows where the lane would lead
         pose = route.line.pose_at(route.ego_s_m + ahead_m)
         bar = pose.to_parent(np.array([[0.0, _TICK_HALF_M], [0.0, -_TICK_HALF_M]]))
         ground.stroke(ground.px(bar), palette.INK, 2.0)

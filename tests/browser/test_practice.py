@@ -2,7 +2,7 @@
 
 import pytest
 from django.contrib.auth.models import User
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from arena.voting.services.practice import practice_pairs
 from augment.models import Augmentation, Scenario
@@ -33,26 +33,6 @@ def wanted(booth: Booth) -> Booth:
     booth.study.practice = True
     booth.study.save()
     return booth
-
-
-def practise(page: Page, booth: Booth) -> None:
-    """Answer all five well."""
-    for pair in practice_pairs(booth.study, User.objects.get(username="eva")):
-        expect(page.locator("#question")).to_contain_text(f"Practice {pair.position} of 5.")
-        letter = "A" if pair.good_is_left else "B"
-        page.get_by_role("button", name=f"{letter} is better").click()
-        expect(page.locator("#feedback-title")).to_contain_text("Right.")
-        last = pair.position == 5
-        page.get_by_role("link", name="Start voting" if last else "Next practice pair").click()
-    expect(page.locator("#place")).to_have_text("1")
-
-
-def test_practice_comes_first_and_only_once(wanted: Booth) -> None:
-    page = wanted.visit("eva", wanted.path, {})
-    practise(page, wanted)
-    assert wanted.votes() == []
-    page.goto(wanted.path)
-    expect(page.locator("#place")).to_have_text("1")
 
 
 def test_practice_is_answered_by_the_keys_that_answer_pairs(wanted: Booth) -> None:

@@ -46,6 +46,17 @@ def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) 
     assert r"\toprule" in (demo_home.folder / "var" / "demo" / "leaderboard.tex").read_text()
 
 
+def test_its_open_study_has_twenty_pairs_and_soon_a_film(demo_home: Home) -> None:
+    pairs = (
+        "SELECT m.position, c.catalogue_set FROM arena_matchup m "
+        "JOIN arena_study s ON s.id = m.study_id JOIN augment_scenario c ON c.id = m.scenario_id "
+        "WHERE s.state = 'open' ORDER BY 1"
+    )
+    rows = demo_home.rows(pairs)
+    assert [position for position, _ in rows] == list(range(1, 21))
+    assert "moving" in [which for _, which in rows[:3]]
+
+
 def test_every_file_says_that_it_is_simulated(demo_home: Home) -> None:
     for ending in ("csv", "json", "tex", "svg"):
         path = demo_home.folder / "var" / "demo" / f"leaderboard.{ending}"

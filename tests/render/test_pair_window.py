@@ -12,11 +12,13 @@ from augment.checks import Ground
 from augment.render.bev import draw
 from augment.render.camera import Camera
 from augment.render.pair_window import AROUND_M, covered_boxes, film_states, pair_camera
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification, without_traffic
 from augment.scene.planned_motion import AtTime, PlannedMotion
 from augment.services.scenarios.catalogue import read_catalogue
 from tests import scenes
 from tests.properties import examples
+from tests.render.pictures import at_camera_size, pixel_at
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 STREET = Ground.of(scenes.scene())
@@ -76,6 +78,31 @@ def test_a_difference_of_few_pixels_has_an_inset_at_the_same_place_on_both_sides
     assert scale[2] < inset[0] or inset[2] < scale[0] or scale[3] < inset[1] or inset[3] < scale[1]
     far = ((sides[0].added[0], sides[1].added[0], 2.0),)
     assert pair_camera(STREET, sides, differing=far).inset is None
+
+
+def test_distances_that_are_named_are_ticked_on_the_egos_lane_as_far_as_it_goes() -> None:
+    sides, ends_m = (added(12.0), added(18.0)), find_end_m()
+    camera = pair_camera(STREET, sides, ticks_m=(30.0, ends_m - 5.0, ends_m + 5.0))
+    camera = replace(camera, x_max_m=ends_m + 15.0)
+    plain = replace(camera, ticks_m=())
+    for side in sides:
+        ticked, bare = (draw(STREET.scene, side, one) for one in (camera, plain))
+        changed = at_camera_size(ticked, camera) != at_camera_size(bare, plain)
+        columns = np.flatnonzero(changed.any(axis=(0, 2)))
+        # Metres ahead of the ego; a label is about 3 m wide.
+        ahead_m = camera.x_min_m + columns / camera.px_per_m
+        for at_m in (30.0, ends_m - 5.0):
+            assert pixel_at(ticked, camera, at_m, 1.0) == pixel_at(ticked, camera, at_m, -1.0)
+            assert max(pixel_at(ticked, camera, at_m, 1.0)) < 60
+        near = np.minimum(abs(ahead_m - 30.0), abs(ahead_m - ends_m + 5.0))
+        assert near.max() < 4.0
+
+
+def find_end_m() -> float:
+    """How far ahead of the ego its lane ends."""
+    route = EgoRoute.of(STREET.scene)
+    assert route is not None
+    return route.line.length_m - route.ego_s_m
 
 
 def test_over_the_catalogue_pictures_are_large_enough() -> None:

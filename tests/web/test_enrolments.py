@@ -67,7 +67,12 @@ def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enr
     client = Client()
     assert join(client, enrolment) == 302
     study = enrolment.study
-    assert client.get(reverse("vote", args=[study.code])).status_code == 200
+    planned = study.matchups.filter(expert__enrolled__isnull=False)
+    planned.update(view={})
+    page = client.get(reverse("vote", args=[study.code])).content.decode()
+    assert "Your next pictures are being drawn" in page
+    planned.update(view=None)
+    assert 'id="vote"' in client.get(reverse("vote", args=[study.code])).content.decode()
     voter = enrolment.voters.get()
     for matchup in matchups_of(study, voter.expert.username):
         vote(matchup)

@@ -6,8 +6,9 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import PracticePair, Study, Vote
+from arena.people.links import accept, invite
 from arena.voting.queries.ballots import voting_progress
-from arena.voting.services.practice import practice_pairs
+from arena.voting.services.practice import is_due, practice_pairs
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
@@ -33,7 +34,9 @@ def opened(*, outside: int = 6, **options: object) -> Study:
     draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
     for number, row in enumerate(Augmentation.objects.all()):
         Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
-    return open_study(**{"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast, **options})
+    study = open_study(**{"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast, **options})
+    accept(token=invite(study=study, expert=eva()).token)
+    return study
 
 
 def eva() -> User:
@@ -74,6 +77,14 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
     assert client.get(page(study)).status_code == 200
     assert not Vote.objects.exists()
     assert voting_progress(study=study, expert=eva()).voted == 0
+
+
+def test_only_who_came_by_a_link_practises_where_the_rules_say_so() -> None:
+    study, finn = opened(), User.objects.get(username="finn")
+    invite(study=study, expert=finn)
+    assert [is_due(study, one) for one in (eva(), finn)] == [True, False]
+    del study.rules["practice_for"]  # as studies that were opened before
+    assert is_due(study, finn)
 
 
 def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:

@@ -7,12 +7,12 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.cache import never_cache
 
-from arena.errors import AlreadyLabelled, LabellingClosed, NotYours
+from arena.errors import AlreadyLabelled, LabellingClosed
 from arena.jobs import queries
 from arena.jobs.exports.faults import fault_table
 from arena.jobs.pages.jobs import job_crumbs
@@ -60,13 +60,10 @@ class LabellingForm(forms.Form):
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the next picture; a label is saved and followed by a redirect."""
     expert = get_user(request)
-    try:
-        progress = queries.labelling_progress(expert=expert, code=code)
-        if request.method == "POST":
-            _save(request, expert)
-            return redirect("label", code=code)
-    except NotYours as error:
-        raise Http404 from error
+    progress = queries.labelling_progress(expert=expert, code=code)
+    if request.method == "POST":
+        _save(request, expert)
+        return redirect("label", code=code)
     task = queries.next_task(labelling=progress.labelling, expert=expert)
     context = {
         **{"progress": progress, "task": task, "faults": list(FaultClass)},

@@ -28,7 +28,7 @@ from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypothes
 from arena.studies.services.planning import store
 from arena.voting.services import shown_pictures
 from arena.voting.services.pictures import Cells, check_pictures, require_checks
-from arena.voting.services.practice import has_practice
+from arena.voting.services.practice import OF_LINKS, has_practice
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
 from augment.services import check_prose, log_change, one_line
@@ -243,6 +243,8 @@ def _insert(
     name: str, frozen: dict[str, Any], study_plan: StudyPlan, rules: PlanRules, has_simulated: bool
 ) -> Study:
     switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
+    if practises := study_plan.practice and has_practice():
+        frozen["practice_for"] = OF_LINKS
     try:
         with transaction.atomic():
             return Study.objects.create(
@@ -252,11 +254,7 @@ def _insert(
                 rules=frozen,
                 questions=list(study_plan.questions) or one_question(),
                 opened_at=timezone.now(),
-                **switches
-                | {
-                    "allow_simulated": has_simulated,
-                    "practice": study_plan.practice and has_practice(),
-                },
+                **switches | {"allow_simulated": has_simulated, "practice": practises},
             )
     except IntegrityError:  # taken since it was looked up
         raise Conflict(f"There is a study named '{name}' already.") from None

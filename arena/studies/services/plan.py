@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from arena.errors import NothingToPlan
 from arena.models import Question, Snapshot, Study
@@ -242,8 +242,8 @@ class StudyPlan:
     )
     practice: bool = _switch(
         "Practice before the first pair",
-        "Five pairs, a reference beside a broken image, each followed by what was right; nothing "
-        "of it counts. Only where scenarios have both images drawn.",
+        "For whoever came by a link: five pairs, a reference beside a broken image, each followed "
+        "by what was right; nothing of it counts. Only where scenarios have both images drawn.",
         default=True,
     )
     allow_simulated: bool = _switch("Simulated may take part", "Every page and file then says so.")
@@ -265,7 +265,7 @@ class StudyPlan:
 
 PLAN_INPUTS = to_inputs(StudyPlan)
 QUANTITIES = ("votes_per_expert", "repeats", "checks", "overlap")
-"""What decides how many pairs each expert sees, and what a preset sets."""
+"""What decides how many pairs each expert sees."""
 SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
 """What the frozen rules call a percentage; they keep it as a share."""
 SWITCH_COLUMNS = tuple(
@@ -277,51 +277,34 @@ SWITCH_COLUMNS = tuple(
 """Switches that a study keeps in a column of its own."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Preset:
+class Preset(NamedTuple):
     """Values of a StudyPlan that go together; everything else keeps its default.
 
     Attributes:
         help: What it is for.
+        quantities: By the fields of StudyPlan.
     """
 
     label: str
     help: str
-    votes_per_expert: int
-    repeats: float
-    checks: float
-    overlap: float
-
-    @property
-    def quantities(self) -> dict[str, float]:
-        """The values, by the fields of StudyPlan."""
-        return {name: getattr(self, name) for name in QUANTITIES}
+    quantities: dict[str, float]
 
 
 PRESETS = {
     "pilot": Preset(
-        label="Pilot",
-        help="A first look: few votes, many of them on pairs that two experts judge.",
-        votes_per_expert=20,
-        repeats=0.0,
-        checks=0.0,
-        overlap=30.0,
+        "Pilot",
+        "A first look: few votes, many of them on pairs that two experts judge.",
+        {"votes_per_expert": 20, "repeats": 0.0, "checks": 0.0, "overlap": 30.0},
     ),
     "paper": Preset(
-        label="Paper",
-        help="A table to publish: agreement and steadiness of the experts can be reported.",
-        votes_per_expert=40,
-        repeats=5.0,
-        checks=2.0,
-        overlap=10.0,
+        "Paper",
+        "A table to publish: agreement and steadiness of the experts can be reported.",
+        {"votes_per_expert": 40, "repeats": 5.0, "checks": 2.0, "overlap": 10.0},
     ),
     "crowd": Preset(
-        label="Crowd",
-        help="Many voters whom you don’t know: more checks and repeats for each of them.",
-        votes_per_expert=30,
-        repeats=10.0,
-        checks=10.0,
-        overlap=0.0,
+        "Crowd",
+        "Many voters whom you don’t know: more checks and repeats for each of them.",
+        {"votes_per_expert": 30, "repeats": 10.0, "checks": 10.0, "overlap": 0.0},
     ),
 }
 

@@ -9,21 +9,24 @@ from django.db import transaction
 from django.db.models import QuerySet
 
 from arena.errors import InvalidVote
-from arena.models import PracticePair, Study, Vote
+from arena.models import EnrolledVoter, Invitation, PracticePair, Study, Vote
 from arena.voting.queries.ballots import require_open
 from arena.voting.services.pictures import latest_pairs
 from augment.models import Scenario
 
 PAIRS = 5
+OF_LINKS = "links"
+"""What the rules of a study call it that only who came by a link practises; earlier studies have
+everybody do so."""
 
 Answer = PracticePair.Answer
-
-# --- Practice ----------------------------------------------------------------------------------
 
 
 def is_due(study: Study, expert: User) -> bool:
     """Return whether the expert practises now: nothing is voted yet and a pair is unanswered."""
     if not study.practice or Vote.objects.filter(matchup__study=study, expert=expert).exists():
+        return False
+    if study.rules.get("practice_for") == OF_LINKS and not _came_by_link(expert):
         return False
     return any(not pair.answer for pair in practice_pairs(study, expert))
 
@@ -78,6 +81,12 @@ def has_practice() -> bool:
     return bool(latest_pairs(Scenario.objects.all()))
 
 
+def _came_by_link(expert: User) -> bool:
+    """Return whether an invitation has let the expert in, or the link of a study for everybody."""
+    invited = Invitation.objects.filter(expert=expert, used_at__isnull=False)
+    return invited.exists() or EnrolledVoter.objects.filter(expert=expert).exists()
+
+
 def _open_practice(study: Study, expert: User) -> QuerySet[PracticePair]:
     require_open(study)
     return PracticePair.objects.filter(study=study, expert=expert, answer="")
@@ -109,6 +118,3 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
         )
         for position, (*_, pk) in enumerate(sorted(ranked)[:PAIRS], start=1)
     ]
-
-
-# --- Reports -----------------------------------------------------------------------------------

@@ -7,7 +7,13 @@ from augment.services.judging.analyses import (
     read_answers,
     repeatability,
 )
-from augment.services.judging.displacement import ALIKE, PLACED_EXACTLY, alike_pairs, list_objects
+from augment.services.judging.displacement import (
+    ALIKE,
+    PLACED_EXACTLY,
+    alike_pairs,
+    list_objects,
+    pairs_apart,
+)
 from augment.services.judging.findings import (
     FaultClass,
     check_augmentation,

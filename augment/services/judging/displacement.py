@@ -202,12 +202,13 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
             }
 
 
-def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[str, str, str], ...]:
-    """Return pairs of contestants whose changes of a scenario nobody can tell apart.
+Cells = Mapping[tuple[str, str], Augmentation]
+"""By scenario (or sample of one) and contestant what is shown. An answer that could not be read
+shows the unchanged scene."""
 
-    Args:
-        cells: By scenario (or sample of one) and contestant what is shown. An answer that could
-            not be read shows the unchanged scene.
+
+def alike_pairs(cells: Cells) -> tuple[tuple[str, str, str], ...]:
+    """Return pairs of contestants whose changes of a scenario nobody can tell apart.
 
     Returns:
         (scenario, contestant, contestant), sorted; identical pictures are among them.
@@ -215,6 +216,17 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
     Raises:
         InvalidDocument: A stored modification can't be read.
     """
+    return _choose_pairs(cells, are_alike)
+
+
+def pairs_apart(cells: Cells, least_m: float) -> tuple[tuple[str, str, str], ...]:
+    """Return pairs as `alike_pairs`, of changes that lie so far apart or more before they move."""
+    return _choose_pairs(cells, lambda one, other: displacement(one, other).error_m >= least_m)
+
+
+def _choose_pairs(
+    cells: Cells, is_wanted: Callable[[Modification, Modification], bool]
+) -> tuple[tuple[str, str, str], ...]:
     rows = Augmentation.objects.filter(pk__in=[row.pk for row in cells.values()])
     shown: dict[int, Modification | None] = {}
     for pk, state, document in rows.values_list("pk", "state", "modification").iterator():
@@ -229,8 +241,8 @@ def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[st
     return tuple(
         (scenario, first, second)
         for scenario, sides in by_scenario.items()
-        for (first, pk), (second, other) in combinations(sides, 2)
-        if are_alike(pk, other)
+        for (first, change), (second, other) in combinations(sides, 2)
+        if is_wanted(change, other)
     )
 
 
