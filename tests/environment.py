@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
+VAR = "ARENA_TESTS_VAR"
 KEPT = {
     "PATH": "where Python, a Chromium, a redis-server and PostgreSQL's programs are found",
     "TMPDIR": "where temporary folders lie",
@@ -21,6 +22,7 @@ KEPT = {
     "PLAYWRIGHT_BROWSERS_PATH": "where Playwright has put a Chromium",
     "DATABASE_URL": "the PostgreSQL of tests.on_postgres",
     "HYPOTHESIS_STORAGE_DIRECTORY": "where examples that failed are kept",
+    VAR: "where the database lies that `--reuse-db` finds again",
 }
 FIXED = {"LC_ALL": "C.UTF-8", "TZ": "UTC", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 STARTED = "ARENA_TESTS_HOME"
@@ -38,11 +40,11 @@ def fix_environment() -> None:
     }
     browsers = Path(os.environ.get("HOME", "/nonexistent")) / ".cache" / "ms-playwright"
     home = tempfile.mkdtemp(prefix="arena-tests-home-")
+    # In a folder of all runs the next one would take the database away from under this one.
+    own = {"HOME": home, "ARENA_VAR_DIR": kept.get(VAR, f"{home}/var"), STARTED: home}
     atexit.register(shutil.rmtree, home, ignore_errors=True)
     os.environ.clear()
-    os.environ.update(
-        {"PLAYWRIGHT_BROWSERS_PATH": str(browsers)} | kept | FIXED | {"HOME": home, STARTED: home}
-    )
+    os.environ.update({"PLAYWRIGHT_BROWSERS_PATH": str(browsers)} | kept | FIXED | own)
 
 
 fix_environment()

@@ -9,9 +9,8 @@ from django.contrib.auth.models import User
 from arena.models import Question, Study
 from arena.shell.forms import ChoiceForm, form_field, offer
 from arena.studies.queries import list_finished, scenario_sources
-from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import StudyEstimate, estimate_plan
-from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
+from arena.studies.services.plan import PLAN_INPUTS, SWITCHES, StudyPlan
 from augment.models import GenerationJob
 from augment.services import InputKind
 

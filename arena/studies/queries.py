@@ -10,24 +10,15 @@ from django.contrib.auth.models import User
 from django.db.models import Count, F, Q, QuerySet
 from django.utils import timezone
 
-from arena.models import (
-    Authorship,
-    Enrolment,
-    Invitation,
-    Matchup,
-    Report,
-    Study,
-    StudyDraft,
-    Vote,
-)
+from arena.models import Authorship, Enrolment, Invitation, Matchup, Report, Study, StudyDraft
 from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
 from arena.voting.queries.ballots import (
     ExpertTally,
     Voters,
     VotingProgress,
+    count_votes,
     list_voters,
-    of_skipped_pair,
     tallies,
 )
 from augment import models
@@ -88,26 +79,13 @@ class StudyProgress(VotingProgress):
 
 
 def count_progress(studies: Iterable[Study], expert: User | None = None) -> list[StudyProgress]:
-    """Count some studies in their order, over all experts or for one; two queries."""
+    """Count some studies in their order, over all experts or for one; three queries."""
     studies = list(studies)
     matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
     if expert is not None:
         matchups = matchups.filter(expert=expert)
-    current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
-    totals = dict(matchups.order_by().values_list("study").annotate(n=Count("pk")))
-    answers = current.exclude(of_skipped_pair()).values_list("matchup__study", "question")
-    voted = {(study, question): n for study, question, n in answers.annotate(n=Count("pk"))}
-    skips = current.filter(outcome=Vote.Outcome.SKIP).values_list("matchup__study")
-    skipped = dict(skips.annotate(n=Count("pk")))
-    return [
-        StudyProgress(
-            study=study,
-            total=totals.get(study.pk, 0),
-            voted=voted.get((study.pk, study.questions[-1]), 0),
-            skipped=skipped.get(study.pk, 0),
-        )
-        for study in studies
-    ]
+    count = count_votes(matchups, by="study")
+    return [StudyProgress(study=one, **count(one.pk, one.questions)) for one in studies]
 
 
 def list_reports(study: Study) -> QuerySet[Report]:

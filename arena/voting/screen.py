@@ -127,10 +127,34 @@ def _alts() -> dict[str, str]:
     }
 
 
+def _urls(study: Study) -> dict[str, str]:
+    return {
+        "page": reverse("vote", args=[study.code]),
+        "votes": reverse("api-votes"),
+        "matchups": f"{reverse('api-matchups')}?study={study.code}",
+        "reports": reverse("api-reports"),
+        "preferences": reverse("api-preferences"),
+    }
+
+
 def _list_choices(keys: Collection[str]) -> dict[str, Any]:
     """Return the buttons of the tools and of the panels that they open."""
+    tools = {
+        "why": _("What is wrong"),
+        "skip": _("Skip"),
+        "report": _("Report"),
+        "comment": _("Comment"),
+    }
+    looks = {
+        "ruler": _("Ruler"),
+        "blink": _("Blink"),
+        "difference": pgettext("a way to look", "Differ"),
+        "replay": _("Drives"),
+        "rings": _("Rings"),
+        "legend": _("Legend"),
+    }
     return {
-        "tools": [(name, label) for name, label in _tools().items() if name in keys],
+        "tools": [(name, label) for name, label in tools.items() if name in keys],
         "fault_classes": [
             ("position", _("Position")),
             ("heading", pgettext("of an object", "Heading")),
@@ -139,7 +163,7 @@ def _list_choices(keys: Collection[str]) -> dict[str, Any]:
         "skip_reasons": Vote.SkipReason.choices,
         "report_reasons": Report.Reason.choices,
         "report_sides": [(name, side.label) for name, side in SIDES.items()],
-        "looks": [(name, label) for name, label in _looks().items() if name in keys],
+        "looks": [(name, label) for name, label in looks.items() if name in keys],
     }
 
 
@@ -200,33 +224,3 @@ def _list_faults(vote: Vote) -> list[dict[str, Any]]:
         for place, mark in enumerate(marks)
     }
     return [places[side, name] | {"fault": fault} for side, name, fault in vote.faults]
-
-
-def _urls(study: Study) -> dict[str, str]:
-    return {
-        "page": reverse("vote", args=[study.code]),
-        "votes": reverse("api-votes"),
-        "matchups": f"{reverse('api-matchups')}?study={study.code}",
-        "reports": reverse("api-reports"),
-        "preferences": reverse("api-preferences"),
-    }
-
-
-def _tools() -> dict[str, str]:
-    return {
-        "why": _("What is wrong"),
-        "skip": _("Skip"),
-        "report": _("Report"),
-        "comment": _("Comment"),
-    }
-
-
-def _looks() -> dict[str, str]:
-    return {
-        "ruler": _("Ruler"),
-        "blink": _("Blink"),
-        "difference": pgettext("a way to look", "Differ"),
-        "replay": _("Drives"),
-        "rings": _("Rings"),
-        "legend": _("Legend"),
-    }

@@ -10,6 +10,7 @@ from django.conf import settings
 from playwright.sync_api import Browser, expect
 from pytest_django.live_server_helper import LiveServer
 
+from arena.models import Study
 from tests.browser.booth import Booth, furnish
 from tests.browser.chromium import PATIENCE_MS, chromium
 
@@ -35,7 +36,14 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def booth(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
-    made = Booth(address=live_server.url, browser=browser, study=furnish())
+def bare_booth(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
+    """A booth whose study the test brings, or that visits other pages."""
+    made = Booth(address=live_server.url, browser=browser, study=Study())
     yield made
     made.leave()
+
+
+@pytest.fixture
+def booth(bare_booth: Booth) -> Booth:
+    bare_booth.study = furnish()
+    return bare_booth

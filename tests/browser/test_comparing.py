@@ -1,10 +1,7 @@
 """X holds B in the place of A, V shows what only one of them has, a zoomed picture has a scale."""
 
-from collections.abc import Iterator
-
 import pytest
-from playwright.sync_api import Browser, expect
-from pytest_django.live_server_helper import LiveServer
+from playwright.sync_api import expect
 
 from augment.models import Augmentation
 from augment.scene.entities import Modification
@@ -31,7 +28,7 @@ MARKED = """() => {
 
 
 @pytest.fixture
-def drawn(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
+def drawn(bare_booth: Booth) -> Booth:
     """A booth with drawn pictures: every contestant has put a car in another place."""
     study = a_study(scenarios=3, votes_per_expert=3, experts=("eva",))
     places = {slug: 8.0 + 6.0 * n for n, slug in enumerate(("ann", "bob", "cid"))}
@@ -42,9 +39,8 @@ def drawn(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
         hang(row, draw_picture(loaded, Modification(added=(car,)), camera))
         unchanged = draw_picture(loaded, Modification(), camera)
         row.scenario.matchups.update(original_image=unchanged)
-    made = Booth(address=live_server.url, browser=browser, study=study)
-    yield made
-    made.leave()
+    bare_booth.study = study
+    return bare_booth
 
 
 def test_x_holds_b_in_the_place_of_a_and_v_marks_what_differs(drawn: Booth) -> None:

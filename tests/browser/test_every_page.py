@@ -4,10 +4,8 @@ from collections.abc import Callable
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Route
-from pytest_django.live_server_helper import LiveServer
+from playwright.sync_api import BrowserContext, ConsoleMessage, Page, Route
 
-from arena.models import Study
 from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import faults
 from tests.web.every_page import ShownPage, pages_of_a_rated_study, pages_of_an_open_study
@@ -24,15 +22,14 @@ TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clie
 
 @pytest.mark.parametrize("pages", [pages_of_an_open_study, pages_of_a_rated_study])
 def test_axe_finds_nothing_and_nothing_is_wider_than_a_phone(
-    live_server: LiveServer, browser: Browser, pages: Callable[[], list[ShownPage]]
+    bare_booth: Booth, pages: Callable[[], list[ShownPage]]
 ) -> None:
     shown = pages()
     wrong: dict[str, list[str]] = {}
-    booth = Booth(address=live_server.url, browser=browser, study=Study())
     by_user: dict[str, BrowserContext] = {}
     for one in shown:
         told: list[ConsoleMessage] = []
-        page = _tab(booth, by_user, one, told)
+        page = _tab(bare_booth, by_user, one, told)
         found = faults(page) + [line.text for line in told if "Permissions-Policy" in line.text]
         page.set_viewport_size(PHONE)
         if beyond := page.evaluate(TOO_WIDE):
@@ -42,7 +39,6 @@ def test_axe_finds_nothing_and_nothing_is_wider_than_a_phone(
         if found:
             wrong[f"{one.name} for {one.user.username}"] = found
         page.close()
-    booth.leave()
     assert not wrong, "\n".join(f"{name}: {found}" for name, found in wrong.items())
 
 

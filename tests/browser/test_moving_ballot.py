@@ -1,11 +1,8 @@
 """Pairs that move are voted on by keys alone: both sides in step, within 300 kB."""
 
-from collections.abc import Iterator
-
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Browser, Page, Response, expect
-from pytest_django.live_server_helper import LiveServer
+from playwright.sync_api import Page, Response, expect
 
 from augment.models import Augmentation
 from tests.browser.booth import Booth, press, ready
@@ -47,19 +44,15 @@ CUT = """() => [...document.querySelectorAll(".vote .button")].filter(
 
 
 @pytest.fixture
-def moving(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
-    study = a_moving_study(scenarios=3, votes=9)
-    made = Booth(address=live_server.url, browser=browser, study=study)
-    yield made
-    made.leave()
+def moving(bare_booth: Booth) -> Booth:
+    bare_booth.study = a_moving_study(scenarios=3, votes=9)
+    return bare_booth
 
 
 @pytest.mark.slow
-def test_thirty_moving_pairs_are_voted_on_by_keys(
-    live_server: LiveServer, browser: Browser
-) -> None:
-    study = a_moving_study(scenarios=10, votes=30)
-    booth = Booth(address=live_server.url, browser=browser, study=study)
+def test_thirty_moving_pairs_are_voted_on_by_keys(bare_booth: Booth) -> None:
+    booth = bare_booth
+    booth.study = a_moving_study(scenarios=10, votes=30)
     page = booth.visit("eva", "/", {})
     sizes: dict[str, int] = {}
 
@@ -80,7 +73,6 @@ def test_thirty_moving_pairs_are_voted_on_by_keys(
     # Each pair has two pictures with films, what these play over, and the scene before.
     assert len(sizes) == 30 * 6
     assert sum(sizes.values()) / 30 <= MOST_BYTES
-    booth.leave()
 
 
 def test_both_sides_move_in_step_by_keys_and_by_the_range(moving: Booth) -> None:

@@ -1,10 +1,7 @@
 """D plays how a planner drove both scenes, under their pictures, and the vote says so."""
 
-from collections.abc import Iterator
-
 import pytest
-from playwright.sync_api import Browser, Page, expect
-from pytest_django.live_server_helper import LiveServer
+from playwright.sync_api import Page, expect
 
 from tests.browser.booth import Booth, all_sent, hang, press
 from tests.web.test_replay import a_replayed_study
@@ -13,12 +10,10 @@ pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
 
 @pytest.fixture
-def played(live_server: LiveServer, browser: Browser) -> Iterator[Booth]:
+def played(bare_booth: Booth) -> Booth:
     """A booth whose study plays drives."""
-    study = hang(a_replayed_study(experts=("eva",)))
-    made = Booth(address=live_server.url, browser=browser, study=study)
-    yield made
-    made.leave()
+    bare_booth.study = hang(a_replayed_study(experts=("eva",)))
+    return bare_booth
 
 
 def picture(page: Page, number: int) -> str:

@@ -1,13 +1,14 @@
 """Votes are cast as fast as a person can and kept once, whatever the network does."""
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 from pytest_django import Settings
-from pytest_django.live_server_helper import LiveServer
 
 from arena.models import Vote
+from arena.voting import screen
 from tests import study_rows
-from tests.browser.booth import BOUNCE_MS, Booth, all_sent, furnish, press, ready
+from tests.browser.booth import BOUNCE_MS, Booth, all_sent, furnish, let_bounce, press, ready
+from tests.browser.test_voting_page import faults
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
@@ -16,10 +17,11 @@ ANSWERS = {"1": "left", "2": "equal", "3": "right"}
 
 @pytest.mark.slow
 def test_fifty_votes_with_the_network_cut_twice_are_fifty_rows(
-    live_server: LiveServer, browser: Browser, settings: Settings
+    bare_booth: Booth, settings: Settings
 ) -> None:
     settings.VOTES_PER_S = 100  # nobody holds the test back
-    booth = Booth(address=live_server.url, browser=browser, study=furnish(scenarios=20, votes=50))
+    booth = bare_booth
+    booth.study = furnish(scenarios=20, votes=50)
     page = booth.enter()
     given = []
     for number in range(50):
@@ -43,7 +45,6 @@ def test_fifty_votes_with_the_network_cut_twice_are_fifty_rows(
     assert Vote.objects.count() == 50
     assert booth.outcomes() == given
     assert len({vote.matchup_id for vote in booth.votes()}) == 50
-    booth.leave()
 
 
 def test_a_held_key_is_one_vote(booth: Booth) -> None:
@@ -117,3 +118,46 @@ def test_the_first_vote_counts_where_the_pair_was_decided_elsewhere(booth: Booth
     press(page, "1")
     expect(page.locator("#note")).to_contain_text("your first vote counts: B.")
     assert booth.outcomes() == ["right"]
+
+
+def test_a_skip_moves_no_bar_and_its_pair_comes_back_from_the_list(booth: Booth) -> None:
+    page = booth.enter(bypass_csp=True)
+    press(page, "1")
+    page.keyboard.press("s")
+    page.keyboard.press("3")
+    expect(page.locator("#skipped")).to_have_text("Skipped: 1")
+    all_sent(page, 1)
+    assert page.locator("#bar").evaluate("bar => bar.value") == 1
+    page.locator("#skipped").click()
+    expect(page.get_by_role("heading", name="Skipped pairs")).to_be_visible()
+    assert faults(page) == []
+    page.get_by_role("link", name="Open pair 2 again").click()
+    expect(page.locator("#question")).to_have_text("Pair 2: skipped. Choose now?")
+    ready(page)
+    page.keyboard.press("3")
+    all_sent(page, 2)
+    expect(page.locator("#skipped")).to_be_hidden()
+    expect(page.locator("#place")).to_have_text("3")
+    assert booth.outcomes() == ["left", "right"]
+
+
+def test_a_pair_skipped_long_ago_is_asked_about_once(
+    booth: Booth, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(screen, "UNDOABLE", 1)  # the skip is none of the last votes
+    page = booth.enter(bypass_csp=True)
+    page.keyboard.press("s")
+    page.keyboard.press("3")
+    expect(page.locator("#skipped")).to_have_text("Skipped: 1")
+    let_bounce(page)
+    for _ in range(2):
+        press(page, "1")
+    all_sent(page, 2)
+    page.locator("#skipped").click()
+    page.get_by_role("link", name="Open pair 1 again").click()
+    ready(page)
+    page.keyboard.press("3")
+    all_sent(page, 3)
+    expect(page.locator("#skipped")).to_be_hidden()
+    expect(page.locator("#place")).to_have_text("4")
+    assert sorted(booth.outcomes()) == ["left", "left", "right"]

@@ -5,8 +5,7 @@ from typing import Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from django.conf import settings
-from playwright.sync_api import Browser, Page, ViewportSize, expect
-from pytest_django.live_server_helper import LiveServer
+from playwright.sync_api import Page, ViewportSize, expect
 
 from arena.studies.services.opening import close_study
 from arena.voting.screen import LONGEST
@@ -62,17 +61,16 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
 
 @pytest.mark.parametrize("films", [0, 2])
 def test_over_the_catalogue_everything_fits_and_nothing_moves(
-    live_server: LiveServer, browser: Browser, films: int
+    bare_booth: Booth, films: int
 ) -> None:
     # The longest instructions alone settle how high the text is.
-    study = (a_moving_study if films else furnish)(scenarios=LONGEST, votes=9)
-    booth = Booth(address=live_server.url, browser=browser, study=study)
+    bare_booth.study = (a_moving_study if films else furnish)(scenarios=LONGEST, votes=9)
     entries = read_catalogue(settings.BASE_DIR / "fixtures")[1]
     texts = sorted((entry.instruction for entry in entries), key=len, reverse=True)
-    for scenario, text in zip(study.scenarios.all(), texts, strict=False):
+    for scenario, text in zip(bare_booth.study.scenarios.all(), texts, strict=False):
         scenario.instruction = text
         scenario.save()
-    page = booth.enter()
+    page = bare_booth.enter()
     places: dict[tuple[int, int], list[Any]] = {size: [] for size in SIZES}
     for number in range(4):
         expect(page.locator(".film-bar:visible")).to_have_count(films // 2)
@@ -89,7 +87,6 @@ def test_over_the_catalogue_everything_fits_and_nothing_moves(
             press(page, "1")
     for size, boxes in places.items():
         assert boxes == [boxes[0]] * 4, size
-    booth.leave()
 
 
 def _fits(page: Page) -> None:

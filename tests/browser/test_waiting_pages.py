@@ -1,16 +1,14 @@
 """Pages that wait for workers show themselves anew and lose nothing of what is done on them."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Page, Route, expect
 from pytest_django import Settings
-from pytest_django.live_server_helper import LiveServer
 
-from arena.models import BenchmarkFile, Study
+from arena.models import BenchmarkFile
 from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from augment.models import BaseScene, SceneUpload
 from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
@@ -27,13 +25,11 @@ SLOW_S = 2
 
 
 @pytest.fixture
-def scenes_page(live_server: LiveServer, browser: Browser) -> Iterator[Page]:
+def scenes_page(bare_booth: Booth) -> Page:
     """A page that waits for the picture of its only scene."""
     people()
     add_scenario("street", scene=scene(), reference=None)
-    booth = Booth(address=live_server.url, browser=browser, study=Study())
-    yield booth.visit("the-researcher", reverse("scenes"), {})
-    booth.leave()
+    return bare_booth.visit("the-researcher", reverse("scenes"), {})
 
 
 def _after_a_while(route: Route) -> None:

@@ -116,6 +116,7 @@ def _run_here(root: Path, arguments: Sequence[str], said: Path) -> None:
     sys.path[:] = [str(root), *(path for path in sys.path if path not in ("", str(ROOT)))]
     sys.dont_write_bytecode = False
     os.chdir(root)
+    os.environ["ARENA_TESTS_VAR"] = str(root / "var")
     with said.open("wb") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)

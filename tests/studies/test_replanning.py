@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from arena.errors import NotYours
-from arena.models import Study
+from arena.models import Matchup, Study
 from arena.pairing.order import MAIN
 from arena.studies.services.taking_part import hand_over
 from arena.voting.services.reports import Complaint, report
@@ -94,3 +94,21 @@ def test_a_hand_over_that_makes_no_sense_is_refused(
     with pytest.raises(error, match=sentence):
         hand_over(study=study, username=giver, to=to)
     assert study.matchups.count() == 18
+
+
+@pytest.mark.parametrize("is_vote", [True, False])
+def test_a_pair_whose_repeat_was_judged_is_not_handed_over(is_vote: bool) -> None:
+    study = open_study(name="Round 1", votes_per_expert=8, seed=7, repeats=25, **cast_of())
+    repeat, other = (row for row in matchups_of(study, "eva") if row.kind == Matchup.Kind.REPEAT)
+    if is_vote:
+        vote(repeat)
+    else:
+        report(
+            expert=repeat.expert,
+            complaint=Complaint(key=uuid.uuid4(), matchup=repeat.code, reason="other"),
+        )
+    taken = hand_over(study=study, username="eva", to=["finn"])
+    kept = {row.pk for row in matchups_of(study, "eva")}
+    assert kept == {repeat.pk, repeat.repeat_of_id}
+    assert taken == {"finn": 7}, "all eight but the one that stays"
+    assert not Matchup.objects.filter(pk__in=[other.pk, other.repeat_of_id]).exists()

@@ -8,7 +8,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import Study
-from arena.voting.services.shown_pictures import draw_sample
+from arena.voting.services.pictures import draw_sample
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.opening import open_study

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from tests.study_rows import a_study, matchups_of
 
 pytestmark = pytest.mark.django_db(transaction=True)
 
-SHORT_S = 0.2
+SHORT_S, FULL = 0.2, 2
 only_sqlite = pytest.mark.sqlite
 """PostgreSQL lets votes on different pairs pass by."""
 
@@ -139,3 +140,20 @@ def test_every_connection_of_a_web_server_waits_no_longer_than_a_vote(tmp_path: 
         check=True,
     ).stdout
     assert said == "5000\n"
+
+
+@only_sqlite  # PostgreSQL writes its log through by itself
+def test_every_connection_writes_through() -> None:
+    """A vote that was confirmed survives a power cut."""
+
+    def pragma() -> int:
+        try:
+            with connection.cursor() as cursor:
+                cursor.execute("PRAGMA synchronous")
+                return int(cursor.fetchone()[0])
+        finally:
+            connection.close()
+
+    # Web threads, workers and commands all open theirs by the same settings.
+    with ThreadPoolExecutor(2) as pool:
+        assert [pragma(), *pool.map(lambda _: pragma(), range(2))] == [FULL] * 3

@@ -10,14 +10,19 @@ from django.db import transaction
 
 from arena.models import Study, StudyDraft
 from arena.studies.services.opening import open_study
-from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, read_opened_plan
+from arena.studies.services.plan import (
+    LONGEST_NAME,
+    PLAN_INPUTS,
+    SWITCHES,
+    StudyPlan,
+    read_opened_plan,
+)
 from augment.errors import Conflict
 from augment.services import InputKind, log_change, make_storable
 
 Entered = dict[str, str | bool | list[str]]
 """Every field of the form: a text as it was typed, a switch, or names."""
 
-SWITCHES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.SWITCH)
 NAMES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.NAMES)
 
 

@@ -24,10 +24,10 @@ from arena.pairing.rules import ATTENTION_CHECKS, MOST_CHECKS, Triple, check_sha
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.vote_columns import VERSION as VOTES_VERSION
-from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
+from arena.studies.services.plan import SWITCH_COLUMNS, SWITCH_RULES, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
-from arena.voting.services import shown_pictures
-from arena.voting.services.pictures import Cells, check_pictures, require_checks
+from arena.voting.services import pictures
+from arena.voting.services.pictures import Cells
 from arena.voting.services.practice import OF_LINKS, has_practice
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
@@ -79,7 +79,7 @@ def open_study(
     accounts = {user.username: user for user in expert_accounts()}
     experts = find_named("expert", study_plan.experts, accounts)
     has_simulated = _check_simulated(study_plan, contestants, experts)
-    shown = shown_pictures.choose_pictures(
+    shown = pictures.choose_pictures(
         contestants,
         scenarios,
         seed=study_plan.seed,
@@ -95,7 +95,7 @@ def open_study(
     cells = broken | shown.cells
     frozen = _frozen(study_plan, rules, planned, shown, alike_shown)
     if study_plan.allow_replay:
-        frozen["replays"] = shown_pictures.replay_settings(cells)
+        frozen["replays"] = pictures.replay_settings(cells)
     study = _insert(name, frozen, study_plan, rules, has_simulated)
     study.contestants.set(contestants)
     study.scenarios.set(scenarios)
@@ -186,9 +186,9 @@ def _rules(
     checks: tuple[Check, ...] = ()
     broken: Cells = {}
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
-        shows_all = study_plan.samples is shown_pictures.SampleRule.ALL
-        checks, broken = check_pictures(scenarios, shows_all=shows_all)
-        require_checks(checks, wanted=wanted)
+        shows_all = study_plan.samples is pictures.SampleRule.ALL
+        checks, broken = pictures.check_pictures(scenarios, shows_all=shows_all)
+        pictures.require_checks(checks, wanted=wanted)
     alike = [
         triple
         for triple in (() if study_plan.show_alike else alike_pairs(cells))
@@ -212,7 +212,7 @@ def _frozen(
     study_plan: StudyPlan,
     rules: PlanRules,
     planned: MatchupPlan,
-    shown: shown_pictures.StudyPictures,
+    shown: pictures.StudyPictures,
     alike_shown: list[Triple],
 ) -> dict[str, Any]:
     """Return everything that the plan came from, and what it had to give up."""
@@ -227,11 +227,7 @@ def _frozen(
         "alike_within": ALIKE,
         "windows": "pair",
         # Kept where it departs from the default, so that the settings can be used again.
-        **{
-            name: True
-            for name in ("show_alike", "hide_rings", "show_ticks")
-            if getattr(study_plan, name)
-        },
+        **{name: True for name in SWITCH_RULES if getattr(study_plan, name)},
         "hypotheses": [asdict(hypothesis) for hypothesis in hypotheses],
         "samples": study_plan.samples.value,
         "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],

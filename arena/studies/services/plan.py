@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 from arena.errors import NothingToPlan
 from arena.models import Question, Snapshot, Study
 from arena.pairing.rules import MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
-from arena.voting.services.shown_pictures import SampleRule
+from arena.voting.services.pictures import SampleRule
 from augment.services import InputKind, input_field, to_inputs
 
 MOST = 100
@@ -268,13 +268,11 @@ QUANTITIES = ("votes_per_expert", "repeats", "checks", "overlap")
 """What decides how many pairs each expert sees."""
 SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
 """What the frozen rules call a percentage; they keep it as a share."""
-SWITCH_COLUMNS = tuple(
-    field.name
-    for field in PLAN_INPUTS
-    if field.kind is InputKind.SWITCH
-    and field.name in {column.name for column in Study._meta.fields}
-)
-"""Switches that a study keeps in a column of its own."""
+_COLUMNS = {column.name for column in Study._meta.fields}
+SWITCHES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.SWITCH)
+SWITCH_COLUMNS = tuple(name for name in SWITCHES if name in _COLUMNS)
+"""Switches that a study keeps in a column of its own; the others are among its rules."""
+SWITCH_RULES = tuple(name for name in SWITCHES if name not in _COLUMNS)
 
 
 class Preset(NamedTuple):
@@ -326,9 +324,7 @@ def read_opened_plan(study: Study) -> StudyPlan:
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
         questions=tuple(study.questions),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),
-        show_alike=bool(rules.get("show_alike")),
-        hide_rings=bool(rules.get("hide_rings")),
-        show_ticks=bool(rules.get("show_ticks")),
+        **{name: bool(rules.get(name)) for name in SWITCH_RULES},
         **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
         **{name: getattr(study, name) for name in SWITCH_COLUMNS},
     )

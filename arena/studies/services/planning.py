@@ -17,12 +17,14 @@ from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, sample_place, scenario_at
 from arena.voting.services.pictures import (
     Cells,
+    Showing,
     check_pictures,
     find_showable,
+    find_sides,
+    frames_shown,
     with_picture,
     without_lost_checks,
 )
-from arena.voting.services.shown_pictures import Showing, find_sides, frames_shown
 from augment.models import Augmentation
 from augment.services.scenarios import camera_key
 

@@ -1,5 +1,6 @@
 """Past and next ballots of an expert. Nobody sees somebody else's."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import takewhile
@@ -47,12 +48,9 @@ class VotingProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExpertTally(VotingProgress):
-    """The progress of one expert of a study, and how the votes are spread."""
+    """The progress of one expert of a study."""
 
     expert: User
-    left_wins: int
-    ties: int
-    right_wins: int
 
 
 def require_open(study: Study) -> None:
@@ -231,31 +229,32 @@ WHERE study.id = %(study)s
 """
 
 
+def count_votes(
+    matchups: QuerySet[Matchup], by: str
+) -> Callable[[int, Sequence[str]], dict[str, int]]:
+    """Count matchups, and those with a vote or skipped, by their study or expert; three queries.
+
+    Returns:
+        From a key and the questions that are asked the values of a VotingProgress.
+    """
+    current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
+    totals = dict(matchups.order_by().values_list(by).annotate(n=Count("pk")))
+    answers = current.exclude(of_skipped_pair()).values_list(f"matchup__{by}", "question")
+    voted = {(key, question): n for key, question, n in answers.annotate(n=Count("pk"))}
+    skips = current.filter(outcome=Vote.Outcome.SKIP).values_list(f"matchup__{by}")
+    skipped = dict(skips.annotate(n=Count("pk")))
+    return lambda key, questions: {
+        "total": totals.get(key, 0),
+        "voted": voted.get((key, questions[-1]), 0),
+        "skipped": skipped.get(key, 0),
+    }
+
+
 def tallies(study: Study) -> list[ExpertTally]:
-    """Return one line per expert of the study, by pseudonym; votes are those that end a pair."""
-    totals = Matchup.objects.filter(study=study).order_by().values_list("expert")
-    total_of = dict(totals.annotate(n=Count("pk")))
-    outcomes = ("left", "equal", "right", "skip")
-    counts = {name: Count("pk", filter=Q(outcome=name)) for name in outcomes}
-    is_end = Q(question=study.questions[-1]) & ~of_skipped_pair()
-    ends = current_votes(study).filter(is_end | Q(outcome=Vote.Outcome.SKIP))
-    votes = ends.order_by().values_list("expert").annotate(**counts)
-    counts_of = {expert: numbers for expert, *numbers in votes}
-    lines = []
-    for expert in by_pseudonym(study.experts.select_related("person")):
-        left_wins, ties, right_wins, skipped = counts_of.get(expert.pk, (0, 0, 0, 0))
-        lines.append(
-            ExpertTally(
-                expert=expert,
-                total=total_of.get(expert.pk, 0),
-                voted=left_wins + ties + right_wins,
-                skipped=skipped,
-                left_wins=left_wins,
-                ties=ties,
-                right_wins=right_wins,
-            )
-        )
-    return lines
+    """Return one line per expert of the study, by pseudonym."""
+    count = count_votes(study.matchups.all(), by="expert")
+    experts = by_pseudonym(study.experts.select_related("person"))
+    return [ExpertTally(expert=one, **count(one.pk, study.questions)) for one in experts]
 
 
 Voters = QuerySet[Any]
