@@ -1,7 +1,7 @@
 """Distance of stored augmentations to their wishes, and displacement from their references."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from enum import StrEnum
