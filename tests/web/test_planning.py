@@ -27,7 +27,7 @@ def test_the_form_says_what_its_votes_will_tell_and_a_preset_changes_them() -> N
     assert f"±{prospect(estimate).half_width:.0f} Elo" in shown
     pressed = text_of(admin.post(reverse("study-new"), {**sent, "preset": "pilot"}))
     preset = PRESETS["pilot"].quantities
-    votes = preset["votes_per_expert"]
+    votes = int(preset["votes_per_expert"])
     pilot = replace(estimate, votes_per_expert=votes, overlap=preset["overlap"])
     assert f"{2 * votes} votes {votes} from each of 2 experts" in pressed
     assert f"±{prospect(pilot).half_width:.0f} Elo" in pressed
