@@ -15,7 +15,7 @@ from itertools import groupby, product
 import numpy as np
 
 from arena.rating.board_table import anchor_lines
-from arena.rating.comparisons import select_votes, t_quantile
+from arena.rating.comparisons import select_votes
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.side import side_bias
 from arena.rating.verdict import verdict
@@ -28,7 +28,6 @@ PAPER = World(ratings=paper_ratings(), votes_per_expert=200)
 EQUALS = replace(PAPER, ratings=np.full(9, 1000.0), votes_per_expert=100)
 CLAIMS = (" better ", " worse ", "The order")
 NEWCOMERS = 3
-BEFORE, AFTER = "experts alike", "experts as they count"
 
 Measured = Mapping[str, float]
 
@@ -78,25 +77,23 @@ def board_worlds() -> list[World]:
 def measure_boards(world: World, studies: int) -> Measured:
     """Return how often intervals hold the truth around the founders' mean, by who it is.
 
-    A third of the votes with a newcomer are cast; for newcomers also how often the intervals
-    around everybody's mean do, as boards showed them before.
+    A third of the votes with a newcomer are cast.
     """
     names = [f"c{number}" for number in range(len(world.ratings))]
     founders = names[:-NEWCOMERS]
     points = world.truth()
     truth = dict(zip(names, points - points[:-NEWCOMERS].mean() + 1000.0, strict=True))
-    held: dict[str, list[bool]] = {"founders": [], "newcomers": [], "newcomers, before": []}
+    held: dict[str, list[bool]] = {"founders": [], "newcomers": []}
     for seed in range(studies):
         rng = np.random.default_rng(seed)
         votes = world.votes(rng)
         is_old = np.maximum(votes.first, votes.second) < len(founders)
         votes = select_votes(votes, is_old | (rng.random(len(votes)) < 1 / 3))
-        for around, before in ((founders, ""), ((), ", before")):
-            board = rate(votes, rounds=ROUNDS, founders=around)
-            for line in anchor_lines(board.lines, founders):
-                who = ("founders" if line.name in founders else "newcomers") + before
-                if who in held and line.lower is not None and line.upper is not None:
-                    held[who].append(line.lower <= truth[line.name] <= line.upper)
+        board = rate(votes, rounds=ROUNDS, founders=founders)
+        for line in anchor_lines(board.lines, founders):
+            who = "founders" if line.name in founders else "newcomers"
+            if line.lower is not None and line.upper is not None:
+                held[who].append(line.lower <= truth[line.name] <= line.upper)
     return {who: float(np.mean(inside)) for who, inside in held.items()}
 
 
@@ -111,21 +108,13 @@ def side_worlds() -> list[World]:
 
 
 def measure_sides(world: World, studies: int) -> Measured:
-    """Return how often the interval of the left side's advantage holds the truth.
-
-    Before, it was by the spread of experts and Student's t, as if all had as many votes.
-    """
-    truth = world.truth_of_side()
-    held: dict[str, list[bool]] = {BEFORE: [], AFTER: []}
+    """Return how often the interval of the left side's advantage holds the truth."""
+    truth, held = world.truth_of_side(), list[bool]()
     for seed in range(studies):
-        found = side_bias(world.votes(np.random.default_rng(seed)))
-        value, lower, upper = found.advantage.value, found.advantage.lower, found.advantage.upper
-        if value is None or lower is None or upper is None or found.standard_error is None:
-            continue
-        half = float(t_quantile(found.clusters - 1)) * found.standard_error
-        held[BEFORE].append(abs(value - truth) <= half)
-        held[AFTER].append(lower <= truth <= upper)
-    return {way: float(np.mean(inside)) for way, inside in held.items()}
+        advantage = side_bias(world.votes(np.random.default_rng(seed))).advantage
+        if advantage.lower is not None and advantage.upper is not None:
+            held.append(advantage.lower <= truth <= advantage.upper)
+    return {"advantage": float(np.mean(held))}
 
 
 def spread_text(shares: Iterable[float]) -> str:
@@ -174,8 +163,8 @@ def report(studies: int) -> str:
         [
             f"{studies} simulated studies a world; {form} of the worlds.",
             table(["nine equals", "worlds", "sentence"], sentence),
-            table(["board", "worlds", "founders", "newcomers", "newcomers, before"], boards),
-            table(["left side", "worlds", f"{BEFORE}, before", AFTER], sides),
+            table(["board", "worlds", "founders", "newcomers"], boards),
+            table(["left side", "worlds", "advantage"], sides),
         ]
     )
 

@@ -12,7 +12,6 @@ import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
@@ -28,12 +27,12 @@ from arena.rating.rules import Unit
 from arena.rating.sandwich import estimate_spread, pulls_of_model
 from arena.rating.snapshot_document import PanelRater
 from bench.odd_worlds import ODD_WORLDS, OddWorld
+from bench.report import ROOT, table, write_block
 from bench.worlds import World, paper_ratings
 
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
 """Points by which scenarios, and experts, differ about a contestant."""
 ROUNDS = 500
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "rating.md"
 DEFAULT, CLOSED, SINGLE = METHODS = "bootstrap, default", "closed form", "single votes"
 
 
@@ -126,9 +125,12 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
         found.held[method].append(np.abs(rating - truth) <= half_width)
 
 
-def lines(studies: int) -> Iterator[str]:
-    """Yield the table of worlds: per plan and effects the lowest and highest of its worlds."""
-    yield from _head("plan", "scenario / expert", "experts", *METHODS, "told apart, at most")
+Rows = Iterator[list[str]]
+
+
+def rows_of_worlds(studies: int) -> Rows:
+    """Yield per plan and effects the lowest and highest of its worlds."""
+    yield ["plan", "scenario / expert", "experts", *METHODS, "told apart, at most"]
     groups: dict[tuple[str, float, float], list[World]] = {}
     for plan, world in worlds():
         groups.setdefault((plan, world.scenario_sd, world.expert_sd), []).append(world)
@@ -139,28 +141,26 @@ def lines(studies: int) -> Iterator[str]:
             if min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE:
                 equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
                 false.append(study(equal, studies=studies, judge=True).false)
-        cells = (
+        yield [
             plan,
             f"{scenario_sd:.0f} / {expert_sd:.0f}",
             _range([world.experts for world in members], "d"),
             *(_range([one.coverage(method) for one in found], ".1%") for method in METHODS),
             f"{max(false):.1%}" if false else "",
-        )
-        yield "| " + " | ".join(cells) + " |"
+        ]
 
 
-def odd_lines(studies: int) -> Iterator[str]:
-    """Yield the table of worlds that break assumptions; a controversial contestant by itself."""
-    yield from _head("world", *METHODS, "width / closed form")
+def rows_of_odd_worlds(studies: int) -> Rows:
+    """Yield worlds that break assumptions; a controversial contestant by itself."""
+    yield ["world", *METHODS, "width / closed form"]
     for name, world in ODD_WORLDS.items():
         found = study(world, studies=studies)
-        cells = [name, *(f"{found.coverage(method):.1%}" for method in METHODS)]
-        yield "| " + " | ".join((*cells, f"{np.median(found.widths):.2f}")) + " |"
+        cells = [f"{found.coverage(method):.1%}" for method in METHODS]
+        yield [name, *cells, f"{np.median(found.widths):.2f}"]
         for contestant in world.controversial:
             alone = slice(contestant, contestant + 1)
-            cells = ["– this contestant alone"]
-            cells += [f"{found.coverage(method, alone):.1%}" for method in METHODS]
-            yield "| " + " | ".join((*cells, "")) + " |"
+            cells = [f"{found.coverage(method, alone):.1%}" for method in METHODS]
+            yield ["– this contestant alone", *cells, ""]
 
 
 # --- Judgements of experts -----------------------------------------------------------------------
@@ -169,26 +169,20 @@ KINDS = ("honest", "coin", "always equal", "alternating", "reversed", "always le
 PANEL = World(ratings=paper_ratings(), scenario_sd=100.0, expert_sd=40.0)
 
 
-def rater_lines(studies: int) -> Iterator[str]:
-    """Yield how often an expert of each kind is looked at, and called reliable: before, now."""
-    yield from _head("checks", "votes", *KINDS)
+def rows_of_raters(studies: int) -> Rows:
+    """Yield how often an expert of each kind is looked at, and called reliable."""
+    yield ["checks", "votes", *KINDS]
     for checks, votes in product((0.0, 0.05), (30, 100, 300)):
         world, cells = replace(PANEL, votes_per_expert=votes), []
         for kind in KINDS:
-            found = [
-                words for seed in range(studies) for words in _judge(world, kind, checks, seed)
-            ]
-            shares = [
-                float(np.mean([words[way] == word for words in found]))
-                for word in ("look here", "reliable")
-                for way in (0, 1)
-            ]
-            cells.append("{:.0%}, {:.0%}; {:.0%}, {:.0%}".format(*shares))
-        yield "| " + " | ".join((f"{checks:.0%}", str(votes), *cells)) + " |"
+            words = [word for seed in range(studies) for word in _judge(world, kind, checks, seed)]
+            shares = [words.count(word) / len(words) for word in ("look here", "reliable")]
+            cells.append("{:.0%}, {:.0%}".format(*shares))
+        yield [f"{checks:.0%}", str(votes), *cells]
 
 
-def _judge(world: World, kind: str, checks: float, seed: int) -> Iterator[tuple[str, str]]:
-    """Yield by the earlier rule and by today's, of all who are honest, or of expert 0."""
+def _judge(world: World, kind: str, checks: float, seed: int) -> Iterator[str]:
+    """Yield the word on everybody who is honest, or on expert 0 who is not."""
     rng = np.random.default_rng(seed)
     votes, repeated, again = world.with_repeats(rng, 0.05)
     score = votes.score.copy()
@@ -223,7 +217,7 @@ def _judge(world: World, kind: str, checks: float, seed: int) -> Iterator[tuple[
             repeats=repeats.by_expert.get(line.expert, (0, 0)),
             checks=(shown, passed),
         )
-        yield _judge_by_shares(rater), judge_rater(rater).reliability.value
+        yield judge_rater(rater).reliability.value
 
 
 def _careless(kind: str, number: int, rng: np.random.Generator) -> FloatArray:
@@ -235,70 +229,28 @@ def _careless(kind: str, number: int, rng: np.random.Generator) -> FloatArray:
     return np.full(number, TIE if kind == "always equal" else WIN)
 
 
-def _judge_by_shares(rater: PanelRater) -> str:
-    """The rule until November 2026: each raw share against a threshold of its own."""
-    (checks, passed), (repeats, alike) = rater.checks, rater.repeats
-    left, favourites, fast = rater.left, rater.favourites, rater.fast or 0.0
-    lower, upper = left.lower or 0.0, 1.0 if left.upper is None else left.upper
-    one_sided = 0.0 if left.value is None else max(left.value, 1.0 - left.value)
-    if (
-        (checks - passed > 1 and passed < 0.8 * checks)
-        or fast >= 0.25
-        or (repeats >= 5 and alike < 0.4 * repeats)
-        or (one_sided >= 0.7 and (lower > 0.5 or upper < 0.5))
-        or (favourites.upper is not None and favourites.upper < 0.5)
-    ):
-        return "look here"
-    if (
-        rater.votes < 20
-        or passed < checks
-        or fast >= 0.1
-        or (repeats >= 5 and alike < 0.6 * repeats)
-        or rater.ties >= 0.9
-        or (favourites.lower is not None and favourites.lower <= 0.5)
-    ):
-        return "uncertain"
-    is_good = checks or repeats >= 5 or favourites.value is not None
-    return "reliable" if is_good else "uncertain"
-
-
 def _range(values: Sequence[float], form: str) -> str:
     lowest, highest = format(min(values), form), format(max(values), form)
     return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
-def _head(*heads: str) -> Iterator[str]:
-    yield "| " + " | ".join(heads) + " |"
-    yield "|---" * len(heads) + "|"
+TABLES = {"worlds": rows_of_worlds, "odd": rows_of_odd_worlds, "raters": rows_of_raters}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("studies", type=int, nargs="?", default=400)
     parser.add_argument("--write", action="store_true", help="into docs/rating.md")
-    tables = {"worlds": lines, "odd": odd_lines, "raters": rater_lines}
-    parser.add_argument(
-        "--odd", action="store_const", dest="table", const="odd", help="odd worlds instead"
-    )
-    parser.add_argument(
-        "--raters",
-        action="store_const",
-        dest="table",
-        const="raters",
-        help="judgements of experts",
-    )
+    for name in ("odd", "raters"):
+        parser.add_argument(f"--{name}", action="store_const", dest="table", const=name)
     asked = parser.parse_args()
-    name = asked.table or "worlds"
-    printed = [f"{asked.studies} simulated studies a row.", ""]
-    for line in tables[name](asked.studies):
-        print(line, flush=True)
-        printed.append(line)
+    name, rows = asked.table or "worlds", list[list[str]]()
+    for row in TABLES[name](asked.studies):
+        print(*row, sep=" | ", flush=True)
+        rows.append(row)
     if asked.write:
-        # Read at the end: others may have written meanwhile.
-        before, rest = PAGE.read_text().split(f"<!-- {name} -->\n")
-        after = rest.partition(f"<!-- end of {name} -->")[2]
-        text = "\n".join([f"<!-- {name} -->", *printed, f"<!-- end of {name} -->"])
-        PAGE.write_text(before + text + after)
+        text = f"{asked.studies} simulated studies a row.\n\n{table(rows[0], rows[1:])}"
+        write_block(name, text, page=ROOT / "docs" / "rating.md")
 
 
 if __name__ == "__main__":

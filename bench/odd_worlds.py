@@ -14,18 +14,9 @@ import numpy as np
 from numpy.random import Generator
 from scipy.special import expit
 
-from arena.rating.comparisons import (
-    LOSS,
-    TIE,
-    WIN,
-    BoolArray,
-    Comparisons,
-    FloatArray,
-    IntArray,
-    PairCounts,
-)
-from arena.rating.models import ELO_PER_LOGIT, Meetings, fit, to_elo
-from bench.worlds import paper_ratings
+from arena.rating.comparisons import LOSS, TIE, WIN, BoolArray, Comparisons, FloatArray, IntArray
+from arena.rating.models import ELO_PER_LOGIT
+from bench.worlds import paper_ratings, rate_scores
 
 _DRAWN = 20_000
 """Experts on scenarios that the truth is the mean of."""
@@ -100,13 +91,7 @@ class OddWorld:
             scores[pair] = np.where(at_random, 0.5, score).mean()
         if not np.ptp(self.ratings) and not self.camps and not self.types:
             return np.full(size, 1000.0)
-        nobody = np.empty(0, dtype=np.int64)
-        outcomes = np.tile([1, 0, 0], (len(low), 1))
-        met = Meetings(
-            size,
-            PairCounts(low=low, high=high, outcomes=outcomes, pair_of=nobody, outcome_of=nobody),
-        )
-        return to_elo(fit(met, of_pairs[:, None], (of_pairs * scores)[:, None])[:, 0])
+        return rate_scores(size, of_pairs, scores)
 
     def votes(self, rng: Generator) -> Comparisons:
         """A study: experts and scenarios are new ones each time."""

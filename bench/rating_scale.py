@@ -16,7 +16,6 @@ import resource
 import statistics
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
 from dataclasses import dataclass
@@ -27,13 +26,10 @@ import numpy as np
 from arena.rating.comparisons import Comparisons, IntArray
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.models import ELO_PER_LOGIT
-from bench.report import load, table, write_section
+from bench.report import ROOT, load, table, write_section
 
-ROOT = Path(__file__).resolve().parents[1]
 HEADING = "Bootstrap and closed form, with many contestants"
 RESAMPLES_HEADING = "Intervals by resampled votes, beside others"
-EARLIER = "39907c1"
-"""A commit whose resamples were fast; its rating is taken out of the history."""
 REPEATS = 5
 TIES = 0.3
 WINNERS = ("model_a", "tie", "model_b")
@@ -95,7 +91,7 @@ before = time.process_time()
 rate(votes, unit=Unit.VOTE, rounds=1000)
 print(time.process_time() - before)
 """
-"""By the tree in which it runs; modules are loaded before."""
+"""Modules are loaded before."""
 CHOIX = """
 import sys, time
 import choix
@@ -161,41 +157,24 @@ def measure(crowd: Crowd, intervals: Intervals) -> dict[str, float]:
     }
 
 
-def earlier_tree(folder: Path) -> bool:
-    """Put the earlier rating into a folder; return whether the history has it."""
-    paths = ("arena/__init__.py", "arena/rating", "augment/__init__.py", "augment/sentences.py")
-    command = ["git", "archive", "-o", str(folder / "tree.tar"), EARLIER, *paths]
-    if subprocess.run(command, cwd=ROOT, check=False, stderr=subprocess.DEVNULL).returncode:
-        return False
-    with tarfile.open(folder / "tree.tar") as packed:
-        packed.extractall(folder, filter="data")
-    return True
-
-
 def measure_resamples() -> str:
     """The section on 1,000 vote resamples: rivals take turns, each in a process of its own."""
     before, rows = load(), []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        rivals = {"ours": (RATE, ROOT), "choix": (CHOIX, ROOT)}
-        if earlier_tree(folder):
-            rivals[EARLIER] = (RATE, folder)
+        rivals = {"ours": RATE, "choix": CHOIX}
         for crowd in RESAMPLED:
             votes = drawn(crowd)
             columns = ("first", "second", "score", "expert", "scenario")
             np.savez(folder / "votes.npz", **{one: getattr(votes, one) for one in columns})
             seconds: dict[str, list[float]] = {rival: [] for rival in rivals}
             for rival in list(rivals) * REPEATS:
-                script, tree = rivals[rival]
-                command = [sys.executable, "-c", script, str(folder / "votes.npz")]
-                ended = subprocess.run(command, cwd=tree, check=True, stdout=subprocess.PIPE)
+                command = [sys.executable, "-c", rivals[rival], str(folder / "votes.npz")]
+                ended = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
                 seconds[rival].append(float(ended.stdout))
             medians = {rival: statistics.median(took) for rival, took in seconds.items()}
             cells = [
-                f"{1e3 * medians[one]:,.1f} ms ({medians[one] / medians['ours']:.2f})"
-                if one in medians
-                else "not in this history"
-                for one in ("ours", "choix", EARLIER)
+                f"{1e3 * took:,.1f} ms ({took / medians['ours']:.2f})" for took in medians.values()
             ]
             rows.append([f"{crowd.votes:,}", str(crowd.contestants), *cells])
             print(rows[-1], flush=True)
@@ -205,7 +184,7 @@ def measure_resamples() -> str:
         f"median of {REPEATS} turns (and its ratio to ours), one thread; choix warm-started "
         f"on dense matrices; {before}."
     )
-    return "\n\n".join([said, table(["votes", "contestants", "ours", "choix", EARLIER], rows)])
+    return "\n\n".join([said, table(["votes", "contestants", "ours", "choix"], rows)])
 
 
 def save_csv(votes: Comparisons, path: Path) -> None:

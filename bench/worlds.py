@@ -73,8 +73,7 @@ class World:
         """
         win, loss, weights = self._chances_of_pairs(thresholds)
         scores = 0.5 * (1.0 + (1.0 - self.spammers) * (win - loss).mean(axis=0) @ weights)
-        met = Meetings(len(self.ratings), _one_game_a_pair(len(self.ratings)))
-        return to_elo(fit(met, np.ones((len(scores), 1)), scores[:, None])[:, 0])
+        return rate_scores(len(self.ratings), np.ones(len(scores)), scores)
 
     def truth_of_side(self) -> float:
         """What the left side would be worth by infinitely many votes."""
@@ -131,7 +130,7 @@ class World:
         spread = np.sqrt(variance_of_pairs)[:, None] / ELO_PER_LOGIT
         nodes, weights = np.polynomial.hermite_e.hermegauss(60)
         gaps = (strengths[low] - strengths[high])[:, None] + side / ELO_PER_LOGIT + spread * nodes
-        win, loss = _chances(gaps[None], thresholds[:, None, None])
+        win, loss = chances(gaps[None], thresholds[:, None, None])
         return win, loss, weights / weights.sum()
 
     def votes(self, rng: np.random.Generator) -> Comparisons:
@@ -217,7 +216,7 @@ class _Panel:
         seen = self.seen[scenario, expert]
         rows = np.arange(len(expert))
         gap = (seen[rows, first] - seen[rows, second] + self.side[expert]) / ELO_PER_LOGIT
-        win, loss = _chances(gap, self.threshold[expert])
+        win, loss = chances(gap, self.threshold[expert])
         at_random = self.is_spammer[expert]
         win, loss = np.where(at_random, 1 / 3, win), np.where(at_random, 1 / 3, loss)
         drawn = rng.random(len(rows))
@@ -242,14 +241,17 @@ def _handed_over(planned: IntArray, experts: int, rng: np.random.Generator) -> I
     return expert
 
 
-def _one_game_a_pair(contestants: int) -> PairCounts:
+def rate_scores(contestants: int, games: FloatArray, scores: FloatArray) -> FloatArray:
+    """(C,) points by so many games (P,) of each pair, and the mean scores (P,) in them."""
     low, high = np.triu_indices(contestants, 1)
     nobody = np.empty(0, dtype=np.int64)
     outcomes = np.tile([1, 0, 0], (len(low), 1))
-    return PairCounts(low=low, high=high, outcomes=outcomes, pair_of=nobody, outcome_of=nobody)
+    pairs = PairCounts(low=low, high=high, outcomes=outcomes, pair_of=nobody, outcome_of=nobody)
+    scored = games * scores
+    return to_elo(fit(Meetings(contestants, pairs), games[:, None], scored[:, None])[:, 0])
 
 
-def _chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:
+def chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The chances that the first wins and loses; the rest are ties."""
     win, loss = 1.0 / (1.0 + threshold * np.exp(-gap)), 1.0 / (1.0 + threshold * np.exp(gap))
     return win, loss
