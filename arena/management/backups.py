@@ -43,7 +43,7 @@ from arena.exports.written_files import FOLDERS
 from arena.results.exports.closure import TRAVELLING
 from arena.results.exports.study_folder import FORMAT as STUDY
 from arena.results.services import stored_rows
-from arena.results.services.restored_rows import (
+from arena.results.services.stored_rows import (
     check_row,
     check_votes,
     end_restored_work,

@@ -9,7 +9,6 @@ from arena.people import pages as people
 from arena.results.pages import boards, judges
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
-from arena.results.pages.closing import close_page
 from arena.results.pages.comparison import comparison_page
 from arena.results.pages.shared import send_shared, show_shared
 from arena.scenarios.urls import urlpatterns as SCENARIOS
@@ -18,6 +17,7 @@ from arena.studies.pages import experts, setup, studies
 from arena.voting import pages as voting
 
 STUDY = "studies/<uuid:code>"
+RATING = f"{STUDY}/rating/<uuid:rating>"
 SHARED_BOARD = "shared/boards/<str:token>"
 
 urlpatterns: list[URLPattern] = [
@@ -61,7 +61,7 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/experts/invite/", experts.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
     path(f"{STUDY}/experts/authors/", experts.mark, name="author"),
-    path(f"{STUDY}/close/", close_page, name="study-close"),
+    path(f"{STUDY}/close/", results.close_page, name="study-close"),
     path(f"{STUDY}/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path(f"{STUDY}/vote/", voting.vote_page, name="vote"),
     path(f"{STUDY}/vote/practice/", voting.practice_page, name="vote-practice"),
@@ -86,8 +86,8 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
     path(f"{STUDY}/files/<slug:kind>/", studies.download, name="study-file"),
     path(f"{STUDY}/rating/<slug:name>.<slug:form>", results.rating_file, name="results-export"),
-    path(f"{STUDY}/rating/<uuid:rating>/share/", results.share, name="results-share"),
-    path(f"{STUDY}/rating/<uuid:rating>/unshare/", results.unshare, name="results-unshare"),
+    path(f"{RATING}/share/", results.share, {"is_shared": True}, name="results-share"),
+    path(f"{RATING}/unshare/", results.share, {"is_shared": False}, name="results-unshare"),
     path("shared/<str:token>/", show_shared, name="shared-results"),
     path("shared/<str:token>/table.<slug:form>", send_shared, name="shared-file"),
     path("boards/", boards.boards_page, name="boards"),

@@ -7,8 +7,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Snapshot
-from arena.results.queries.evidence import vote_page
-from arena.results.queries.scores import VoteScore, scores_of_pairs
+from arena.results.queries.evidence import VoteScore, scores_of_pairs, vote_page
 from arena.results.queries.search import VoteSearch
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study

@@ -13,7 +13,7 @@ from django.urls import reverse
 from pytest_django import Settings
 
 from arena.models import EarlyLook, Study, StudyFile
-from arena.results.exports.study_files import STUDY_FILES
+from arena.results.exports.study_folder import STUDY_FILES
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import cancel_study, close_study
 from augment.models import Augmentation, Event, GenerationJob

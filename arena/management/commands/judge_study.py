@@ -6,7 +6,7 @@ from django.core.management.base import CommandParser
 
 from arena.rating.agreement import share_text
 from arena.results.queries.judges import judge_lines
-from arena.results.services.judges import judge_agreement, start_judge
+from arena.results.services.agreement import judge_agreement, start_judge
 from arena.studies.queries import study_named
 from augment.services import TerminalCommand, add_options, read_request, to_inputs
 from augment.services.running import JUDGEMENTS, JudgeRequest

@@ -8,28 +8,35 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from django.core.files import File
+from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.template.loader import render_to_string
+from django.utils.text import slugify
 
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
-from arena.exports.files import new_folder
+from arena.exports.files import new_folder, zip_bytes, zip_folder
 from arena.exports.formats import Value, make_csv, read_value, sheet_csv
+from arena.exports.written_files import FileWork, MadeFile
 from arena.jobs.exports.displacement import object_sheet
-from arena.models import Snapshot, Study
+from arena.jobs.exports.files import pack_scenarios
+from arena.models import Snapshot, Study, StudyFile
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
 from arena.results.exports.writers import bundle_files
+from arena.results.queries.access import snapshot_to_export
 from arena.results.services import stored_rows
-from arena.results.services.restored_rows import UNFINISHED
+from arena.results.services.stored_rows import UNFINISHED
 from arena.results.services.vote_files import faults_text
+from arena.studies.services.files import why_not
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256, product_version
+from arena.studies.services.planning import list_shown
+from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.judging import measure_job
+from augment.services.judging import ExportOrigin, export_rows, measure_job
 from augment.services.running import make_record, tries_by_augmentation
 from augment.services.scenarios import film_document, film_name
-
-File = tuple[str, bytes]
 
 FORMAT, VERSION = "scenario-arena-study", 1
 MANIFEST, README = "manifest.json", "README.md"
@@ -183,6 +190,34 @@ class _Folder:
         return len(written)
 
 
+class StudyFiles(FileWork[StudyFile]):
+    """Files of studies."""
+
+    model = StudyFile
+    related = ("study",)
+
+    def make(self, row: StudyFile, folder: Path) -> MadeFile:
+        """Make what the row's kind says, unless the study has changed since somebody asked."""
+        if reason := why_not(row.study, row.kind):
+            raise Conflict(reason)
+        study, slug = row.study, slugify(row.study.name) or "study"
+        if row.kind == StudyFile.Kind.INTERPLAN:
+            origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
+            rows, many = list_shown(study), study.shows_all_samples
+            return pack_scenarios(export_rows(rows, origin, "interplan", many=many), slug)
+        if row.kind == StudyFile.Kind.RATING:
+            content = zip_bytes(bundle_files(snapshot_to_export(study)))
+            return MadeFile(name=f"{slug}-rating.zip", content=ContentFile(content))
+        write_study(study, folder / "study", say=lambda line: None)
+        packed = folder / "study.zip"
+        with packed.open("wb") as file:
+            zip_folder(folder / "study", file)
+        return MadeFile(name=f"{slug}-study.zip", content=File(packed.open("rb")))
+
+
+STUDY_FILES = StudyFiles()
+
+
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -245,7 +280,7 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
     }
 
 
-def _files_for_people(closure: Closure) -> Iterator[File]:
+def _files_for_people(closure: Closure) -> Iterator[tuple[str, bytes]]:
     """Yield every file but the rows, the pictures and the README, in a fixed order."""
     study, jobs = closure.study, closure.jobs
     rows = Augmentation.objects.filter(job__in=jobs).order_by("pk")
@@ -278,7 +313,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
                 yield f"ratings/{snapshot.code}/{name}", content
 
 
-def _contestant_files(augmentations: list[Augmentation]) -> Iterator[File]:
+def _contestant_files(augmentations: list[Augmentation]) -> Iterator[tuple[str, bytes]]:
     """Yield each contestant's results, and the transcripts of those that asked a model.
 
     Transcripts come without their pictures, which stand under media, and without a machine.

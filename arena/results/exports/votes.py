@@ -2,15 +2,18 @@
 
 from collections.abc import Iterator
 
-from arena.exports.cells import csv_parts
+from arena.exports.cells import csv_parts, csv_text
 from arena.exports.formats import Dtype, Sheet, formats, sheet_csv, sheet_parquet
 from arena.models import Snapshot, Study
 from arena.rating import vote_columns
 from arena.results.queries.evidence import ListedVote, each_vote
+from arena.results.queries.judges import judge_name, list_answered_pairs
 from arena.results.queries.search import VoteSearch
 from arena.results.queries.votes import RATED, Filters, RatedVote, current_votes, last_vote_id
 from arena.results.services import vote_files
 from arena.results.services.ratings import read_votes, votes_version
+from augment.models import JudgeRun
+from augment.services.running import exchange
 
 _KINDS = {"ms_visible": Dtype.WHOLE, "simulated": Dtype.YES_NO, "position": Dtype.WHOLE}
 
@@ -71,3 +74,28 @@ def _list_row(line: ListedVote) -> tuple[object, ...]:
         vote.question,
         *(line.mark, vote.reason, vote.key, vote_files.faults_text(vote.faults)),
     )
+
+
+COLUMNS = (
+    *("judge", "question", "scenario", "order", "picture_a", "picture_b"),
+    *("augmentation_a", "augmentation_b", "answer", "exchange", "reason"),
+)
+"""A and B are what the judge was shown first and second; `exchange` says of both answers about a
+pair whether their preference was kept."""
+
+
+def judge_answers_csv(run: JudgeRun) -> bytes:
+    """Return all answers of a judge in the order of their pairs."""
+    return csv_text(COLUMNS, _rows(run)).encode()
+
+
+def _rows(run: JudgeRun) -> Iterator[tuple[object, ...]]:
+    for row in list_answered_pairs(run):
+        about = judge_name(run), run.question, row.left.scenario.slug
+        became = exchange(row.first, row.second).value
+        for order, a, b, answer, reason in (
+            (1, row.left, row.right, row.first, row.first_reason),
+            (2, row.right, row.left, row.second, row.second_reason),
+        ):
+            shown = a.contestant.slug, b.contestant.slug, a.code, b.code
+            yield *about, order, *shown, answer, became, reason

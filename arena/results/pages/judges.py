@@ -15,10 +15,10 @@ from django.utils.text import slugify
 from arena.exports.formats import attach
 from arena.models import Study
 from arena.rating.agreement import AgreementLine, agreement_sentence, share_text
-from arena.results.exports.judges import judge_answers_csv
+from arena.results.exports.votes import judge_answers_csv
 from arena.results.pages.ratings import get_readable_study
 from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines
-from arena.results.services.judges import estimate_study_judge, judge_agreement, start_judge
+from arena.results.services.agreement import estimate_study_judge, judge_agreement, start_judge
 from arena.shell.access import ADMIN, STAFF, act_for, get_user, page_for
 from arena.shell.acts import (
     Confirmation,

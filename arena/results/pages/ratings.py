@@ -1,9 +1,13 @@
-"""The results of a study: its tabs, its files, a new rating, and opening them early."""
+"""The results of a study: its tabs, its files, a new rating, opening them early, its end."""
 
 import uuid
-from collections.abc import Callable
+from functools import partial
+from typing import Any, Unpack
 
+from django import forms
+from django.contrib import messages
 from django.core.exceptions import PermissionDenied
+from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
@@ -11,26 +15,85 @@ from django.utils.text import slugify
 
 from arena.errors import NoSnapshot
 from arena.exports.formats import download
-from arena.models import Snapshot, Study
+from arena.models import Question, Snapshot, Study
+from arena.rating.rules import METHOD_TEXTS
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHART_FORMATS, download_rating
-from arena.results.pages.rating_form import RatingForm, rate_or_send
 from arena.results.pages.tabs import FOR_EXPERTS, MAIN, TABS, describe
 from arena.results.queries.access import list_snapshots, snapshot_to_export
 from arena.results.services.rating_request import RatingRequest
-from arena.results.services.ratings import open_early
-from arena.results.services.sharing import share_rating, stop_sharing
+from arena.results.services.ratings import (
+    Choices,
+    is_big,
+    open_early,
+    plan_snapshot,
+    rate_now,
+    share_rating,
+)
 from arena.shell import sending
-from arena.shell.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, get_user, page_for
+from arena.shell.access import (
+    ADMIN,
+    EXPERT,
+    RESEARCHER,
+    STAFF,
+    act_for,
+    form_for,
+    get_user,
+    page_for,
+)
 from arena.shell.accounts import top_role
-from arena.shell.acts import refusals_told, tell_errors, wait_for_workers
+from arena.shell.acts import (
+    Confirmation,
+    ask,
+    is_sure,
+    refusals_told,
+    send_later,
+    tell_errors,
+    wait_for_workers,
+)
+from arena.shell.forms import RequestForm, offer
 from arena.shell.pictures import charts_for_pages
-from arena.studies.pages.studies import export_place
+from arena.studies.pages.studies import export_place, study_question
+from arena.studies.queries import count_progress
+from arena.studies.services.opening import close_study
 from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access, votes_in
-from augment.services import read_request
+from augment.services import read_request, to_inputs
+from augment.services.scenarios import type_choices
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
+
+
+class AnyOf(forms.MultipleChoiceField):
+    """Codes of experts; rating itself refuses those that do not occur."""
+
+    def valid_value(self, value: Any) -> bool:
+        """Accept any ticked value."""
+        return True
+
+
+class RatingForm(RequestForm):
+    """Method, resampling and which votes count; experts are offered as a rating names them."""
+
+    inputs = to_inputs(RatingRequest)
+    experts = AnyOf(required=False)
+
+    def __init__(
+        self,
+        data: dict[str, Any] | None = None,
+        *,
+        snapshot: Snapshot | None = None,
+        study: Study | None = None,
+    ) -> None:
+        super().__init__(data)
+        if study is not None:
+            offer(self, "question", ((key, Question(key).label) for key in study.questions))
+        offer(self, "method", ((key, text) for key, text in METHOD_TEXTS.items() if key != "elo"))
+        for name in ("method", "rounds", "seed"):
+            self.fields[name].required = False
+        offer(self, "types", type_choices())
+        names = snapshot.results.judges if snapshot is not None else {}
+        self.judges = sorted(names.items(), key=lambda item: item[1])
 
 
 @page_for(ADMIN, RESEARCHER, EXPERT)
@@ -102,15 +165,13 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> N
 
 
 @act_for(*STAFF, back="results")
-def share(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
-    """Make the link by which anybody reads the table of this rating."""
-    return _change_link(request, code, rating, share_rating)
-
-
-@act_for(*STAFF, back="results")
-def unshare(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
-    """Take it back."""
-    return _change_link(request, code, rating, stop_sharing)
+def share(
+    request: HttpRequest, code: uuid.UUID, rating: uuid.UUID, *, is_shared: bool
+) -> HttpResponse:
+    """Make the link by which anybody reads the table of this rating, or take it back."""
+    snapshot = snapshot_to_export(get_readable_study(request, code), rating)
+    share_rating(snapshot, is_shared=is_shared, actor=get_user(request))
+    return redirect(f"{reverse('results', args=[code])}?rating={rating}")
 
 
 @act_for(*STAFF, back="results")
@@ -141,6 +202,23 @@ def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> 
     return redirect("results", code=code)
 
 
+@form_for(ADMIN)
+def close_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Take no more votes, rate them with the defaults and show the table; asks first."""
+    study = get_object_or_404(Study, code=code)
+    if not is_sure(request):
+        if study.state != Study.State.OPEN:
+            return redirect("study", code=code)
+        return ask(request, _closing(study))
+    actor = get_user(request)
+    with refusals_told(request):
+        closed = close_study(study=study, actor=actor)
+        if study.state == Study.State.OPEN:  # not pressed twice
+            rate_or_send(request, closed, actor=actor)
+        return redirect("results", code=code)
+    return redirect("study", code=code)
+
+
 # --- What other pages of a rating share --------------------------------------------------------
 
 
@@ -168,12 +246,19 @@ def get_snapshot(request: HttpRequest, study: Study) -> Snapshot:
         raise Http404 from error
 
 
-def _change_link(
-    request: HttpRequest, code: uuid.UUID, rating: uuid.UUID, change: Callable[..., object]
-) -> HttpResponse:
-    study = get_readable_study(request, code)
-    change(snapshot_to_export(study, rating), actor=get_user(request))
-    return redirect(f"{reverse('results', args=[code])}?rating={rating}")
+def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices]) -> None:
+    """Rate a study's current votes; with many of them a worker does, and a message says so.
+
+    Raises:
+        AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
+    """
+    if not is_big(study):
+        send_later(request, sending.send_charts, rate_now(study=study, **choices).pk)
+        return
+    with transaction.atomic():
+        planned = plan_snapshot(study=study, **choices)
+        transaction.on_commit(partial(sending.send_snapshot, planned.pk))
+    messages.success(request, "The rating is being computed.")
 
 
 def _rating_code(request: HttpRequest) -> uuid.UUID | None:
@@ -195,3 +280,15 @@ def _choose_snapshot(
         return None
     rows = Snapshot.objects.select_related("study__vote_file", "made_by__person", "shared")
     return get_object_or_404(rows, study=study, code=code, state=Snapshot.State.READY)
+
+
+def _closing(study: Study) -> Confirmation:
+    (line,) = count_progress([study])
+    return study_question(
+        study,
+        f"Close the study “{study.name}”?",
+        f"Votes given: {line.voted}. Pairs skipped: {line.skipped}. Still planned: {line.left}.",
+        "No more votes are taken. This can’t be taken back.",
+        "Its results can be read then, also by its experts. To end it without any, cancel it.",
+        button="Close the study",
+    )

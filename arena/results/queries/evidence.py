@@ -3,15 +3,16 @@
 In: a snapshot and what is looked for. Out: votes with the mark that says why one does not count.
 """
 
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from django.core.paginator import Page, Paginator
+from django.db.models import Count, F, Value
 
 from arena.models import Snapshot, Vote
-from arena.results.queries.scores import Pair, VoteScore, scores_of_pairs, sort_votes
-from arena.results.queries.search import VoteSearch, is_found
+from arena.results.queries.search import VoteSearch, find_votes, is_found
 from arena.results.queries.votes import (
     Filters,
     RatedVote,
@@ -25,6 +26,43 @@ from augment.models import Augmentation
 PER_PAGE = 10
 CHUNK = 2000
 """So many votes are read at once for a file."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoteScore:
+    """Votes of one contestant, as it is seen from it."""
+
+    wins: int = 0
+    ties: int = 0
+    losses: int = 0
+
+    @property
+    def votes(self) -> int:
+        """All of them."""
+        return self.wins + self.ties + self.losses
+
+    @property
+    def disagreement(self) -> float:
+        """The mean distance of two judgements: a win against a loss is 1, against a tie a half."""
+        n = self.votes
+        if n < 2:
+            return 0.0
+        far = self.wins * self.losses + (self.wins + self.losses) * self.ties / 2
+        return far / (n * (n - 1) / 2)
+
+
+class Pair(NamedTuple):
+    """Two pictures of a scenario, the contestant of the lower key first."""
+
+    scenario: int
+    sample: int
+    low: int
+    high: int
+
+    @classmethod
+    def of(cls, scenario: int, sample: int, first: int, other: int) -> "Pair":
+        """Return the pair, whoever was shown on the left."""
+        return cls(scenario, sample, min(first, other), max(first, other))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +122,42 @@ def count_settled(snapshot: Snapshot) -> int:
     return snapshot.votes_counted - select_counted_votes(snapshot).count()
 
 
+def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:
+    """The votes of a rating by pair, as seen from the lower contestant; one query."""
+    columns = (
+        *("matchup__scenario", _sample(snapshot)),
+        *("shown_left__contestant", "shown_right__contestant", "outcome"),
+    )
+    rows = select_counted_votes(snapshot).values_list(*columns).annotate(number=Count("pk"))
+    counts: defaultdict[Pair, Counter[str]] = defaultdict(Counter)
+    for scenario, sample, left, right, outcome, number in rows:
+        pair = Pair.of(scenario, sample, left, right)
+        winner = {"left": left, "right": right}.get(outcome)
+        side = "ties" if winner is None else "wins" if winner == pair.low else "losses"
+        counts[pair][side] += number
+    return {pair: VoteScore(**numbers) for pair, numbers in counts.items()}
+
+
+def sort_votes(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str]]:
+    """Return keys and marks of the votes looked for, as given or the most disputed ones first."""
+    rows = find_votes(snapshot, search)
+    if not search.order:
+        return list(rows.order_by("pk").values_list("pk", F("mark")))
+    scores = scores_of_pairs(snapshot)
+
+    def place(row: tuple[Any, ...]) -> tuple[Any, ...]:
+        pk, _, slug, *shown = row
+        pair = Pair.of(*shown)
+        score = scores.get(pair, VoteScore())
+        return -score.disagreement, -score.votes, slug, pair, pk
+
+    columns = rows.values_list(
+        *("pk", F("mark"), "matchup__scenario__slug", "matchup__scenario", _sample(snapshot)),
+        *("shown_left__contestant", "shown_right__contestant"),
+    )
+    return [(pk, mark) for pk, mark, *_ in sorted(columns, key=place)]
+
+
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -134,3 +208,8 @@ def _list_vote(
     person = vote.expert.person
     judge = snapshot.results.judges.get(str(person.code), person.pseudonym)
     return ListedVote(given=vote, mark=mark, judge=judge, pair=pair)
+
+
+def _sample(snapshot: Snapshot) -> F | Value:
+    """Return the sample of both sides where each one is judged on its own, else 0."""
+    return F("matchup__right__sample") if snapshot.study.shows_all_samples else Value(0)

@@ -14,7 +14,7 @@ from django.utils import timezone
 
 from arena.errors import StudyStillOpen
 from arena.exports.files import sha256_hex
-from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
+from arena.models import EarlyLook, ImportedVote, SharedRating, Snapshot, Standing, Study, Vote
 from arena.models.ratings import snapshot_values
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
@@ -33,8 +33,7 @@ from arena.results.queries import votes as vote_queries
 from arena.results.services import analysis
 from arena.results.services.agreement import rater_agreement
 from arena.results.services.analysis import VoteArrays, vote_arrays
-from arena.results.services.settled import remark_on_ties
-from arena.results.services.trust import board_remarks, trust
+from arena.results.services.trust import board_remarks, remark_on_ties, trust
 from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.queries import author_pairs
 from arena.studies.services.opening import product_version
@@ -261,6 +260,25 @@ def software_versions() -> dict[str, str | int]:
         "results": RESULTS_VERSION,
         "votes": VOTES_VERSION,
     }
+
+
+@transaction.atomic
+def share_rating(snapshot: Snapshot, *, is_shared: bool, actor: User) -> None:
+    """Make the link by which anybody reads the table of a rating, or take it back for good.
+
+    Raises:
+        StudyStillOpen: Whoever reads the results could still vote.
+    """
+    study = snapshot.study
+    if is_shared:
+        if study.state != Study.State.CLOSED:
+            raise StudyStillOpen(study.name)
+        _, is_changed = SharedRating.objects.get_or_create(snapshot=snapshot)
+    else:
+        is_changed = bool(SharedRating.objects.filter(snapshot=snapshot).delete()[0])
+    if is_changed:
+        verb = "share results" if is_shared else "stop sharing results"
+        log_change(study, verb, actor, after={"snapshot": str(snapshot.code)})
 
 
 # --- Private -----------------------------------------------------------------------------------
