@@ -70,6 +70,7 @@ EARLIER: dict[str, tuple[str, frozenset[str]]] = {
     "augment.0044_open_set": ("", frozenset()),
     "augment.0045_judge_frames": ("", frozenset({"augment.judgerun.frames"})),
     "arena.0044_ask_why": ("", frozenset({"arena.study.ask_why", "arena.vote.faults"})),
+    "arena.0045_provisional_above": ("", frozenset({"arena.board.provisional_above"})),
 }
 """Migrations that rows may lack: what these do to values (empty for nothing), and columns that get
 their default."""

@@ -7,7 +7,7 @@ from django.db import models
 
 from arena.models.people import CodedModel
 from arena.models.studies import Study
-from arena.rating.board_table import BoardTableDocument, table_from_document
+from arena.rating.board_table import PROVISIONAL_ABOVE, BoardTableDocument, table_from_document
 from augment.models import AppendOnly, Benchmark
 
 
@@ -30,6 +30,10 @@ class Board(CodedModel):
         null=True,
         blank=True,
         help_text="of the link by which anybody reads its tables; null without one",
+    )
+    provisional_above = models.PositiveIntegerField(
+        default=PROVISIONAL_ABOVE,
+        help_text="points to either side; a wider interval makes a line provisional",
     )
     made_at = models.DateTimeField(auto_now_add=True)
 

@@ -13,8 +13,8 @@ from arena.rating.snapshot_document import read_document
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
 
-PROVISIONAL_ABOVE = 50.0
-"""Elo points: a wider half of an interval makes a line provisional."""
+PROVISIONAL_ABOVE = 50
+"""Elo points: a wider half of an interval makes a line provisional; a board may say otherwise."""
 
 AnyName = TypeVar("AnyName")
 
@@ -152,11 +152,11 @@ def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[An
     ]
 
 
-def is_provisional(line: Line) -> bool:
-    """Return whether a line has no interval, or one wider than `PROVISIONAL_ABOVE` each way."""
+def is_provisional(line: Line, above: float) -> bool:
+    """Return whether a line has no interval, or one wider than so many points each way."""
     if line.lower is None or line.upper is None:
         return True
-    return line.upper - line.lower > 2.0 * PROVISIONAL_ABOVE
+    return line.upper - line.lower > 2.0 * above
 
 
 def spread_over(ranked: Sequence[AnyName], most: int) -> list[AnyName]:

@@ -101,4 +101,5 @@ def test_what_is_no_table_of_this_version_is_refused(change: dict[str, object]) 
 def test_a_line_is_provisional_until_its_interval_is_within_the_rule(
     lower: float | None, upper: float | None, provisional: bool
 ) -> None:
-    assert is_provisional(Line(name="a", rating=1000.0, lower=lower, upper=upper)) is provisional
+    line = Line(name="a", rating=1000.0, lower=lower, upper=upper)
+    assert is_provisional(line, 50) is provisional

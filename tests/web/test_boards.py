@@ -36,7 +36,8 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
             uploaded_by=[cast["researcher"], cast["admin"]][sender],
         )
     admin, stranger = signed_in(cast["admin"]), Client()
-    admin.post(reverse("boards"), {"name": "City", "study": str(first.code)})
+    asked = {"name": "City", "study": str(first.code), "provisional_above": "100"}
+    admin.post(reverse("boards"), asked)
     board = Board.objects.get()
     page = reverse("board", args=[board.code])
     assert "No table was published yet." in admin.get(page).content.decode()
@@ -99,7 +100,8 @@ def test_what_is_simulated_says_so_in_every_file() -> None:
     Contestant.objects.filter(slug="bob").update(kind=Contestant.Kind.SIMULATED)
     Study.objects.filter(pk=study.pk).update(allow_simulated=True)
     admin = signed_in(people()["admin"])
-    admin.post(reverse("boards"), {"name": "City", "study": str(study.code)})
+    asked = {"name": "City", "study": str(study.code), "provisional_above": "50"}
+    admin.post(reverse("boards"), asked)
     board = Board.objects.get()
     admin.post(reverse("board-publish", args=[board.code]))
     files = board.tables.get().files

@@ -121,7 +121,10 @@ class Cast:
                 {"benchmark": str(self.streets.code), "file": ("ours.zip", packed)},
             ),
             "api-tokens": ({"apitoken": 1}, {"name": "Mine", "role": "admin", "days": "7"}),
-            "boards": ({"board": 1}, {"name": "Town", "study": str(self.here.study.code)}),
+            "boards": (
+                {"board": 1},
+                {"name": "Town", "study": str(self.here.study.code), "provisional_above": "50"},
+            ),
             "endpoint-new": (
                 {"endpoint": 1},
                 {"label": "x", "base_url": HERE, "max_concurrency": 4},

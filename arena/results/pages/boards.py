@@ -16,6 +16,7 @@ from arena.exports.files import CONTENT_TYPE, zip_bytes
 from arena.exports.formats import attach
 from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
+from arena.rating.board_table import PROVISIONAL_ABOVE
 from arena.results.exports.board_files import board_folder, table_rows, write_table
 from arena.results.pages.plots import plot
 from arena.results.services.batches import BatchRequest, open_batch, possible_newcomers
@@ -55,6 +56,14 @@ class BoardForm(forms.Form):
         empty_label="None",
         widget=forms.Select({"class": "input"}),
         help_text="Where the study shows just its test split; its version stands in every table.",
+    )
+    provisional_above = forms.IntegerField(
+        label="Provisional above ± points",
+        min_value=1,
+        max_value=1000,
+        initial=PROVISIONAL_ABOVE,
+        widget=forms.NumberInput({"class": "input"}),
+        help_text="A contestant with a wider interval is marked as provisional in every table.",
     )
 
 

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
@@ -55,7 +56,12 @@ WriteFiles = Callable[[BoardTableDocument], dict[str, str]]
 
 @transaction.atomic
 def make_board(
-    *, name: str, study: Study, benchmark: Benchmark | None = None, actor: User | None = None
+    *,
+    name: str,
+    study: Study,
+    benchmark: Benchmark | None = None,
+    provisional_above: int = PROVISIONAL_ABOVE,
+    actor: User | None = None,
 ) -> Board:
     """Begin a board with its first study, whose scenarios and rules all batches share.
 
@@ -63,6 +69,7 @@ def make_board(
         name: Of the board; batches have it in theirs, which experts see.
         study: The first one.
         benchmark: Whose test split it shows; None for scenarios of no benchmark.
+        provisional_above: Points to either side; a wider interval makes a line provisional.
         actor: Who begins it, for the log.
 
     Raises:
@@ -73,7 +80,9 @@ def make_board(
     name = one_line("name", name, what="board", longest=LONGEST_NAME)
     try:
         with transaction.atomic():
-            board = Board.objects.create(name=name, benchmark=benchmark)
+            board = Board.objects.create(
+                name=name, benchmark=benchmark, provisional_above=provisional_above
+            )
     except IntegrityError:
         raise Conflict(f"There is a board named '{name}' already.") from None
     board.studies.add(study)
@@ -214,7 +223,13 @@ def make_document(
     standings = hide_ranks(rated.standings) if not_ranked else rated.standings
     since = {line.slug: line.since for line in before.lines} if before else {}
     lines = tuple(
-        _board_line(line, by_slug[line.name], since.get(line.name, made_at[:10]), settled)
+        _board_line(
+            line,
+            by_slug[line.name],
+            settled,
+            since=since.get(line.name, made_at[:10]),
+            is_provisional=is_provisional(line, board.provisional_above),
+        )
         for line in anchor_lines(standings, founders)
     )
     judges = {vote.judge: vote.judge_name for vote in votes}
@@ -238,7 +253,7 @@ def make_document(
         includes_simulated=any(who.is_simulated for who in by_slug.values())
         or any(vote.is_simulated for vote in votes),
         settled_ties=len(votes) - cast,
-        provisional_above=PROVISIONAL_ABOVE,
+        provisional_above=float(board.provisional_above),
     )
 
 
@@ -283,20 +298,19 @@ def _pool(study: Study, votes: VoteSet) -> PooledStudy:
     )
 
 
-def _board_line(line: Line, who: Competitor, since: str, settled: Counter[str]) -> BoardLine:
+def _board_line(line: Line, who: Competitor, settled: Counter[str], **more: Any) -> BoardLine:
     card = (who.contestant and who.contestant.card) or {}
     submitted, withdrawn = _count_attempts(who.contestant)
     return BoardLine(
         slug=who.slug,
         kind=who.kind,
         is_simulated=who.is_simulated,
-        since=since,
         authors=tuple(card.get("authors", ())),
         is_open=card.get("is_open"),
         settled_ties=settled[who.slug],
-        is_provisional=is_provisional(line),
         submitted=submitted,
         withdrawn=withdrawn,
+        **more,
         **asdict(line)
         | {"name": who.name, "votes": line.votes - settled[who.slug]}
         | {"ties": line.ties - settled[who.slug]},
