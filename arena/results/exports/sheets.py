@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
@@ -19,7 +17,6 @@ from augment.services.running import list_cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
 
 SHEET_FORMATS = ("pdf", "png")
 
@@ -27,23 +24,6 @@ _LEGEND = (
     "Ego vehicle red, changed agents blue. Every row has one camera for all its pictures. "
     "An unreadable or refused answer shows the unchanged scene."
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tile:
-    """A picture with its title.
-
-    Attributes:
-        pixels: None without a picture.
-        word: Why there is none.
-        note: What is said of it, beneath.
-    """
-
-    title: str
-    is_simulated: bool
-    pixels: Any | None = None
-    word: str = ""
-    note: str = ""
 
 
 def find_cells(
@@ -84,28 +64,13 @@ def sample_sheet(
             scenario = rows[slug]
             text = f"{scenario.get_type_display()}: “{scenario.wording.strip()}”"
             caption = f"({chr(ord('a') + line % 26)}) {text}"
-            tiles = [_sample_tile(shown[name], cells.get((slug, name))) for name in contestants]
-            _draw_tiles(part, _wrap(caption, 50 * across), tiles, across)
+            wrapped = textwrap.wrap(caption, 50 * across, max_lines=2, placeholder=" …")
+            part.suptitle("\n".join(wrapped), fontsize=8)
+            grid = part.subplots(1, across, squeeze=False).flat
+            for axes, name in zip(grid, contestants, strict=True):
+                _draw_tile(axes, shown[name], cells.get((slug, name)))
         figure.supxlabel(textwrap.fill(_LEGEND, width=72 * across), fontsize=6, color=SOFT)
         return write_figure(figure, file_format)
-
-
-def _sample_tile(contestant: Contestant, cell: Augmentation | None) -> Tile:
-    """Return the cell's picture, or a word on why there is none."""
-    from matplotlib.image import imread
-
-    pixels = None
-    if cell is not None and cell.image and default_storage.exists(cell.image):
-        with default_storage.open(cell.image) as file:
-            pixels = imread(io.BytesIO(file.read()), format="png")
-    word = _explain(cell)
-    return Tile(
-        title=show_name(contestant),
-        is_simulated=contestant.is_simulated,
-        pixels=pixels,
-        word=word,
-        note=word,
-    )
 
 
 def _explain(cell: Augmentation | None) -> str:
@@ -119,36 +84,22 @@ def _explain(cell: Augmentation | None) -> str:
     return f"no picture: {cell.get_state_display().lower()}"
 
 
-def _wrap(caption: str, width: int) -> str:
-    return "\n".join(textwrap.wrap(caption, width=width, max_lines=2, placeholder=" …"))
+def _draw_tile(axes: Axes, contestant: Contestant, cell: Augmentation | None) -> None:
+    """Draw a picture or why there is none; a simulated one is stamped, as it may be cut out."""
+    from matplotlib.image import imread
 
-
-def _draw_tiles(part: SubFigure, caption: str, tiles: Sequence[Tile], across: int) -> None:
-    part.suptitle(caption, fontsize=8)
-    grid = list(part.subplots(math.ceil(len(tiles) / across), across, squeeze=False).flat)
-    for axes, tile in zip(grid, tiles, strict=False):
-        _draw_tile(axes, tile)
-    for axes in grid[len(tiles) :]:
-        axes.set_visible(False)
-
-
-def _draw_tile(axes: Axes, tile: Tile) -> None:
-    """Draw a picture or a word instead; a simulated one is stamped, as it may be cut out."""
-    axes.set_title(tile.title, fontsize=7, color=SIMULATED if tile.is_simulated else INK)
+    is_simulated, word = contestant.is_simulated, _explain(cell)
+    axes.set_title(show_name(contestant), fontsize=7, color=SIMULATED if is_simulated else INK)
     axes.set_xticks([])
     axes.set_yticks([])
     axes.spines[:].set(visible=True, color=SOFT, linewidth=0.5)
     centred: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center"}
-    if tile.pixels is None:
-        axes.text(0.5, 0.5, tile.word, color=SOFT, **centred)
+    if cell is None or not cell.image or not default_storage.exists(cell.image):
+        axes.text(0.5, 0.5, word, color=SOFT, **centred)
         return
-    axes.imshow(tile.pixels)
-    axes.set_xlabel(tile.note, fontsize=7, color=SOFT)
-    if tile.is_simulated:
-        stamp: dict[str, Any] = {
-            "rotation": 25,
-            "fontsize": 14,
-            "fontweight": "bold",
-            "alpha": 0.3,
-        }
-        axes.text(0.5, 0.5, "SIMULATED", color=SIMULATED, **stamp, **centred)
+    with default_storage.open(cell.image) as file:
+        axes.imshow(imread(io.BytesIO(file.read()), format="png"))
+    axes.set_xlabel(word, fontsize=7, color=SOFT)
+    if is_simulated:
+        stamp: dict[str, Any] = {"rotation": 25, "fontsize": 14, "fontweight": "bold"}
+        axes.text(0.5, 0.5, "SIMULATED", color=SIMULATED, alpha=0.3, **stamp, **centred)
