@@ -41,7 +41,6 @@ class World:
     """What is true: ratings, and how much scenarios and experts differ, in Elo points.
 
     Attributes:
-        controversial: Contestants about whom experts differ four times as much.
         spammers: The chance that an expert answers at random.
         uneven: The standard deviation of the logarithm of the votes of an expert.
         side, side_sd: What being on the left is worth on average, and by how much experts differ.
@@ -53,19 +52,11 @@ class World:
     experts: int = 9
     votes_per_expert: int = 640
     scenarios: int = SCENARIOS
-    controversial: tuple[int, ...] = ()
     spammers: float = 0.0
     uneven: float = 0.0
     handed_over: bool = False
     side: float = 0.0
     side_sd: float = 0.0
-
-    @property
-    def expert_sds(self) -> FloatArray:
-        """(C,) points."""
-        found = np.full(len(self.ratings), float(self.expert_sd))
-        found[list(self.controversial)] *= 4.0
-        return found
 
     def truth(self, thresholds: FloatArray = THRESHOLDS) -> FloatArray:
         """(C,) what infinitely many votes of this world would be rated, if these thresholds
@@ -125,9 +116,8 @@ class World:
         """
         strengths = self.ratings / ELO_PER_LOGIT
         low, high = np.triu_indices(len(strengths), 1)
-        variance = self.scenario_sd**2 + self.expert_sds**2
-        variance_of_pairs = variance[low] + variance[high] + self.side_sd**2
-        spread = np.sqrt(variance_of_pairs)[:, None] / ELO_PER_LOGIT
+        variance = 2.0 * (self.scenario_sd**2 + self.expert_sd**2) + self.side_sd**2
+        spread = np.sqrt(variance) / ELO_PER_LOGIT
         nodes, weights = np.polynomial.hermite_e.hermegauss(60)
         gaps = (strengths[low] - strengths[high])[:, None] + side / ELO_PER_LOGIT + spread * nodes
         win, loss = chances(gaps[None], thresholds[:, None, None])
@@ -196,7 +186,7 @@ class _Panel:
     def __init__(self, world: World, rng: np.random.Generator) -> None:
         contestants = len(world.ratings)
         of_scenarios = rng.normal(0.0, 1.0, (world.scenarios, contestants)) * world.scenario_sd
-        of_experts = rng.normal(0.0, 1.0, (world.experts, contestants)) * world.expert_sds
+        of_experts = rng.normal(0.0, 1.0, (world.experts, contestants)) * world.expert_sd
         self.seen = world.ratings + of_scenarios[:, None] + of_experts
         self.threshold = THRESHOLDS[rng.integers(0, len(THRESHOLDS), world.experts)]
         self.side = np.full(world.experts, float(world.side))

@@ -12,7 +12,7 @@ from arena.jobs.exports.displacement import (
     object_sheet,
 )
 from arena.jobs.exports.tables import JOB_TABLES, augmentation_sheet
-from augment.models import Augmentation, Contestant, GenerationJob
+from augment.models import Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.planned_motion import AtTime
@@ -36,17 +36,8 @@ def a_job(*, aside_m: float = 2.0) -> GenerationJob:
     kinds = {"works": ScenarioType.CONSTRUCTION_ZONE, "parked": ScenarioType.NUDGE}
     for slug, kind in kinds.items():
         scenario = rows.add_scenario(slug, type=kind)
-        Augmentation.objects.create(
-            job=job,
-            scenario=scenario,
-            contestant=ann,
-            state="done",
-            modification=modification_to_document(change),
-            image=store(png()),
-        )
-        Augmentation.objects.create(
-            job=job, scenario=scenario, contestant=sim, state="unreadable", image=store(png(9))
-        )
+        rows.add_answer(job, scenario, ann, change, image=store(png()))
+        rows.add_answer(job, scenario, sim, state="unreadable")
     return job
 
 
@@ -117,7 +108,7 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     assert b"2026" not in first[:400]
 
 
-def add_moving(job: GenerationJob) -> Augmentation:
+def add_moving(job: GenerationJob) -> None:
     """Bea's car starts a second too late: over 6 s it is 177.5 / 61 m behind, then 5 m."""
     place = rows.add_scenario(
         "cut",
@@ -126,14 +117,8 @@ def add_moving(job: GenerationJob) -> Augmentation:
         intent=None,
         intent_origin="",
     )
-    return Augmentation.objects.create(
-        job=job,
-        scenario=place,
-        contestant=rows.add_kind("bea", Contestant.Kind.RULE),
-        state="done",
-        modification=modification_to_document(starts(AtTime(after_s=3.0))),
-        image=store(png()),
-    )
+    bea = rows.add_kind("bea", Contestant.Kind.RULE)
+    rows.add_answer(job, place, bea, starts(AtTime(after_s=3.0)))
 
 
 def test_columns_over_time_appear_where_something_moves() -> None:

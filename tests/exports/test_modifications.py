@@ -10,12 +10,11 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.formats.interplan.file import scene_token
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.scenarios.catalogue import load_catalogue
-from augment.services.scenarios.pictures import store
+from augment.services.scenarios.scenes import load_reference
 from tests.fixtures.shelf import FOLDER
 from tests.jobs import rows
-from tests.web.cast import png
 
 pytestmark = pytest.mark.django_db
 
@@ -32,17 +31,8 @@ def job() -> GenerationJob:
     rule = rows.add_kind("rule", Contestant.Kind.RULE)
     for slug in SLUGS:
         scenario = Scenario.objects.get(slug=slug)
-        Augmentation.objects.create(
-            job=job,
-            scenario=scenario,
-            contestant=reference,
-            state="done",
-            modification=scenario.reference,
-            image=store(png()),
-        )
-        Augmentation.objects.create(
-            job=job, scenario=scenario, contestant=rule, state="refused", image=store(png())
-        )
+        rows.add_answer(job, scenario, reference, load_reference(scenario))
+        rows.add_answer(job, scenario, rule)
     return job
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from arena.jobs.exports.realism import FORMATS
 from augment.metrics.realism import REALISM_VERSION
-from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
+from augment.models import BaseScene, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification
 from augment.services.judging.realism import REALISM, realism_of_job
@@ -40,14 +40,7 @@ def a_job() -> GenerationJob:
         )
         for who, change in zip(cast, (PARKED, WILD), strict=True):
             is_refused = who.slug == "bob" and number == 2
-            Augmentation.objects.create(
-                job=job,
-                scenario=scenario,
-                contestant=who,
-                state="refused" if is_refused else "done",
-                modification=None if is_refused else modification_to_document(change),
-                image="bev/x.png",
-            )
+            rows.add_answer(job, scenario, who, None if is_refused else change)
     return job
 
 

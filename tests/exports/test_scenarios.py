@@ -19,14 +19,12 @@ from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.studies.services.opening import product_version
 from augment.formats.writers import WRITERS
-from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
-from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
+from augment.models import BaseScene, Contestant, GenerationJob
+from augment.scene.codec import scene_from_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
-from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import NewScenario, add_scenario
 from tests.jobs import rows
 from tests.scenes import junction, pedestrian, vehicle
-from tests.web.cast import png
 
 pytestmark = pytest.mark.django_db
 
@@ -49,18 +47,8 @@ def job() -> GenerationJob:
     )
     scenario = add_scenario(new)
     job = GenerationJob.objects.create(name="Round 1")
-    for slug, state, change in (
-        ("rule", "done", modification_to_document(ADDED)),
-        ("shy", "refused", None),
-    ):
-        Augmentation.objects.create(
-            job=job,
-            scenario=scenario,
-            contestant=rows.add_kind(slug, Contestant.Kind.RULE),
-            state=state,
-            modification=change,
-            image=store(png()),
-        )
+    for slug, change in (("rule", ADDED), ("shy", None)):
+        rows.add_answer(job, scenario, rows.add_kind(slug, Contestant.Kind.RULE), change)
     return job
 
 

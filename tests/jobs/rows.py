@@ -49,6 +49,24 @@ def add_model(slug: str, *, endpoint: Endpoint, model: str, **columns: object) -
     )
 
 
+def add_answer(
+    job: GenerationJob,
+    scenario: Scenario,
+    contestant: Contestant,
+    change: Modification | None = None,
+    **columns: Any,
+) -> Augmentation:
+    """A picture with a change; a refusal without one, unless a column says otherwise."""
+    columns = {
+        "state": "done" if change else "refused",
+        "modification": modification_to_document(change) if change else None,
+        "image": "bev/x.png",
+    } | columns
+    return Augmentation.objects.create(
+        job=job, scenario=scenario, contestant=contestant, **columns
+    )
+
+
 def launch(*, scenarios: int = 1, contestants: tuple[str, ...] = ("reference",)) -> GenerationJob:
     for slug in contestants:
         if not Contestant.objects.filter(slug=slug).exists():

@@ -1,5 +1,7 @@
 """Intervals that keep what they promise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,14 +63,7 @@ def test_votes_that_agree_within_scenarios_widen_the_scenario_interval() -> None
     # The same scenario always gives the same answer: 2000 votes are worth 20.
     score = (votes.scenario % 2).astype(float)
     low_first = votes.first < votes.second
-    clustered = type(votes)(
-        names=votes.names,
-        first=votes.first.copy(),
-        second=votes.second.copy(),
-        score=np.where(low_first, score, 1 - score),
-        expert=votes.expert.copy(),
-        scenario=votes.scenario.copy(),
-    )
+    clustered = replace(votes, score=np.where(low_first, score, 1 - score))
 
     def width(unit: Unit) -> float:
         line = by_votes(clustered, rounds=500, unit=unit, seed=3).lines[0]

@@ -1,5 +1,7 @@
 """Online Elo: every round plays the paper's formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,14 +56,7 @@ def test_counted_votes_are_resampled_like_as_many_rows() -> None:
         count=count,
     )
     single = select_votes(counted, np.repeat(np.arange(len(counted)), counted.count))
-    rows = Comparisons(
-        names=single.names,
-        first=single.first,
-        second=single.second,
-        score=single.score,
-        expert=single.expert,
-        scenario=single.scenario,
-    )
+    rows = replace(single, count=np.ones(len(single), dtype=np.int64))
     assert len(counted) < len(rows) == counted.votes
     of_counted = models.resample_elo(counted, rounds=7, seed=2)
     assert of_counted.tolist() == models.resample_elo(rows, rounds=7, seed=2).tolist()
@@ -70,14 +65,8 @@ def test_counted_votes_are_resampled_like_as_many_rows() -> None:
 def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
     """Small gains on large ratings: what single precision would lose."""
     votes = simulated([1000.0, 1000.0], 30_000, 1, ties=0.0)
-    always = Comparisons(
-        names=votes.names,
-        first=np.zeros_like(votes.first),
-        second=np.ones_like(votes.second),
-        score=np.ones_like(votes.score),
-        expert=votes.expert,
-        scenario=votes.scenario,
-    )
+    ones = np.ones_like(votes.first)
+    always = replace(votes, first=ones - 1, second=ones, score=np.ones_like(votes.score))
     assert models.resample_elo(always, rounds=2, seed=0)[:, 1] == pytest.approx(
         as_worded(always, 4.0), abs=1e-6
     )

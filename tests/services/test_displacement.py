@@ -29,14 +29,8 @@ def ended(
     change: Modification = NEAR,
 ) -> Augmentation:
     is_done = state == Augmentation.State.DONE
-    return Augmentation.objects.create(
-        job=job,
-        scenario=scenario,
-        contestant=contestant,
-        state=state,
-        modification=modification_to_document(change) if is_done else None,
-        image="bev/x.png" if is_done else "",
-    )
+    change = change if is_done else None
+    return rows.add_answer(job, scenario, contestant, change, state=state)
 
 
 def a_job() -> GenerationJob:

@@ -34,14 +34,7 @@ def crash() -> Augmentation:
     """A car that stands in the ego, where the reference has two cones."""
     job = GenerationJob.objects.create(name="Round 1")
     into_the_ego = Modification(added=(vehicle("Agent2", 1.0, 0.0),))
-    return Augmentation.objects.create(
-        job=job,
-        scenario=rows.add_scenario("one"),
-        contestant=rows.add_kind("ann"),
-        state="done",
-        modification=modification_to_document(into_the_ego),
-        image="bev/x.png",
-    )
+    return rows.add_answer(job, rows.add_scenario("one"), rows.add_kind("ann"), into_the_ego)
 
 
 def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated() -> None:
