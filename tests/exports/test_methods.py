@@ -30,6 +30,7 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     answers = {line["number"]: line["answer"] for line in sheet["questions"]}
     assert (answers["3.1.1"], answers["3.2.1"]) == ("6", "2")
     assert preregistration_sha256(study) in answers["3.3.1"]
+    assert (answers["2.4"], answers["4.1.1"]) == ("English", "Correctness")
     assert answers["4.3.7"] == "Which image carries out the instruction better?"
     assert "Of 2 hidden repeats a share of 0.00" in answers["4.3.11"]
     assert set(sheet["blank"]) >= {"1.1", "3.2.2", "3.2.3", "5.1"}

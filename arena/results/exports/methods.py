@@ -9,6 +9,7 @@ import json
 from collections import Counter
 from typing import Any
 
+from django.conf.locale import LANG_INFO
 from django.template import Context
 from django.template.loader import get_template
 
@@ -17,13 +18,24 @@ from arena.exports.latex import escape
 from arena.models import Question, Snapshot
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import votes_text
-from arena.rating.snapshot_document import Trust
+from arena.rating.snapshot_document import BoardRemarks, Trust
 from arena.results.exports.tables import method_text
+from arena.results.queries.votes import Filters
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict
 
 BLANK = "[BLANK]"
 """What authors have to fill in."""
+CRITERIA = {
+    Question.INSTRUCTION: {
+        "quality": "Correctness",
+        "aspect": "Content of outputs",
+        "frame": "Relative to the input: the scene and its instruction",
+        "effect": "Intrinsic",
+    }
+}
+"""Section 4 of HEDS where the question itself answers it; what realism or difficulty means is for
+authors to say."""
 
 
 def read_methods(snapshot: Snapshot) -> dict[str, Any]:
@@ -37,12 +49,6 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         raise Conflict(f"'{study.name}' has no preregistration, so nobody knows how it was held.")
     frozen = json.loads(study.preregistration)
     counts = set(Counter(entry["contestant"] for entry in frozen["pictures"]).values())
-    shares = {"hidden repeats": "repeat_share", "attention checks": "check_share"}
-    used = [
-        f"{100.0 * frozen['rules'][share]:.0f} % {name}"
-        for name, share in shares.items()
-        if frozen["rules"].get(share)
-    ]
     left_out = sorted(snapshot.votes_left_out.items())
     key = snapshot.question or study.questions[0]
     return {
@@ -52,21 +58,22 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "simulated": snapshot.includes_simulated,
         "contestants": len(frozen["contestants"]),
         "scenarios": len(frozen["scenarios"]),
-        "languages": sorted(set(study.scenarios.values_list("language", flat=True))),
+        "languages": [
+            LANG_INFO.get(code, {}).get("name", code)
+            for code in sorted(set(study.scenarios.values_list("language", flat=True)))
+        ],
         "outputs": [str(count) for count in sorted({min(counts), max(counts)})],
-        "plan": f"A balanced plan ({frozen['product']['planner']}, seed {frozen['seed']}) chose "
-        f"pairs and sides before the first vote, {study.votes_per_expert} pairs for each of "
-        f"{frozen['experts']} accounts; {len(frozen['rules'].get('identical', ()))} pairs that "
-        "nobody can tell apart count as ties",
+        "plan": _tell_plan(snapshot, frozen),
         "product": frozen["product"]["version"],
-        "quality": f"{' and '.join(used) or 'No hidden repeats or attention checks'}, never "
-        "rated; no vote is removed by them",
+        "quality": _tell_quality(frozen["rules"]),
         "key": key,
+        "criterion": CRITERIA.get(Question(key), {}),
         "question": str(Question(key).label),
         "method": method_text(snapshot),
         "votes": votes_text(snapshot.votes_cast, snapshot.settled_ties),
         "left_out": ", ".join(f"{number} {reason}" for reason, number in left_out) or "none",
         "agreement": _tell_agreement(snapshot.results.trust),
+        "tests": _tell_tests(snapshot.results.board),
         "preregistration": preregistration_sha256(study),
     }
 
@@ -116,11 +123,49 @@ def _render(name: str, methods: dict[str, Any]) -> str:
     return str(template.render(Context(methods, autoescape=False)))
 
 
+def _tell_plan(snapshot: Snapshot, frozen: dict[str, Any]) -> str:
+    plan = (
+        f"A balanced plan ({frozen['product']['planner']}, seed {frozen['seed']}) chose pairs and "
+        f"sides before the first vote, {snapshot.study.votes_per_expert} pairs for each of "
+        f"{frozen['experts']} accounts"
+    )
+    settled = len(frozen["rules"].get("identical", ()))
+    if not settled:
+        return plan
+    is_left_out = Filters.of_document(snapshot.filters).leave_out_settled
+    counted = (
+        "are left out" if is_left_out else "count as ties, each as often as others on average"
+    )
+    return f"{plan}; {settled} pairs that nobody can tell apart were not shown and {counted}"
+
+
+def _tell_quality(rules: dict[str, Any]) -> str:
+    shares = {"hidden repeats": "repeat_share", "attention checks": "check_share"}
+    used = [
+        f"{100.0 * rules[share]:.0f} % {name}"
+        for name, share in shares.items()
+        if rules.get(share)
+    ]
+    if not used:
+        return "There were no hidden repeats or attention checks"
+    return f"On top came {' and '.join(used)}; they are not rated, and no vote is removed by them"
+
+
+def _tell_tests(board: BoardRemarks) -> str:
+    if board.above is None:
+        return "Differences of pairs are not tested: too few experts or scenarios, or unknown ones"
+    pairs = "All pairs" if board.p_values is None else f"All {len(board.p_values)} pairs"
+    number = len(board.above)
+    verb = "differs" if number == 1 else "differ"
+    return f"{pairs} are tested at once, at an error of 5 % for the table; {number} {verb}"
+
+
 def _tell_agreement(trust: Trust) -> str:
     parts = []
     if trust.agreement is not None:
         alpha, units = _text(trust.agreement.alpha), trust.agreement.units
-        parts.append(f"Krippendorff's alpha (nominal) is {alpha} on {units} shared pairs")
+        on = f"{units} pair{'s' * (units != 1)} that several experts judged"
+        parts.append(f"Krippendorff's alpha (nominal) is {alpha} on {on}")
     if trust.repeats is not None:
         number, same = trust.repeats.number, _text(trust.repeats.same)
         parts.append(f"Of {number} hidden repeats a share of {same} was answered alike")
@@ -133,4 +178,4 @@ def _text(estimate: Estimate) -> str:
         return "undetermined"
     if estimate.lower is None or estimate.upper is None:
         return f"{estimate.value:.2f}"
-    return f"{estimate.value:.2f} (95 % {estimate.lower:.2f} to {estimate.upper:.2f})"
+    return f"{estimate.value:.2f} (95 % interval {estimate.lower:.2f} to {estimate.upper:.2f})"
