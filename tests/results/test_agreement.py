@@ -8,10 +8,8 @@ import pytest
 from django.urls import reverse
 
 from arena.models import Snapshot, Study, Vote
-from arena.rating.agreement import AgreementLine, LineRole, measure_agreement, rater_by_pairs
+from arena.rating.agreement import AgreementLine, LineRole
 from arena.results.exports.writers import RATING_FILES
-from arena.results.queries.votes import Filters, current_votes
-from arena.results.services.agreement import pair_votes
 from arena.results.services.ratings import rate_now
 from arena.site import demo
 from arena.site.demo import RATED, SIMULATED_EXPERTS, hold_study
@@ -107,27 +105,6 @@ def test_displacement_and_the_experts_are_those_counted_from_the_rows(rating: Sn
     assert experts.share.value == pytest.approx(np.mean(means))
     assert (experts.known, experts.role) == (len(means), LineRole.EXPERTS)
     assert lines["A coin"].known == len(votes)
-
-
-def test_a_metric_that_agrees_on_80_percent_of_the_pairs_is_shown_so(rating: Snapshot) -> None:
-    """Pair after pair in a random order it takes the experts' side while 80 % allow it."""
-    on_pair: dict[tuple[str, str], int] = {}
-    for won, lost in decided(rating):
-        one, other = sorted((str(won.code), str(lost.code)))
-        on_pair[one, other] = on_pair.get((one, other), 0) + (1 if str(won.code) == one else -1)
-    votes = pair_votes(current_votes(rating.study, Filters(), rating.last_vote))
-    for seed in range(5):
-        rng = np.random.default_rng(seed)
-        pairs = [pair for pair in sorted(on_pair) if on_pair[pair]]
-        wrong = {pairs[at] for at in rng.permutation(len(pairs))[: round(0.2 * len(pairs))]}
-        metric = {
-            pair: int(np.sign(on_pair[pair])) * (-1 if pair in wrong else 1) for pair in pairs
-        }
-        line = measure_agreement(votes, [rater_by_pairs("80", metric)])[1]
-        assert line.share.lower is not None
-        assert line.share.upper is not None
-        assert line.share.lower < 0.8 < line.share.upper
-        assert line.share.value == pytest.approx(0.8, abs=0.05)
 
 
 def test_the_page_says_it_first_and_every_file_has_it(rating: Snapshot) -> None:
