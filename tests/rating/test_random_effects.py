@@ -5,27 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, t_quantile
+from arena.rating.comparisons import Comparisons, FloatArray, t_quantile
 from arena.rating.leaderboard import Method, rate
-from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
+from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.random_effects import find_quantiles
 from arena.rating.rules import Unit
-from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model
+from arena.rating.sandwich import estimate_spread
 from bench.worlds import World
-from tests.rating.votes import simulated
+from tests.rating.votes import pulls_of, simulated
 
 TRUTH = [1080.0, 1020.0, 980.0, 920.0]
 SMALL = World(
     ratings=np.array(TRUTH), scenario_sd=100.0, expert_sd=60.0, experts=4, scenarios=6,
     votes_per_expert=36,
 )  # fmt: skip
-
-
-def pulls_of(votes: Comparisons) -> Pulls:
-    counts = count_pairs(votes)
-    met = Meetings(len(votes.names), counts)
-    answer = fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
-    return pulls_of_model(votes, met, counts.games, answer)
 
 
 def quantiles(votes: Comparisons, *, rounds: int, seed: int = 1) -> tuple[FloatArray, FloatArray]:

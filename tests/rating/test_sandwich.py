@@ -8,13 +8,13 @@ import pytest
 import scipy.stats
 import statsmodels.api as sm
 
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, t_above, t_quantile
+from arena.rating.comparisons import Comparisons, FloatArray, t_above, t_quantile
 from arena.rating.leaderboard import rate
-from arena.rating.models import ELO_PER_LOGIT, Meetings, to_elo
+from arena.rating.models import ELO_PER_LOGIT, to_elo
 from arena.rating.rules import Unit
-from arena.rating.sandwich import Pulls, estimate_spread, pulls_of_model, remaining_share
+from arena.rating.sandwich import estimate_spread, remaining_share
 from bench.worlds import World
-from tests.rating.votes import fit, simulated
+from tests.rating.votes import fit, pulls_of, simulated
 
 ARENA_RANK = json.loads((Path(__file__).parent / "arena_rank.json").read_text())
 TRUTH = [1060.0, 1020.0, 1000.0, 980.0, 940.0]
@@ -30,11 +30,6 @@ def covariance(votes: Comparisons, unit: Unit) -> FloatArray:
 
 def half_widths(votes: Comparisons, unit: Unit) -> FloatArray:
     return np.asarray(1.959964 * np.sqrt(covariance(votes, unit).diagonal()))
-
-
-def pulls_of(votes: Comparisons) -> Pulls:
-    counts, strengths = count_pairs(votes), fit(votes)
-    return pulls_of_model(votes, Meetings(len(votes.names), counts), counts.games, strengths)
 
 
 @pytest.mark.parametrize("degrees", [1.0, 1.3, 2.0, 3.0, 8.0, 19.0, 57.4, 4000.0, 1e6])

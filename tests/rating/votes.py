@@ -11,6 +11,7 @@ from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, In
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.rules import Unit
+from arena.rating.sandwich import Pulls, pulls_of_model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +89,12 @@ def fit(votes: Comparisons) -> FloatArray:
     counts = count_pairs(votes)
     met = models.Meetings(len(votes.names), counts)
     return models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
+
+
+def pulls_of(votes: Comparisons) -> Pulls:
+    counts, strengths = count_pairs(votes), fit(votes)
+    met = models.Meetings(len(votes.names), counts)
+    return pulls_of_model(votes, met, counts.games, strengths)
 
 
 def named(votes: list[Comparison], *names: str) -> Comparisons:

@@ -89,6 +89,3 @@ def moderated(votes: list[RawVote], slugs: list[str]) -> tuple[np.ndarray, np.nd
     total = np.maximum(total, 0.6 * base)
     freedom = total**2 / sum(variance**2 / degrees for variance, degrees in parts)
     return t.ppf(0.975, freedom) * np.sqrt(total), total
-
-
-# --- The table -----------------------------------------------------------------------------------

@@ -90,29 +90,24 @@ def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
 
 def make_scatters(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatter]:
     """Return the scatter charts that have points, by name."""
-    metres = {line.slug: line.median_m for line in snapshot.results.displacement}
-    wishes = {line.slug: line.wish_median_m for line in snapshot.results.displacement}
-    costs = {line.slug: line for line in snapshot.results.cost}
+    far, costs = snapshot.results.displacement, snapshot.results.cost
+    classes = {line.slug: line.model_class for line in costs}
     rated = [(key, row) for key, row in key_rows(table) if row.rating is not None]
-    wished, far = (
-        [
-            Point(key=key, row=row, x=x)
+    plots = {}
+    for name, across, values in (
+        ("wish", "Median distance to the wish (m)", {x.slug: x.wish_median_m for x in far}),
+        ("displacement", "Median displacement (m)", {x.slug: x.median_m for x in far}),
+        ("elo-usd", "USD per scenario", {x.slug: x.usd or None for x in costs}),
+    ):
+        is_money = name == "elo-usd"
+        points = [
+            Point(key=key, row=row, x=x, model_class=classes[row.slug] if is_money else "")
             for key, row in rated
             if (x := values.get(row.slug)) is not None
         ]
-        for values in (wishes, metres)
-    )
-    spent = [
-        Point(key=key, row=row, x=cost.usd, model_class=cost.model_class)
-        for key, row in rated
-        if (cost := costs.get(row.slug)) and cost.usd
-    ]
-    by_name = {
-        "wish": Scatter(across="Median distance to the wish (m)", points=wished),
-        "displacement": Scatter(across="Median displacement (m)", points=far),
-        "elo-usd": Scatter(across="USD per scenario", points=spent, is_log=True),
-    }
-    return {name: plot for name, plot in by_name.items() if plot.points}
+        if points:
+            plots[name] = Scatter(across=across, points=points, is_log=is_money)
+    return plots
 
 
 def key_rows(table: LeaderboardTable) -> list[tuple[str, Row]]:

@@ -121,9 +121,8 @@ class RatedVote(NamedTuple):
         return sides.get(self.outcome)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Competitor:
-    """Contestant of a rating; `contestant` is None for names from a file."""
+class Competitor(NamedTuple):
+    """Contestant of a rating, as a Standing has it; `contestant` is None for names of a file."""
 
     slug: str
     name: str

@@ -214,16 +214,7 @@ def keep(snapshot: Snapshot, computed: ComputedRating) -> Snapshot:
     snapshot.finished_at = timezone.now()
     snapshot.save()
     Standing.objects.bulk_create(
-        Standing(
-            snapshot=snapshot,
-            contestant=competitor.contestant,
-            slug=competitor.slug,
-            name=competitor.name,
-            variant=competitor.variant,
-            kind=competitor.kind,
-            is_simulated=competitor.is_simulated,
-            **snapshot_values(line),
-        )
+        Standing(snapshot=snapshot, **competitor._asdict(), **snapshot_values(line))
         for competitor, line in zip(computed.competitors, computed.board.lines, strict=True)
     )
     return snapshot

@@ -61,6 +61,3 @@ def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:
     """The rows with their head; no cell is a formula."""
     names = vote_columns(version)
     return csv_text(names, (row[: len(names)] for row in rows)).encode()
-
-
-# --- Private -----------------------------------------------------------------------------------
