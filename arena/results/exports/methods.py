@@ -153,7 +153,10 @@ def _tell_quality(rules: dict[str, Any]) -> str:
 
 def _tell_tests(board: BoardRemarks) -> str:
     if board.above is None:
-        return "Differences of pairs are not tested: too few experts or scenarios, or unknown ones"
+        why = "the intervals do not know how votes are clustered"
+        if board.seems_above is not None:
+            why = "too few experts or scenarios judged"
+        return f"Differences of pairs are not tested: {why}"
     pairs = "All pairs" if board.p_values is None else f"All {len(board.p_values)} pairs"
     number = len(board.above)
     verb = "differs" if number == 1 else "differ"
