@@ -10,7 +10,6 @@ from arena.results.pages import boards, judges
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
 from arena.results.pages.comparison import comparison_page
-from arena.results.pages.shared import send_shared, show_shared
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
 from arena.studies.pages import experts, setup, studies
@@ -88,8 +87,8 @@ urlpatterns: list[URLPattern] = [
     path(f"{STUDY}/rating/<slug:name>.<slug:form>", results.rating_file, name="results-export"),
     path(f"{RATING}/share/", results.share, {"is_shared": True}, name="results-share"),
     path(f"{RATING}/unshare/", results.share, {"is_shared": False}, name="results-unshare"),
-    path("shared/<str:token>/", show_shared, name="shared-results"),
-    path("shared/<str:token>/table.<slug:form>", send_shared, name="shared-file"),
+    path("shared/<str:token>/", results.show_shared, name="shared-results"),
+    path("shared/<str:token>/table.<slug:form>", results.send_shared, name="shared-file"),
     path("boards/", boards.boards_page, name="boards"),
     path("boards/<uuid:code>/", boards.board_page, name="board"),
     path("boards/<uuid:code>/export.zip", boards.board_export, name="board-export"),

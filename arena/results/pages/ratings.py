@@ -6,20 +6,23 @@ from typing import Any, Unpack
 
 from django import forms
 from django.contrib import messages
+from django.contrib.auth.decorators import login_not_required
 from django.core.exceptions import PermissionDenied
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.text import slugify
+from django.views.decorators.http import require_safe
 
 from arena.errors import NoSnapshot
 from arena.exports.formats import download
 from arena.models import Question, Snapshot, Study
 from arena.rating.rules import METHOD_TEXTS
+from arena.results.exports.tables import for_experts, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
-from arena.results.exports.writers import CHART_FORMATS, download_rating
-from arena.results.pages.tabs import FOR_EXPERTS, MAIN, TABS, describe
+from arena.results.exports.writers import CHART_FORMATS, FORMATS, download_rating
+from arena.results.pages.tabs import FOR_EXPERTS, MAIN, TABS, describe, fill_table
 from arena.results.queries.access import list_snapshots, snapshot_to_export
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import (
@@ -39,6 +42,7 @@ from arena.shell.access import (
     act_for,
     form_for,
     get_user,
+    keep_secret,
     page_for,
 )
 from arena.shell.accounts import top_role
@@ -56,7 +60,13 @@ from arena.shell.pictures import charts_for_pages
 from arena.studies.pages.studies import export_place, study_question
 from arena.studies.queries import count_progress
 from arena.studies.services.opening import close_study
-from arena.voting.queries.blinding import ResultsAccess, is_imported, results_access, votes_in
+from arena.voting.queries.blinding import (
+    ResultsAccess,
+    is_imported,
+    refuse_open_judge,
+    results_access,
+    votes_in,
+)
 from augment.services import read_request, to_inputs
 from augment.services.scenarios import type_choices
 
@@ -219,6 +229,32 @@ def close_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study", code=code)
 
 
+# --- For whoever has the link ------------------------------------------------------------------
+
+DATA = {form: FORMATS[form] for form in ("csv", "json")}
+
+
+@login_not_required
+@require_safe
+def show_shared(request: HttpRequest, token: str) -> HttpResponse:
+    """The sentence, the table, how it came about, and links to its data."""
+    snapshot = _find_snapshot(request, token)
+    description = describe(snapshot, is_staff=False)
+    context = {"study": snapshot.study, "snapshot": snapshot, "token": token}
+    context |= description | fill_table(snapshot, description["table"])
+    return keep_secret(render(request, "results/shared.html", context))
+
+
+@login_not_required
+@require_safe
+def send_shared(request: HttpRequest, token: str, form: str) -> HttpResponse:
+    """The data of the page, as CSV or JSON."""
+    snapshot = _find_snapshot(request, token)
+    stem = f"{slugify(snapshot.study.name) or 'study'}-leaderboard"
+    table = for_experts(leaderboard_table(snapshot))
+    return keep_secret(download(DATA, form, stem, table))
+
+
 # --- What other pages of a rating share --------------------------------------------------------
 
 
@@ -292,3 +328,11 @@ def _closing(study: Study) -> Confirmation:
         "Its results can be read then, also by its experts. To end it without any, cancel it.",
         button="Close the study",
     )
+
+
+def _find_snapshot(request: HttpRequest, token: str) -> Snapshot:
+    """The rating of a link that holds; of a study that is closed, as it was when it was shared."""
+    refuse_open_judge(request.user, Study.objects.filter(snapshots__shared__token=token))
+    rows = Snapshot.objects.select_related("study__vote_file")
+    closed = rows.filter(study__state=Study.State.CLOSED, state=Snapshot.State.READY)
+    return get_object_or_404(closed, shared__token=token)
