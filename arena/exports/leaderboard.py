@@ -6,6 +6,7 @@ Django.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from arena.exports.cells import Columns, Dtype, Value
@@ -27,7 +28,7 @@ class Column:
         kind: What Parquet holds.
         field: Of a line; of a whole table where there is no key.
         of: The leaderboards whose files have it.
-        key: In the JSON of a rating; empty where that says it once.
+        key: In the JSON of a rating; empty where a whole table says it once.
         printed: Its head in LaTeX and on a terminal, and the field that stands there.
         identifies: Says whose line it is, which stands first where it is printed.
         is_old: Also of ratings that did not count settled ties apart.
@@ -81,6 +82,10 @@ COLUMNS = (
     _column("sends"),
     _column("settled_ties", Dtype.WHOLE, RATING, BOARD, is_old=False),
     _column("votes_sha256", key="", field="snapshot.votes_sha256", is_old=False),
+    _column("remarks", Dtype.TEXT, BOARD, key="", field=lambda table: " ".join(table.notes)),
+    _column("submitted", Dtype.WHOLE, BOARD),
+    _column("withdrawn", Dtype.WHOLE, BOARD),
+    _column("provisional", Dtype.YES_NO, BOARD, field="is_provisional"),
 )
 WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
 _PRINTED = dict(column.printed for column in WHOSE_FIRST if column.printed)
@@ -98,10 +103,32 @@ def print_lines(lines: Sequence[Any], *, has_places: bool = True) -> list[list[s
     return [list(fields), *cells]
 
 
-def file_columns(leaderboard: str) -> Columns:
-    """Return the columns of a leaderboard's files, as sheets take them."""
+def list_columns(leaderboard: str, *, is_old: bool = False) -> list[Column]:
+    """Return the columns of a leaderboard, those that say whose line it is first."""
+    return [
+        column
+        for column in WHOSE_FIRST
+        if leaderboard in column.of and (column.is_old or not is_old)
+    ]
+
+
+def file_columns(leaderboard: str, table: Any, *, is_old: bool = False) -> Columns:
+    """Return the columns of a leaderboard's files, as sheets take them.
+
+    Args:
+        leaderboard: Which.
+        table: That whose lines are written; some columns have the same value in all of them.
+        is_old: Whether it is of before settled ties were counted apart.
+    """
+    chosen = list_columns(leaderboard, is_old=is_old)
     return {
-        column.name: (column.field, column.kind)
-        for column in COLUMNS
-        if column.name and leaderboard in column.of
+        column.name: (column.field if column.key else _once(column.field, table), column.kind)
+        for column in sorted(chosen, key=COLUMNS.index)
+        if column.name
     }
+
+
+def _once(field: Value, table: Any) -> Value:
+    """Return what reads a field of the table, whatever the line."""
+    read = field if callable(field) else attrgetter(field)
+    return lambda line: read(table)

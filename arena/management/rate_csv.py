@@ -13,7 +13,7 @@ from typing import Any
 
 from arena.exports.cells import csv_text
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
-from arena.exports.leaderboard import VOTES_FILE, WHOSE_FIRST, print_lines
+from arena.exports.leaderboard import VOTES_FILE, list_columns, print_lines
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.lines import notes_by_reason
@@ -40,7 +40,7 @@ HELP = (
 )
 _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
 
-COLUMNS = {column.name: str(column.field) for column in WHOSE_FIRST if VOTES_FILE in column.of}
+COLUMNS = {column.name: str(column.field) for column in list_columns(VOTES_FILE)}
 """Those of CSV and JSON, by the fields of a line."""
 _CLUSTERED = {
     Unit.VOTE: "single votes",

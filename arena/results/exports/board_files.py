@@ -13,7 +13,6 @@ from typing import Any
 
 from django.template.loader import render_to_string
 
-from arena.exports.cells import Columns, Dtype
 from arena.exports.files import write_whole
 from arena.exports.formats import json_bytes, make_sheet, sheet_csv
 from arena.exports.leaderboard import BOARD, file_columns
@@ -31,13 +30,10 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
     rows = table_rows(table)
     simulated = " (simulated)" if table.includes_simulated else ""
     chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
-    remarks: Columns = {"remarks": (lambda _: " ".join(table.notes), Dtype.TEXT)}
-    attempts = Dtype.WHOLE.columns("submitted", "withdrawn")
-    provisional: Columns = {"provisional": ("is_provisional", Dtype.YES_NO)}
-    columns = {**file_columns(BOARD), **remarks, **attempts, **provisional}
+    sheet = make_sheet(table.lines, file_columns(BOARD, table), name="board-table")
     return {
         "json": json_bytes(asdict(table)).decode(),
-        "csv": sheet_csv(make_sheet(table.lines, columns, name="board-table")).decode(),
+        "csv": sheet_csv(sheet).decode(),
         "svg": chart.decode(),
         "html": render_to_string("boards/frozen.html", _table_context(table)),
     }

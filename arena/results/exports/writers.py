@@ -29,7 +29,7 @@ from arena.exports.formats import (
     table_formats,
 )
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
-from arena.exports.leaderboard import COLUMNS, RATING, WHOSE_FIRST, Column, print_lines
+from arena.exports.leaderboard import RATING, file_columns, list_columns, print_lines
 from arena.models import Snapshot
 from arena.rating.rules import Intervals
 from arena.rating.snapshot_document import Results, results_document
@@ -50,11 +50,7 @@ MANIFEST = "manifest.json"
 
 def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
     """Return one row a contestant; in CSV numbers have two decimals."""
-    columns = {
-        column.name: (partial(_value_of, column, table), column.kind)
-        for column in _columns_in(table, COLUMNS)
-        if column.name
-    }
+    columns = file_columns(RATING, table, is_old=_is_old(table))
     return make_sheet(table.rows, columns, name="leaderboard", digits=None, number=".2f")
 
 
@@ -245,14 +241,8 @@ def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _columns_in(table: LeaderboardTable, columns: Iterable[Column]) -> list[Column]:
-    """Return those that the rating of a table has."""
-    is_new = table.snapshot.results.board.settled_ties is not None
-    return [column for column in columns if RATING in column.of and (is_new or column.is_old)]
-
-
-def _value_of(column: Column, table: LeaderboardTable, row: Row) -> object:
-    return read_value(row if column.key else table, column.field, None)
+def _is_old(table: LeaderboardTable) -> bool:
+    return table.snapshot.results.board.settled_ties is None
 
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
@@ -260,7 +250,7 @@ def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
     part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {
         column.key: read_value(row, column.field)
-        for column in _columns_in(table, WHOSE_FIRST)
+        for column in list_columns(RATING, is_old=_is_old(table))
         if column.key
     } | part
 
