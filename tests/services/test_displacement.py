@@ -29,8 +29,8 @@ def ended(
     change: Modification = NEAR,
 ) -> Augmentation:
     is_done = state == Augmentation.State.DONE
-    change = change if is_done else None
-    return rows.add_answer(job, scenario, contestant, change, state=state)
+    made = change if is_done else None
+    return rows.add_answer(job, scenario, contestant, made, state=state)
 
 
 def a_job() -> GenerationJob:
