@@ -29,8 +29,8 @@ def ended(
     change: Modification = NEAR,
 ) -> Augmentation:
     is_done = state == Augmentation.State.DONE
-    made = change if is_done else None
-    return rows.add_answer(job, scenario, contestant, made, state=state)
+    made, image = (change, "bev/x.png") if is_done else (None, "")
+    return rows.add_answer(job, scenario, contestant, made, state=state, image=image)
 
 
 def a_job() -> GenerationJob:
