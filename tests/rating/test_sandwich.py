@@ -99,7 +99,7 @@ def test_ratings_and_intervals_agree_with_arena_rank(name: str) -> None:
 # --- Moderated variances ---------------------------------------------------------------------
 
 
-STUDIES = 250
+STUDIES = 120
 
 
 @pytest.mark.parametrize(
