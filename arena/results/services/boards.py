@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
@@ -223,13 +222,7 @@ def make_document(
     standings = hide_ranks(rated.standings) if not_ranked else rated.standings
     since = {line.slug: line.since for line in before.lines} if before else {}
     lines = tuple(
-        _board_line(
-            line,
-            by_slug[line.name],
-            settled,
-            since=since.get(line.name, made_at[:10]),
-            is_provisional=is_provisional(line, board.provisional_above),
-        )
+        _board_line(board, line, by_slug[line.name], since.get(line.name, made_at[:10]), settled)
         for line in anchor_lines(standings, founders)
     )
     judges = {vote.judge: vote.judge_name for vote in votes}
@@ -298,19 +291,22 @@ def _pool(study: Study, votes: VoteSet) -> PooledStudy:
     )
 
 
-def _board_line(line: Line, who: Competitor, settled: Counter[str], **more: Any) -> BoardLine:
+def _board_line(
+    board: Board, line: Line, who: Competitor, since: str, settled: Counter[str]
+) -> BoardLine:
     card = (who.contestant and who.contestant.card) or {}
     submitted, withdrawn = _count_attempts(who.contestant)
     return BoardLine(
         slug=who.slug,
         kind=who.kind,
         is_simulated=who.is_simulated,
+        since=since,
         authors=tuple(card.get("authors", ())),
         is_open=card.get("is_open"),
         settled_ties=settled[who.slug],
+        is_provisional=is_provisional(line, board.provisional_above),
         submitted=submitted,
         withdrawn=withdrawn,
-        **more,
         **asdict(line)
         | {"name": who.name, "votes": line.votes - settled[who.slug]}
         | {"ties": line.ties - settled[who.slug]},
