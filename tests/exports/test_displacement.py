@@ -12,7 +12,7 @@ from arena.jobs.exports.displacement import (
     object_sheet,
 )
 from arena.jobs.exports.tables import JOB_TABLES, augmentation_sheet
-from augment.models import Contestant, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.planned_motion import AtTime
@@ -108,7 +108,7 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     assert b"2026" not in first[:400]
 
 
-def add_moving(job: GenerationJob) -> None:
+def add_moving(job: GenerationJob) -> Augmentation:
     """Bea's car starts a second too late: over 6 s it is 177.5 / 61 m behind, then 5 m."""
     place = rows.add_scenario(
         "cut",
@@ -118,7 +118,7 @@ def add_moving(job: GenerationJob) -> None:
         intent_origin="",
     )
     bea = rows.add_kind("bea", Contestant.Kind.RULE)
-    rows.add_answer(job, place, bea, starts(AtTime(after_s=3.0)))
+    return rows.add_answer(job, place, bea, starts(AtTime(after_s=3.0)))
 
 
 def test_columns_over_time_appear_where_something_moves() -> None:
