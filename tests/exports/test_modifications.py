@@ -12,7 +12,7 @@ from django.core.management.base import CommandError
 from augment.formats.interplan.file import scene_token
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.scenarios.catalogue import load_catalogue
-from augment.services.scenarios.scenes import load_reference
+from augment.services.scenarios.scenes import LoadedScenario
 from tests.fixtures.shelf import FOLDER
 from tests.jobs import rows
 
@@ -31,7 +31,7 @@ def job() -> GenerationJob:
     rule = rows.add_kind("rule", Contestant.Kind.RULE)
     for slug in SLUGS:
         scenario = Scenario.objects.get(slug=slug)
-        rows.add_answer(job, scenario, reference, load_reference(scenario))
+        rows.add_answer(job, scenario, reference, LoadedScenario(scenario).reference)
         rows.add_answer(job, scenario, rule)
     return job
 
