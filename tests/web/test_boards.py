@@ -36,8 +36,8 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
             uploaded_by=[cast["researcher"], cast["admin"]][sender],
         )
     admin, stranger = signed_in(cast["admin"]), Client()
-    asked = {"name": "City", "study": str(first.code), "provisional_above": "100"}
-    admin.post(reverse("boards"), asked)
+    made = {"name": "City", "study": str(first.code), "provisional_above": "100"}
+    admin.post(reverse("boards"), made)
     board = Board.objects.get()
     page = reverse("board", args=[board.code])
     assert "No table was published yet." in admin.get(page).content.decode()
