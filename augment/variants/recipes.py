@@ -35,8 +35,7 @@ class Keep(StrEnum):
 class Recipe:
     """One variant: lane format x tools x review.
 
-    Raises:
-        ValueError: Bezier lanes without a tool: nobody should have to walk along control points.
+    Bezier lanes come with a tool: nobody should have to walk along control points.
     """
 
     slug: str
@@ -46,10 +45,6 @@ class Recipe:
     review: Review | None = None
     keep: Keep = Keep.LAST
     limits: Limits = field(default_factory=Limits)
-
-    def __post_init__(self) -> None:
-        if self.lane_format is LaneFormat.BEZIER and self.tools is Tools.NONE:
-            raise ValueError(f"{self.slug}: Bezier lanes come with a function")
 
     @property
     def roles(self) -> tuple[ModelRole, ...]:

@@ -24,8 +24,3 @@ def test_a_combination_has_the_parts_of_both(name: str, calling: Recipe, tools: 
     assert (both.lane_format, both.tools) == (calling.lane_format, tools)
     assert (both.review, both.keep) == (TQA.review, Keep.BEST)
     assert (calling.tools, spell_variant(both.slug)) == (tools, name)
-
-
-def test_bezier_lanes_without_a_tool_are_refused() -> None:
-    with pytest.raises(ValueError, match="come with a function"):
-        Recipe(slug="bare", title="Bare", lane_format=LaneFormat.BEZIER)
