@@ -8,6 +8,7 @@ road is not asked: passing what stands in the lane may need the other one.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 _LAWFUL = ("no_ego_at_fault_collisions", "drivable_area_compliance", "ego_is_making_progress")
 """Parts of nuPlan's score, each 1 in a lawful drive."""
@@ -58,6 +59,9 @@ class TriedValue:
         return max(lawful, key=lambda trial: trial.score, default=None)
 
 
+Tried = TypeVar("Tried", bound=TriedValue)
+
+
 def find_edges(values: Iterable[TriedValue]) -> tuple[tuple[float, float], ...]:
     """Return between which neighbours the outcome changes: (passed, failed), in order of values.
 
@@ -73,7 +77,7 @@ def find_edges(values: Iterable[TriedValue]) -> tuple[tuple[float, float], ...]:
     )
 
 
-def find_hardest(values: Sequence[TriedValue]) -> TriedValue | None:
+def find_hardest(values: Sequence[Tried]) -> Tried | None:
     """Return the value that is solved, not by the planner under test, with the least score.
 
     Of equal ones that furthest from all values that the planner passes, then the lowest.

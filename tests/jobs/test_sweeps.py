@@ -105,7 +105,7 @@ def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
         road = Road(setting.scene)
         drive = run(setting, Straight(), road=road)
         by_hand[line.row.value] = not score_drive(drive, find_expert(setting, road)).collisions
-    assert {line.row.value: line.tried.is_passed for line in result.lines} == by_hand
+    assert {line.row.value: line.is_passed for line in result.lines} == by_hand
     # Bodies 2.297 m and 2 m wide pass each other at 2.149 m.
     assert result.edges == ((2.5, 2.0),)
     assert "passes 2.5 and fails 2" in result.verdict
@@ -154,7 +154,7 @@ def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> 
     DRIVES.cleanup(rows.NOON)
     sweep.refresh_from_db()
     assert sweep.hardest is not None
-    assert [line.tried.is_passed for line in sweep_result(sweep).lines] == [False, True]
+    assert [line.is_passed for line in sweep_result(sweep).lines] == [False, True]
     assert DRIVES.find_unsent(older_than=timedelta(0)) == []
 
 

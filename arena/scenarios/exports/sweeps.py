@@ -76,7 +76,7 @@ def _draw_curve(axes: Axes, result: SweepResult, driver: str, colour: str, strok
     trials = [
         (line.row.value, 100.0 * trial.score, trial.is_lawful)
         for line in result.lines
-        for trial in line.tried.trials
+        for trial in line.trials
         if trial.driver == driver
     ]
     values, scores, lawful = np.array(trials, dtype=float).reshape(-1, 3).T

@@ -59,7 +59,7 @@ class Command(TerminalCommand):
         for line in result.lines:
             parts = [
                 f"{trial.driver} {100.0 * trial.score:.1f}{'' if trial.is_lawful else ' (fails)'}"
-                for trial in line.tried.trials
+                for trial in line.trials
             ]
             parts += [drive.reason for drive in line.drives if drive.reason]
             self.stdout.write(f"{line.row.value:g}: {'; '.join(parts) or line.row.reason}")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from uuid import UUID
 
-from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import InvalidDocument
@@ -32,15 +31,12 @@ class ImportedResults:
     strangers: tuple[str, ...]
 
 
-def import_results(
-    *, tokens: Path, folders: Sequence[Path], actor: User | None = None
-) -> ImportedResults:
+def import_results(*, tokens: Path, folders: Sequence[Path]) -> ImportedResults:
     """Keep what nuPlan wrote about scenarios that were exported for interPlan; all or nothing.
 
     Args:
         tokens: `nuplan_tokens.csv` of that export.
         folders: Of experiments; each has `aggregator_metric/`.
-        actor: Who did it.
 
     Raises:
         InvalidDocument: A file can't be read, or two folders have the same drive.
@@ -68,7 +64,7 @@ def import_results(
             _keep(row, drive)
         for pk, number in sorted(Counter(row.job_id for row, _ in imported).items()):
             job = GenerationJob.objects.get(pk=pk)
-            log_change(job, "import nuPlan results", actor, after={"results": number})
+            log_change(job, "import nuPlan results", None, after={"results": number})
     failed = sum(drive.score is None for _, drive in imported)
     return ImportedResults(kept=len(imported), failed=failed, strangers=tuple(strangers))
 

@@ -27,23 +27,21 @@ _TRIAL = ("swept", "planner", "offsets", "state", "nuplan_score", "document", "c
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepLine:
+class SweepLine(TriedValue):
     """A value of a sweep.
 
     Attributes:
         row: With the reason why nothing fits, if that is so.
         drives: Without their traces; the planner under test first.
-        tried: What of it has a score.
     """
 
     row: SweepValue
     drives: tuple[Simulation, ...]
-    tried: TriedValue
 
     @property
     def cells(self) -> Sequence[tuple[Simulation | None, bool | None]]:
         """The drives, each with whether it was lawful; None where it has no score."""
-        lawful = {trial.driver: trial.is_lawful for trial in self.tried.trials}
+        lawful = {trial.driver: trial.is_lawful for trial in self.trials}
         return [(drive, lawful.get(driver_name(drive))) for drive in self.drives]
 
 
@@ -62,7 +60,7 @@ class SweepResult:
     sweep: Sweep
     lines: tuple[SweepLine, ...]
     edges: tuple[tuple[float, float], ...]
-    hardest: TriedValue | None
+    hardest: SweepLine | None
     planned: int
     under_way: int
 
@@ -76,7 +74,7 @@ class SweepResult:
     @property
     def verdict(self) -> str:
         """Threshold of the planner under test, as a sentence."""
-        passed = {line.tried.is_passed for line in self.lines} - {None}
+        passed = {line.is_passed for line in self.lines} - {None}
         if self.edges:
             places = "; ".join(f"it passes {good:g} and fails {bad:g}" for good, bad in self.edges)
             return f"Where the planner fails: {places}."
@@ -91,13 +89,12 @@ def sweep_result(sweep: Sweep) -> SweepResult:
     for drive in Simulation.objects.filter(swept__sweep=sweep).only(*_TRIAL).order_by("pk"):
         drives.setdefault(drive.swept_id or 0, []).append(drive)
     lines = tuple(_line(sweep, row, drives.get(row.pk, [])) for row in sweep.values.all())
-    tried = [line.tried for line in lines]
     states = [drive.state for line in lines for drive in line.drives]
     return SweepResult(
         sweep=sweep,
         lines=lines,
-        edges=find_edges(tried),
-        hardest=find_hardest(tried),
+        edges=find_edges(lines),
+        hardest=find_hardest(lines),
         planned=len(states),
         under_way=sum(state in Simulation.UNDER_WAY for state in states),
     )
@@ -119,8 +116,7 @@ def conclude(sweep_pk: int) -> None:
         return
     result = sweep_result(sweep)
     if result.hardest is not None:
-        row = next(line.row for line in result.lines if line.tried is result.hardest)
-        sweep.hardest = _keep(sweep, row)
+        sweep.hardest = _keep(sweep, result.hardest.row)
     sweep.concluded_at = timezone.now()
     sweep.save(update_fields=["hardest", "concluded_at"])
 
@@ -160,8 +156,7 @@ def _line(sweep: Sweep, row: SweepValue, drives: list[Simulation]) -> SweepLine:
         for drive in drives
         if drive.state == State.DONE and drive.document is not None
     )
-    tried = TriedValue(value=row.value, trials=trials)
-    return SweepLine(row=row, drives=tuple(drives), tried=tried)
+    return SweepLine(value=row.value, trials=trials, row=row, drives=tuple(drives))
 
 
 def _keep(sweep: Sweep, row: SweepValue) -> Scenario:

@@ -12,7 +12,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from django.contrib.auth.models import User
 from pydantic import BaseModel
 
 from augment.checks.derived import describe_change
@@ -53,15 +52,12 @@ class ImportStep:
     text: str
 
 
-def import_interplan(
-    *, folder: Path, data: Path | None = None, actor: User | None = None
-) -> Iterator[ImportStep]:
+def import_interplan(*, folder: Path, data: Path | None = None) -> Iterator[ImportStep]:
     """Keep every special scenario whose base token lies in a log, one by one.
 
     Args:
         folder: Holds interPlan's YAML somewhere.
         data: Holds nuPlan's logs and maps somewhere; None for the same folder.
-        actor: Who did it.
 
     Yields:
         Each step as it happens.
@@ -89,7 +85,7 @@ def import_interplan(
         yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {outcome}")
     for token, details in wanted.items():
         if token in logs:
-            yield from _keep_token(token, file, *logs[token], actor)
+            yield from _keep_token(token, file, *logs[token])
         else:
             yield from _skip_all(token, details, "none of the logs has a frame of its base token")
 
@@ -115,18 +111,18 @@ def _skip_all(token: str, details: interplan_file.Details, reason: str) -> Itera
 
 
 def _keep_token(
-    token: str, file: interplan_file.File, log: Path, vehicles_m: _Sizes, actor: User | None
+    token: str, file: interplan_file.File, log: Path, vehicles_m: _Sizes
 ) -> Iterator[ImportStep]:
     details = file.modification_details_dictionary[token]
     try:
         recorded = UntrustedInput(path=log, format=NuPlan.name, reach_m=REACH_M)
         source, reading = recorded.read(item=token, frame=None, name=f"interplan-{token}")
         try:
-            row, _ = keep_reading(reading, source=source, path=log, actor=actor)
+            row, _ = keep_reading(reading, source=source, path=log)
         except Conflict:  # an earlier release kept less of the map under this name
             scene = replace(reading.scene, name=free_scene_slug(reading.scene.name))
             reading = replace(reading, scene=scene)
-            row, _ = keep_reading(reading, source=source, path=log, actor=actor)
+            row, _ = keep_reading(reading, source=source, path=log)
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))
         return
@@ -135,7 +131,7 @@ def _keep_token(
     for index, entry in (details.special_scenario or {}).items():
         try:
             verbatim = _verbatim(file, token, index, entry)
-            yield _keep_entry(row, scene, entry, verbatim, vehicles_m, actor)
+            yield _keep_entry(row, scene, entry, verbatim, vehicles_m)
         except AugmentError as fault:
             yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {fault}")
 
@@ -167,7 +163,6 @@ def _keep_entry(
     entry: interplan_file.SpecialScenario,
     verbatim: dict[str, Any],
     vehicles_m: _Sizes,
-    actor: User | None,
 ) -> ImportStep:
     token, index = row.source_item, verbatim["index"]
     slug, name = f"{row.slug}-s{index}", f"{token}-s{index}"
@@ -204,5 +199,5 @@ def _keep_entry(
         traffic=traffic,
         interplan=verbatim,
     )
-    add_scenario(new, actor=actor)
+    add_scenario(new)
     return ImportStep(StepKind.NEW, f"{name}: {slug}{left_out}")

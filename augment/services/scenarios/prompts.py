@@ -23,12 +23,7 @@ def list_recipes() -> list[Recipe]:
 
 
 def preview_prompt(
-    scenario: Scenario,
-    *,
-    variant: str,
-    role: str,
-    native_tools: bool = False,
-    options: ContestantOptions | None = None,
+    scenario: Scenario, *, variant: str, role: str, native_tools: bool = False
 ) -> ShownPrompt:
     """Return the first messages to a role; reviewers judge the scenario's reference.
 
@@ -37,14 +32,13 @@ def preview_prompt(
         variant: The name of a recipe, in any case.
         role: Whose messages.
         native_tools: Whether the modifier calls natively.
-        options: Of whoever asks; without them the variant's own.
 
     Raises:
         UnknownName: No such variant or role.
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
     check_names("role", [role], [role_choice.value for role_choice in ModelRole])
-    recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
+    recipe = recipe_with(find_recipe(variant), ContestantOptions())
     if role not in recipe.roles:
         played = ", ".join(recipe.roles)
         raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")

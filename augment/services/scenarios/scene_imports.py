@@ -24,7 +24,6 @@ def import_scene(
     frame: int | None = None,
     item: str | None = None,
     slug: str | None = None,
-    actor: User | None = None,
 ) -> BaseScene:
     """Read a scene from outside and keep it, with its recording and what the source left open.
 
@@ -34,7 +33,6 @@ def import_scene(
         frame: The step that becomes t0, from 0; None for what the format means.
         item: Which part of a file that holds several; None for the first.
         slug: The new scene's name; made of the file's when None.
-        actor: Who did it.
 
     Raises:
         UnknownName: No such source.
@@ -45,7 +43,7 @@ def import_scene(
     check_slug(slug, what="scene")
     recorded = UntrustedInput(path=path, format=source)
     name, reading = recorded.read(item=item, frame=frame, name=slug)
-    row, is_new = keep_reading(reading, source=name, path=path, actor=actor)
+    row, is_new = keep_reading(reading, source=name, path=path)
     if not is_new:
         raise Conflict(f"The same scene is stored already, as {row.slug!r}.")
     return row
