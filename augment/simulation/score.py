@@ -24,7 +24,6 @@ from augment.simulation.states import (
     SPEED,
     STEP_S,
     BoolArray,
-    Contact,
     FloatArray,
     IntArray,
     Kind,
@@ -91,7 +90,6 @@ class Collision:
     moment: int
     object_id: str
     kind: Kind
-    contact: Contact
     at_fault: bool
 
 
@@ -190,15 +188,10 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
         states = np.repeat(drive.states[moment : moment + 1], len(hit), axis=0)
         contacts = classify_contacts(states, hit.boxes, hit.speeds_mps, hit.kinds, drive.body)
         faults = are_at_fault(contacts, np.repeat(astray[moment], len(hit)))
-        for name, kind, contact, fault in zip(hit.ids, hit.kinds, contacts, faults, strict=True):
-            collision = Collision(
-                moment=moment,
-                object_id=name,
-                kind=Kind(kind),
-                contact=Contact(contact),
-                at_fault=bool(fault),
-            )
-            met.append(collision)
+        met += (
+            Collision(moment=moment, object_id=name, kind=Kind(kind), at_fault=bool(fault))
+            for name, kind, fault in zip(hit.ids, hit.kinds, faults, strict=True)
+        )
     return tuple(met)
 
 

@@ -4,14 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.geometry.frames import corners
-from augment.render.camera import MARGIN_M, Camera, camera_for
+from augment.render.camera import MARGIN_M, camera_for
 from augment.scene.entities import Modification
 from tests import scenes
 from tests.properties import examples
-
-
-def window(camera: Camera) -> tuple[float, float, float, float]:
-    return camera.x_min_m, camera.x_max_m, camera.y_min_m, camera.y_max_m
 
 
 def test_without_a_reference_the_window_looks_far_ahead() -> None:
