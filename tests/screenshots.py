@@ -92,7 +92,7 @@ def _shots() -> list[Shot]:
     from django.contrib.auth.models import User
 
     from arena.jobs.pages.jobs import TABS as PARTS
-    from arena.management.demo import OPEN_STUDY
+    from arena.management.commands.demo import OPEN_STUDY
     from arena.models import Study
     from arena.results.pages.tabs import TABS
     from arena.site.demo import JOB, SIMULATED_STUDY

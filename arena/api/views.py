@@ -11,9 +11,11 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Model, QuerySet
 from django.http.response import HttpResponseBase
+from django.urls import include, path
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
 from drf_spectacular.extensions import OpenApiAuthenticationExtension
+from drf_spectacular.generators import SchemaGenerator
 from drf_spectacular.openapi import AutoSchema
 from drf_spectacular.types import OpenApiTypes
 from drf_spectacular.utils import OpenApiParameter, extend_schema, inline_serializer
@@ -26,7 +28,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from arena.api.access import RoleAllowed
+from arena.api.access import STAFF, RoleAllowed
 from arena.api.fields import SoundJSONParser, StrictSerializer
 from arena.exports.formats import Export
 from arena.shell.receipts import StoredAnswer, answer_once, digest_body
@@ -376,3 +378,26 @@ def page_serializer(line: type[serializers.Serializer[Any]]) -> serializers.Seri
             ),
         },
     )
+
+
+# --- The document ------------------------------------------------------------------------------
+
+
+@cache
+def make_document() -> dict[str, Any]:
+    """Return the OpenAPI document; it is the same for everybody."""
+    patterns = [path("api/v1/", include("arena.site.api_urls"))]
+    generator = SchemaGenerator(patterns=patterns)  # type: ignore[no-untyped-call]
+    document: dict[str, Any] = generator.get_schema(request=None, public=True)  # type: ignore[no-untyped-call]
+    return document
+
+
+class DocumentView(ApiView):
+    """The document; it names variants, which experts must not know."""
+
+    readers = STAFF
+
+    @extend_schema(exclude=True)
+    def get(self, request: Request) -> Response:
+        """The whole document."""
+        return Response(make_document())

@@ -6,9 +6,8 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from rest_framework import serializers
 
-from arena.api.access import ADMINS
+from arena.api.access import ADMINS, make_api_token
 from arena.api.fields import StrictSerializer, TextField
-from arena.api.tokens import make_api_token
 from arena.api.views import ApiView, Params, operation
 from arena.people.links import accept, find_invitation, make_link_path
 from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin

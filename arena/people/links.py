@@ -12,7 +12,7 @@ from django.db import transaction
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.api.tokens import revoke_api_token
+from arena.api.access import revoke_api_token
 from arena.errors import LinkOver, NotYours
 from arena.models import ApiToken, Authorship, Invitation, Study, token_digest
 from arena.people.queries import may_be_let_in

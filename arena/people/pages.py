@@ -23,7 +23,7 @@ from django.utils.translation import gettext_lazy, ngettext
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods
 
-from arena.api.tokens import DAYS, REQUESTS, make_api_token, revoke_api_token
+from arena.api.access import DAYS, REQUESTS, make_api_token, revoke_api_token
 from arena.errors import LinkOver
 from arena.models import ApiToken, Invitation, Study
 from arena.people import links, services

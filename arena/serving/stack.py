@@ -24,6 +24,9 @@ SHORTEST_GRACE_S, DRAWING_S = 60.0, 30.0
 WEB_GRACE_S = 35.0
 """Gunicorn itself gives its workers 30 s."""
 
+INTERRUPTED = 130
+"""The exit code of what Ctrl-C ended before it was done, as shells have it."""
+
 MANAGE = (sys.executable, str(settings.BASE_DIR / "manage.py"))
 
 

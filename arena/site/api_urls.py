@@ -2,8 +2,7 @@
 
 from django.urls import URLPattern, path
 
-from arena.api import reference
-from arena.api.views import ApiView
+from arena.api.views import ApiView, DocumentView
 from arena.contestants import api as contestants
 from arena.jobs import api as jobs
 from arena.people import api as people
@@ -19,7 +18,7 @@ def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
 
 
 urlpatterns: list[URLPattern] = [
-    _at("openapi.json", reference.DocumentView, "api-document"),
+    _at("openapi.json", DocumentView, "api-document"),
     _at("people", people.PeopleView, "api-people"),
     _at("first", people.FirstView, "api-first"),
     _at("welcome", people.WelcomeView, "api-welcome"),

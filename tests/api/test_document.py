@@ -7,7 +7,7 @@ from django.urls import reverse
 from drf_spectacular.drainage import GENERATOR_STATS
 from drf_spectacular.validation import validate_schema
 
-from arena.api.reference import make_document
+from arena.api.views import make_document
 from arena.site.api_urls import urlpatterns
 from tests.web.cast import people, signed_in
 

@@ -9,8 +9,8 @@ from django.urls import reverse
 from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
-from arena.api import tokens
-from arena.api.tokens import make_api_token
+from arena.api import access as tokens
+from arena.api.access import make_api_token
 from arena.models import ApiToken
 from arena.people.services import set_active, set_role
 from arena.shell.accounts import effective_role

@@ -3,7 +3,7 @@
 from django.contrib.auth.models import User
 from django.test import Client
 
-from arena.api.tokens import make_api_token
+from arena.api.access import make_api_token
 from arena.shell.accounts import top_role
 
 

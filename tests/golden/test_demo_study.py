@@ -22,7 +22,7 @@ from pytest_django import Settings
 
 from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
-from arena.management.demo import vote_and_rate
+from arena.management.commands.demo import vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
 from arena.results.exports.study_folder import MANIFEST, write_study

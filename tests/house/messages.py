@@ -9,7 +9,7 @@ from django.utils.translation.template import templatize
 from tests.house.source import ROOT
 
 VOTER_MODULES = (
-    *("arena/api/errors.py", "arena/api/tokens.py", "arena/models/votes.py"),
+    *("arena/api/access.py", "arena/api/errors.py", "arena/models/votes.py"),
     *("arena/templatetags/shell.py", "arena/people/pages.py", "arena/voting/screen.py"),
     *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
     "arena/voting/pages.py",

@@ -140,7 +140,7 @@ def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
     note_calls(first, 1, (False, False), (False, False))  # broke, and was tried again
     note_calls(first, 2, (True, False), (True, True), (False, False))
     note_calls(second, 1, (True, False))
-    lines = [(line.attempted, line.understood, line.mended) for line in tool_calls(job)]
+    lines = [(line["attempted"], line["understood"], line["mended"]) for line in tool_calls(job)]
     assert lines == [(3, 2, 1), (1, 1, 0)]
 
     Augmentation.objects.update(state=Augmentation.State.FAILED)

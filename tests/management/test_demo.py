@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import pytest
 from django.core.management import CommandError
 
-from arena.management.commands.demo import Command
-from arena.management.demo import add_model, finish, launch_model
+from arena.management.commands.demo import Command, add_model, finish, launch_model
 from augment.errors import AugmentError
 from augment.fake_llm.server import running
 from augment.models import Contestant, Endpoint, ModelCall
@@ -72,7 +71,7 @@ def test_a_model_of_ones_own_runs_within_its_cap(
     assert not Contestant.objects.get(slug=own.contestants[0]).is_simulated
     for slug in ("near", "far"):
         add_scenario(slug, instruction=f"{INSTRUCTION} It is {slug}.")
-    monkeypatch.setattr("arena.management.demo.CALLS_PER_SCENARIO", 10)
+    monkeypatch.setattr("arena.management.commands.demo.CALLS_PER_SCENARIO", 10)
     lines: list[str] = []
     job = launch_model(own, ["near", "far"], lines.append)
     assert "on 2 scenarios" in lines[0]

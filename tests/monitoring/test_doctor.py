@@ -8,7 +8,7 @@ from django.core.cache import cache
 from django.core.management import CommandError, call_command
 from pytest_django import Settings
 
-from arena.management.doctor import Level, examine
+from arena.management.commands.doctor import Level, examine
 from arena.people.services import create_person
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker

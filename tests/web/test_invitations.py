@@ -9,7 +9,7 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.api.tokens import make_api_token
+from arena.api.access import make_api_token
 from arena.config.logs import HideKeys
 from arena.models import Invitation, Study
 from arena.people.links import invite

@@ -3,7 +3,7 @@
 import pytest
 from django.utils.translation import override
 
-from arena.api.tokens import make_api_token
+from arena.api.access import make_api_token
 from arena.models import Snapshot
 from arena.people.links import invite
 from arena.results.queries.votes import Filters

@@ -93,7 +93,7 @@ REPEATS: Columns = {
 
 TOOL_CALLS: Columns = {
     **Dtype.TEXT.columns("contestant", "name", "scenario", "augmentation"),
-    "simulated": ("is_simulated", Dtype.YES_NO),
+    **Dtype.YES_NO.columns("simulated"),
     **Dtype.WHOLE.columns("attempted", "understood", "mended"),
 }
 

@@ -1,25 +1,73 @@
-"""`manage.py demo`: the main job on the catalogue, unattended, then served."""
+"""`manage.py demo`: the main job on the catalogue, unattended, with simulated votes, then served.
 
+Every step can be repeated: what is there already is used again, so a second run changes nothing.
+"""
+
+import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 from django.conf import settings
+from django.contrib.auth.models import User
 from django.core.management import call_command
 from django.core.management.base import CommandError
+from django.db import transaction
 
-from arena.management import demo
-from arena.management.commands.serve import INTERRUPTED
-from arena.models import Snapshot
-from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
+from arena.errors import ArenaError
+from arena.exports.files import write_whole
+from arena.models import Snapshot, Study
+from arena.people.services import create_person
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import FORMATS, plain_text
+from arena.serving import stack
 from arena.serving.supervisor import Supervisor
 from arena.shell.sending import send_charts
-from arena.site.demo import JOB, launch_job, list_slugs
+from arena.site import demo
+from arena.studies.services.opening import open_study
+from arena.studies.services.plan import StudyPlan
+from arena.voting.services.drawing import draw_pictures
+from augment import models
+from augment.errors import KeyMissing, ModelFault
 from augment.services import TerminalCommand, at_least
-from augment.services.endpoints import EndpointRequest
+from augment.services.benchmarks import BenchmarkRequest, make_benchmark
+from augment.services.driving import plan_scenario
+from augment.services.driving.simulations import Options
+from augment.services.endpoints import (
+    ContestantRequest,
+    EndpointRequest,
+    add_contestant,
+    ensure_model,
+    paper_variants,
+)
+from augment.services.endpoints.contestants import REFERENCE, contestant_slug
+from augment.services.judging import pairs_apart
+from augment.services.running import JobRequest, count_rows
+from augment.services.running.estimates import estimate
+from augment.services.running.jobs import cancel, launch, retry_failed
+from augment.services.scenarios import load_catalogue
+from augment.tasks import enqueue_job, enqueue_simulations
 
-STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
+State = models.Augmentation.State
+
+PASSWORD = "arena-demo"  # for the demo's own accounts on this computer
+PEOPLE = (("admin", "admin"), ("researcher", "researcher"), ("expert", "expert"))
+OPEN_STUDY = "Try it yourself"
+OPEN_STUDY_WITH_MODEL = f"{OPEN_STUDY}, with your model"
+YOUR_VOTES = 20
+VISIBLE_M = 1.0
+SEEDS_TRIED = 12
+STUCK_S = 600.0
+"""A job in which nothing ends for so long is stuck; a slow computer only takes its time."""
+
+A_LINE_EVERY = 8
+DRIVEN_PER_TYPE = 2
+CALLS_PER_SCENARIO = 12
+"""So many calls a model of one's own may take, 60 on the five scenarios that it gets."""
 
 
 class Command(TerminalCommand):
@@ -54,55 +102,58 @@ class Command(TerminalCommand):
         if bool(options["endpoint"]) != bool(options["model"]):
             raise CommandError("--endpoint and --model name a model together: give both.")
         try:
-            with hold_alone():
+            with stack.hold_alone():
                 self._run(options, serve=not options["no_serve"])
         except KeyboardInterrupt:
-            raise CommandError(STOPPED, returncode=INTERRUPTED) from None
+            raise CommandError(
+                "The demo was stopped before it was done; started again, it goes on from there.",
+                returncode=stack.INTERRUPTED,
+            ) from None
 
     def _run(self, options: Mapping[str, Any], *, serve: bool) -> None:
         started, say = time.monotonic(), self.stdout.write
-        web = Web(host=options["host"], port=options["port"])
-        server = [web_server(web)] if serve else []
+        web = stack.Web(host=options["host"], port=options["port"])
+        server = [stack.web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
         own = None
         if options["endpoint"]:
             request = EndpointRequest(base_url=options["endpoint"], key_variable=options["key"])
-            own = demo.add_model(request, options["model"])
-        demo.prepare(say)
-        scenarios = [*list_slugs(options["per_type"]), *list_slugs(1, "moving")]
-        jobs = [launch_job(scenarios=scenarios, leave_out=own.contestants if own else ())]
+            own = add_model(request, options["model"])
+        prepare(say)
+        scenarios = [*demo.list_slugs(options["per_type"]), *demo.list_slugs(1, "moving")]
+        jobs = [demo.launch_job(scenarios=scenarios, leave_out=own.contestants if own else ())]
         if own is not None:
-            chosen = scenarios if options["scenarios"] == "all" else list_slugs(1)
-            jobs.append(demo.launch_model(own, chosen, say))
-        supervisor = Supervisor([*background(concurrency=4), *server], self._keep)
+            chosen = scenarios if options["scenarios"] == "all" else demo.list_slugs(1)
+            jobs.append(launch_model(own, chosen, say))
+        supervisor = Supervisor([*stack.background(concurrency=4), *server], self._keep)
         with supervisor.signals():
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)
                 for job in jobs:  # the last one's scenarios are those of the studies
-                    scenarios = demo.finish(job, say, look)
-                text, files = demo.vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
+                    scenarios = finish(job, say, look)
+                text, files = vote_and_rate(scenarios, settings.VAR_DIR / "demo", own)
                 send_charts(Snapshot.objects.latest("made_at").pk)
-                drives = demo.start_drives()
+                drives = start_drives()
                 say(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
                 if drives:
                     say(f"{len(drives)} drives follow in the background.")
                 if not serve:
-                    demo.finish_drives(drives, look)
+                    finish_drives(drives, look)
                 self._show(web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
-                    supervisor.watch(missing_stand_ins)
+                    supervisor.watch(stack.missing_stand_ins)
             finally:
                 supervisor.stop()
 
-    def _show(self, web: Web, took_s: float, *, serve: bool) -> None:
+    def _show(self, web: stack.Web, took_s: float, *, serve: bool) -> None:
         where = "Scenario Arena is at" if serve else "“make serve” serves it at"
         lines = [
             f"The demo took {took_s:.0f} s.\n",
             f"{where} {web.address}",
-            *demo.login_lines(),
-            f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
-            f"  See the drives as 'admin': Jobs, {JOB!r}, See the drives.",
+            *login_lines(),
+            f"  Vote as 'expert' in the study {OPEN_STUDY!r}.",
+            f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
         ]
         self.stdout.write("\n".join(lines))
         self.stdout.flush()
@@ -122,3 +173,249 @@ def _look_at(supervisor: Supervisor) -> None:
     supervisor.insist_on_steadiness()
     if supervisor.is_stopping:
         raise KeyboardInterrupt
+
+
+class DemoFailed(ArenaError):
+    """A step of the demo did not end as it should; the text says which and how."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnModel:
+    """A model of one's own in the demo, the slugs of its contestants, and its probe's calls."""
+
+    name: str
+    contestants: tuple[str, ...]
+    probe_calls: int
+
+
+def prepare(say: Callable[[str], None]) -> None:
+    """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
+    demo.load_scenarios()
+    load_catalogue(sets=["moving"])
+    scenarios, scenes = models.Scenario.objects.count(), models.BaseScene.objects.count()
+    say(f"Catalogue: {scenarios} scenarios on {scenes} scenes")
+    if not models.Benchmark.objects.exists():
+        make_benchmark(
+            BenchmarkRequest(slug="paper", title="The paper’s types", scenarios=["set:paper"])
+        )
+    models.Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
+    demo.add_contestants()
+    say(f"Contestants: {', '.join(models.Contestant.objects.values_list('slug', flat=True))}")
+    usernames = set(User.objects.values_list("username", flat=True))
+    for username, role in PEOPLE:
+        if username not in usernames:
+            create_person(username=username, password=PASSWORD, role=role)
+    demo.add_experts()
+
+
+def add_model(request: EndpointRequest, model: str) -> OwnModel:
+    """Add contestants of a model that answers; of one that doesn't nothing is made.
+
+    Raises:
+        InvalidDocument: The address or the variable of its key can't be used.
+        DemoFailed: The model does not answer, or its key is not set.
+    """
+    try:
+        row = ensure_model(request, model=model)
+    except (KeyMissing, ModelFault) as fault:
+        raise DemoFailed(f"{model} at {request.base_url} can’t be asked: {fault}") from None
+    variants = paper_variants(row)
+    asked = {"endpoint": row.endpoint, "model": model, "options": {}, "roles": {}}
+    known = dict(models.Contestant.objects.filter(**asked).values_list("variant", "slug"))
+    for variant in variants:
+        if variant not in known:
+            slug = contestant_slug(model, variant, {})
+            add_contestant(
+                ContestantRequest(
+                    slug=slug, variant=variant, endpoint=row.endpoint.label, model=model
+                )
+            )
+            known[variant] = slug
+    report = row.probe_report or {}
+    slugs = tuple(known[variant] for variant in variants)
+    return OwnModel(name=model, contestants=slugs, probe_calls=1 + report.get("calls", 0))
+
+
+def launch_model(
+    own: OwnModel, scenarios: list[str], say: Callable[[str], None]
+) -> models.GenerationJob:
+    """Launch a model's job on the scenarios within its cap, and say before what it may use."""
+    name = f"Demo: {own.name}"[:120]
+    if job := models.GenerationJob.objects.filter(name=name).first():
+        return job
+    cap = CALLS_PER_SCENARIO * len(scenarios) - own.probe_calls
+    request = JobRequest(
+        name=name, contestants=own.contestants, scenarios=scenarios, cap_calls=cap
+    )
+    _, usual, most = estimate(request).calls
+    say(
+        f"{own.name}: {', '.join(own.contestants)} on {len(scenarios)} scenarios, {usual} calls "
+        f"expected, at most {min(cap, most)}, after {own.probe_calls} of its probe; cost unknown"
+    )
+    return launch(request)
+
+
+def finish(
+    job: models.GenerationJob, say: Callable[[str], None], look: Callable[[], None]
+) -> list[str]:
+    """Have the workers run a job; what is beyond its cap is cancelled.
+
+    Args:
+        job: Which.
+        say: Told the progress.
+        look: Called again and again; it raises where a worker is gone for good.
+
+    Returns:
+        The scenarios that are done by all of its contestants.
+
+    Raises:
+        DemoFailed: It does not get on, or rows failed.
+    """
+    if count_rows(job).failed:
+        retry_failed(job)
+    enqueue_job(job.pk)
+    told, settled, moved_at = -A_LINE_EVERY, 0, time.monotonic()
+    while (now := count_rows(job)).is_moving:
+        look()
+        if now.settled >= told + A_LINE_EVERY:
+            told = now.settled
+            say(f"  {told} of {now.total} augmentations")
+        if now.settled > settled:
+            settled, moved_at = now.settled, time.monotonic()
+        elif time.monotonic() - moved_at > STUCK_S:
+            raise DemoFailed(f"{job.name!r} does not get on: {now.settled} of {now.total}.")
+        time.sleep(0.2)
+        job.refresh_from_db()
+    ends = {state.value: number for state, number in now.by_state.items() if number}
+    say(f"Augmentations: {', '.join(f'{number} {state}' for state, number in ends.items())}")
+    if now.failed:
+        reasons = job.augmentations.filter(state=State.FAILED)
+        raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
+    if now.under_way:
+        cancel(job)
+        say(f"{job.name!r} is at its cap of {job.cap_calls} calls; the rest is cancelled.")
+    left_out = job.augmentations.filter(state=State.CANCELLED).values("scenario")
+    return list(job.scenarios.exclude(pk__in=left_out).values_list("slug", flat=True))
+
+
+def start_drives() -> list[int]:
+    """Have a few scenarios driven by the workers, before the change and with the reference.
+
+    Returns:
+        The keys of the drives.
+    """
+    rows = models.Scenario.objects.filter(slug__in=demo.list_slugs(DRIVEN_PER_TYPE))
+    waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
+    enqueue_simulations(waiting)
+    return waiting
+
+
+def finish_drives(drives: list[int], look: Callable[[], None]) -> None:
+    """Wait until they are over.
+
+    Raises:
+        DemoFailed: They take longer than STUCK_S.
+    """
+    give_up_at = time.monotonic() + STUCK_S
+    under_way = models.Simulation.objects.filter(
+        pk__in=drives, state__in=models.Simulation.UNDER_WAY
+    )
+    while left := under_way.count():
+        look()
+        if time.monotonic() > give_up_at:
+            raise DemoFailed(f"{left} of {len(drives)} drives are not over.")
+        time.sleep(0.2)
+
+
+def vote_and_rate(
+    scenarios: list[str], folder: Path, own: OwnModel | None = None
+) -> tuple[str, list[Path]]:
+    """Return the table of a study with simulated votes, and the files that it is written to."""
+    name = demo.SIMULATED_STUDY
+    contestants: tuple[str, ...] = demo.RATED
+    if own is not None:
+        name = f"Demo with {own.name[:80]} (simulated votes)"
+        contestants += own.contestants
+    study = demo.hold_study(scenarios=scenarios, name=name, contestants=contestants)
+    if own is not None:
+        # Of a few pairs most are decided already.
+        open_to_try(OPEN_STUDY_WITH_MODEL, contestants, scenarios, 2 * len(scenarios))
+    else:
+        open_to_try(OPEN_STUDY, *choose_visible(scenarios))
+    table = leaderboard_table(study.snapshots.latest("made_at"))
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for chosen in FORMATS.values():
+        files.append(folder / f"leaderboard.{chosen.suffix}")
+        write_whole(files[-1], chosen.write(table))
+    return plain_text(table), files
+
+
+def choose_visible(scenarios: list[str]) -> tuple[tuple[str, ...], list[str], int]:
+    """Return contestants, scenarios on which each two are VISIBLE_M apart, and so many pairs.
+
+    Those three or four with most pairs up to YOUR_VOTES, if possible with something that moves;
+    then those with the reference, and the fewest.
+    """
+    rows = models.Augmentation.objects.filter(scenario__slug__in=scenarios, state=State.DONE)
+    cells = {
+        (row.scenario.slug, row.contestant.slug): row
+        for row in rows.select_related("scenario", "contestant")
+    }
+    apart = set(pairs_apart(cells, VISIBLE_M))
+    moving = set(demo.list_slugs(None, "moving"))
+    slugs = sorted({slug for _, slug in cells})
+
+    def list_apart(chosen: tuple[str, ...]) -> list[str]:
+        pairs = list(combinations(chosen, 2))
+        return [
+            one for one in scenarios if all((one, first, other) in apart for first, other in pairs)
+        ]
+
+    def rank(chosen: tuple[str, ...]) -> tuple[int, bool, bool, int]:
+        shown = list_apart(chosen)
+        pairs = min(math.comb(len(chosen), 2) * len(shown), YOUR_VOTES)
+        return pairs, not moving.isdisjoint(shown), REFERENCE in chosen, -len(chosen)
+
+    sets = (chosen for size in (3, 4) for chosen in combinations(slugs, size))
+    best = max(sets, key=rank, default=demo.RATED)
+    shown = list_apart(best)
+    if not shown:
+        return best, scenarios, 2 * len(scenarios)
+    return best, shown, math.comb(len(best), 2) * len(shown)
+
+
+def open_to_try(name: str, contestants: Sequence[str], scenarios: list[str], pairs: int) -> None:
+    """Open a study for the expert, with a film among the first three pairs if it has any.
+
+    Args:
+        name: Of the study.
+        contestants: Who is compared.
+        scenarios: On what.
+        pairs: At least so many can be shown.
+    """
+    if Study.objects.filter(name=name).exists():
+        return
+    votes = min(YOUR_VOTES, pairs)
+    values = demo.study_asked(name, scenarios, contestants) | {"experts": ["expert"]}
+    moves = models.Scenario.objects.filter(slug__in=scenarios, catalogue_set="moving").exists()
+    seeds = range(demo.SEED, demo.SEED + (SEEDS_TRIED if moves else 1))
+    for seed in seeds:
+        with transaction.atomic():
+            plan = StudyPlan.read(values | {"votes_per_expert": votes, "seed": seed})
+            study = open_study(plan)
+            first = study.matchups.filter(position__lte=3, scenario__catalogue_set="moving")
+            if seed == seeds[-1] or first.exists():
+                break
+            transaction.set_rollback(True)
+    draw_pictures(study)
+
+
+def login_lines() -> list[str]:
+    """Return a line for each account of the demo that still has the demo's password."""
+    names = [username for username, _ in PEOPLE]
+    return [
+        f"  sign in as {user.username:8} password {PASSWORD}"
+        for user in User.objects.filter(username__in=names, is_active=True).order_by("pk")
+        if user.check_password(PASSWORD)
+    ]

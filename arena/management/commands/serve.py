@@ -5,14 +5,11 @@ from typing import Any
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
-from arena.management.demo import login_lines
+from arena.management.commands.demo import login_lines
 from arena.people.services import make_first_link_token
-from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
+from arena.serving import stack
 from arena.serving.supervisor import Supervisor
 from augment.services import TerminalCommand, at_least
-
-INTERRUPTED = 130
-"""The exit code of what Ctrl-C ended before it was done, as shells have it."""
 
 
 class Command(TerminalCommand):
@@ -32,18 +29,20 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run until somebody asks to stop."""
-        web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
+        web = stack.Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
-            with hold_alone():
+            with stack.hold_alone():
                 self._serve(web, options["concurrency"])
         except KeyboardInterrupt:  # before anything was started
-            raise CommandError("Stopped before anything ran.", returncode=INTERRUPTED) from None
+            raise CommandError(
+                "Stopped before anything ran.", returncode=stack.INTERRUPTED
+            ) from None
         self.stdout.write("Everything is stopped.")
 
-    def _serve(self, web: Web, concurrency: int) -> None:
-        server = web_server(web)
+    def _serve(self, web: stack.Web, concurrency: int) -> None:
+        server = stack.web_server(web)
         call_command("prepare", verbosity=0)
-        supervisor = Supervisor([*background(concurrency=concurrency), server], self._say)
+        supervisor = Supervisor([*stack.background(concurrency=concurrency), server], self._say)
         with supervisor.signals():
             try:
                 supervisor.start()
@@ -51,12 +50,12 @@ class Command(TerminalCommand):
                 for line in login_lines():
                     self.stdout.write(line)
                 self._offer_first_link(web)
-                supervisor.watch(missing_stand_ins)
+                supervisor.watch(stack.missing_stand_ins)
             finally:
                 self.stdout.write("Stopping ...")
                 supervisor.stop()
 
-    def _offer_first_link(self, web: Web) -> None:
+    def _offer_first_link(self, web: stack.Web) -> None:
         token = make_first_link_token()
         if token is not None:
             address = f"{web.address.rstrip('/')}/first/{token}/"

@@ -15,16 +15,9 @@ from pydantic import TypeAdapter
 
 from augment.checks import Finding, FindingKind, Severity
 from augment.metrics import paired
-from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.displacement import (
-    DISTANCES,
-    WISHES,
-    KeptSummary,
-    MeasuredRow,
-    of_job,
-)
+from augment.services.judging.displacement import DISTANCES, WISHES, MeasuredRow, of_job
 from augment.services.judging.findings import FINDINGS, read_findings
 from augment.services.judging.measures import Measure, compute_once, digest_code, digest_rows
 from augment.services.judging.realism import REALISM, realism_of_job
@@ -46,23 +39,16 @@ _AT_ONCE = 50
 """So many rows are measured before they are stored."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AugmentationLine:
+@dataclass(frozen=True, kw_only=True)
+class AugmentationLine(MeasuredRow):
     """One augmentation with all that is measured of it.
 
     Attributes:
-        wish: How far it is from what is asked for, None without an intent.
-        displacement: None where nothing can be measured.
-        kept: What a follow-up was to leave alone, None without any.
         spending: None where no model was asked.
         wrong, doubtful: Findings of the checks, None where nothing was checked.
         purpose: Findings on the windows of an open wish.
     """
 
-    row: Augmentation
-    wish: Displacement | None
-    displacement: Displacement | None
-    kept: KeptSummary | None
     spending: Spending | None
     wrong: int | None = None
     doubtful: int | None = None
@@ -212,14 +198,7 @@ def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job with its displacement and cost, unchecked."""
     spent = sum_spending(Q(attempt__augmentation__job=job), by=AUGMENTATION)
     for entry in of_job(job):
-        spending = spent.get(entry.row.pk)
-        yield AugmentationLine(
-            row=entry.row,
-            wish=entry.wish,
-            displacement=entry.displacement,
-            kept=entry.kept_summary,
-            spending=spending,
-        )
+        yield AugmentationLine(**vars(entry), spending=spent.get(entry.row.pk))
 
 
 def _compare(values: Mapping[str, Mapping[str, float]]) -> bytes:

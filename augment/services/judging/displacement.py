@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
 from typing import Any
@@ -57,7 +57,7 @@ class MissingReason(StrEnum):
     UNFIT_MOTION = "its motion can't be followed in its scene"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Distance:
     """Distance of an augmentation from the reference.
 
@@ -78,7 +78,7 @@ class Distance:
         return summarise_kept(self.kept)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class MeasuredRow(Distance):
     """An augmentation with how far it is from the reference.
 
@@ -261,16 +261,9 @@ def _measure(rows: Iterable[Augmentation]) -> list[MeasuredRow]:
     ids = [row.pk for row in listed]
     distances, wishes = DISTANCES.of(ids), WISHES.of(ids)
     return [
-        _join_measures(row, distances.get(row.pk, unfinished), wishes.get(row.pk))
+        MeasuredRow(row=row, wish=wishes.get(row.pk), **vars(distances.get(row.pk, unfinished)))
         for row in listed
     ]
-
-
-def _join_measures(
-    row: Augmentation, distance: Distance, wish: Displacement | None
-) -> MeasuredRow:
-    values = {field.name: getattr(distance, field.name) for field in _FIELDS}
-    return MeasuredRow(row=row, wish=wish, **values)
 
 
 def _compute(ids: Collection[int]) -> dict[int, Distance]:
@@ -325,7 +318,6 @@ def _compute_wishes(ids: Collection[int]) -> dict[int, Displacement]:
 
 DISTANCES = Measure("displacement", Distance, _compute)
 WISHES = Measure("wish distance", Displacement, _compute_wishes)
-_FIELDS = fields(Distance)
 
 
 def _read_answer(row: Augmentation) -> Modification | None:

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import Any
 
 from django.db.models import Count, Q, Sum
 
 from augment.llm.costs import to_usd
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
 from augment.services.endpoints.contestants import read_options, read_respondents
-from augment.services.endpoints.known_models import find_price
 from augment.services.running.jobs import JobScope, with_followed
 from augment.variants.options import recipe_with
 from augment.variants.recipes import find_recipe
@@ -63,20 +63,21 @@ class JobEstimate:
     @property
     def tokens_in(self) -> int | None:
         """Tokens of the prompts, as far as known; None if none are."""
-        counts = [line.tokens_in for line in self.lines if line.tokens_in is not None]
-        return sum(counts) if counts or not self.lines else None
+        return self._sum("tokens_in", 0)
 
     @property
     def tokens_out(self) -> int | None:
         """Tokens of the answers, as far as known; None if none are."""
-        counts = [line.tokens_out for line in self.lines if line.tokens_out is not None]
-        return sum(counts) if counts or not self.lines else None
+        return self._sum("tokens_out", 0)
 
     @property
     def usd(self) -> Decimal | None:
         """The cost, likewise."""
-        costs = [line.usd for line in self.lines if line.usd is not None]
-        return sum(costs, Decimal(0)) if costs or not self.lines else None
+        return self._sum("usd", Decimal(0))
+
+    def _sum(self, name: str, zero: Any) -> Any:
+        known = [value for line in self.lines if (value := getattr(line, name)) is not None]
+        return sum(known, zero) if known or not self.lines else None
 
     @property
     def unpriced(self) -> tuple[ContestantEstimate, ...]:
@@ -119,23 +120,22 @@ def _line(row: Contestant, cells: int) -> ContestantEstimate:
         cells * sum(getattr(call_range, name) for call_range in calls)
         for name in ("least", "usual", "most")
     )
-    plain = ContestantEstimate(
-        slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most)
-    )
     seen, used = _average_use(row)
     if not used:
-        return plain
-    share = cells / seen
-    tokens_in = round(share * sum(prompt for _, prompt, _ in used.values()))
-    tokens_out = round(share * sum(completion for _, _, completion in used.values()))
+        return ContestantEstimate(
+            slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most)
+        )
+    numbers, prompts, completions = (
+        round(cells / seen * sum(counts)) for counts in zip(*used.values(), strict=True)
+    )
     return ContestantEstimate(
         slug=row.slug,
         name=row.name,
         rows=cells,
-        calls=(least, round(share * sum(number for number, _, _ in used.values())), most),
-        tokens_in=tokens_in,
-        tokens_out=tokens_out,
-        usd=_usd(row, used, share),
+        calls=(least, numbers, most),
+        tokens_in=prompts,
+        tokens_out=completions,
+        usd=_usd(row, used, cells / seen),
         seen=seen,
     )
 
@@ -145,7 +145,7 @@ def _usd(
 ) -> Decimal | None:
     respondents, total = read_respondents(row), 0
     for role, (_, prompt, completion) in used.items():
-        price = find_price(respondents[role].facts)
+        price = respondents[role].price
         if price is None:
             return None
         total += price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)

@@ -8,6 +8,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from django.db.models import Count, Max, QuerySet
 from django.db.models.functions import Substr
@@ -108,27 +109,6 @@ class FailureGroup:
         return self.number - len(self.augmentations)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ToolCallLine:
-    """The tool calls of one augmentation.
-
-    Attributes:
-        augmentation: Its code.
-        attempted: Calls in any form, those after the last that is answered included.
-        understood: Calls that could be read.
-        mended: Understood calls that were not in the form that was asked for.
-    """
-
-    contestant: str
-    name: str
-    is_simulated: bool
-    scenario: str
-    augmentation: str
-    attempted: int
-    understood: int
-    mended: int
-
-
 def count_rows(job: GenerationJob) -> JobCounts:
     """Count the rows of one job by state; one query."""
     return count_each([job])[0]
@@ -177,32 +157,34 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
     ]
 
 
-def tool_calls(job: GenerationJob) -> list[ToolCallLine]:
-    """Return a line for each augmentation whose latest attempt called a tool, in order."""
+def tool_calls(job: GenerationJob) -> list[dict[str, Any]]:
+    """Return a line for each augmentation whose latest attempt called a tool, in order.
+
+    `attempted` counts calls in any form, those after the last that is answered included;
+    `understood` those that could be read, `mended` those of them in another form than asked for.
+    """
     attempts = Attempt.objects.filter(augmentation__job=job).values("augmentation")
     latest = dict(attempts.annotate(last=Max("number")).values_list("augmentation", "last"))
-    calls: defaultdict[int, list[tuple[bool, bool]]] = defaultdict(list)
+    calls: defaultdict[int, Counter[str]] = defaultdict(Counter)
     notes = TranscriptNote.objects.filter(
         attempt__augmentation__job=job, kind=NoteKind.TOOL_CALL
     ).values_list("attempt__augmentation_id", "attempt__number", "document")
-    for augmentation_id, number, document in notes:
-        if number == latest[augmentation_id]:
+    for pk, number, document in notes:
+        if number == latest[pk]:
             # Notes of early releases don't say whether a call was understood.
-            is_read = "error" not in document.get("result", {})
-            flags = bool(document.get("understood", is_read)), bool(document.get("mended", False))
-            calls[augmentation_id].append(flags)
+            is_read = document.get("understood", "error" not in document.get("result", {}))
+            is_mended = document.get("mended", False)
+            calls[pk].update(attempted=1, understood=int(is_read), mended=int(is_mended))
     rows = list_cells(job).filter(pk__in=calls)
     return [
-        ToolCallLine(
-            contestant=row.contestant.slug,
-            name=row.contestant.name,
-            is_simulated=row.contestant.is_simulated,
-            attempted=len(calls[row.pk]),
-            understood=sum(understood for understood, _ in calls[row.pk]),
-            mended=sum(mended for _, mended in calls[row.pk]),
-            scenario=row.scenario.slug,
-            augmentation=str(row.code),
-        )
+        {
+            "contestant": row.contestant.slug,
+            "name": row.contestant.name,
+            "simulated": row.contestant.is_simulated,
+            "scenario": row.scenario.slug,
+            "augmentation": str(row.code),
+            **calls[row.pk],
+        }
         for row in rows.order_by("contestant__slug", "scenario__slug", "pk")
     ]
 
