@@ -77,7 +77,7 @@ def work(self: Any, kind: str, pk: int) -> None:
     KINDS[kind].perform(pk, worker=worker[:120])
     enqueue(KINDS[kind], KINDS[kind].find_unblocked(pk))
     if kind == UPLOADS.name:
-        enqueue(MOMENTS, MOMENTS.find_unsent(older_than=RESEND_AFTER, only=Q(upload=pk)))
+        enqueue_moments(pk)
     if kind == AUGMENTATIONS.name:
         # Others of its last rows see it finished as well; one message is enough.
         ended = Augmentation.objects.filter(job=OuterRef("pk")).order_by("-finished_at", "-pk")
@@ -183,22 +183,22 @@ def enqueue(kind: WorkKind[Any], pks: Iterable[int]) -> int:
     return len(waiting)
 
 
-def enqueue_job(job_pk: int) -> int:
-    """Send the messages of a job's rows that have none yet; as `enqueue`."""
-    unsent = AUGMENTATIONS.find_unsent(older_than=RESEND_AFTER, only=Q(job=job_pk))
-    return enqueue(AUGMENTATIONS, unsent)
+def sender_of(kind: WorkKind[Any], owner: str) -> Callable[[int], int]:
+    """Return a function that sends messages of the rows of one owner that have none; as `enqueue`.
+
+    Args:
+        kind: The rows.
+        owner: The column, or path, of what they belong to.
+    """
+    return lambda pk: enqueue(
+        kind, kind.find_unsent(older_than=RESEND_AFTER, only=Q(**{owner: pk}))
+    )
 
 
-def enqueue_sweep(sweep_pk: int) -> int:
-    """Send the messages of a sweep's drives; as `enqueue`."""
-    unsent = DRIVES.find_unsent(older_than=RESEND_AFTER, only=Q(swept__sweep=sweep_pk))
-    return enqueue(DRIVES, unsent)
-
-
-def enqueue_judge(run_pk: int) -> int:
-    """Send the messages of the pairs that a judge has not been asked about; as `enqueue`."""
-    unsent = JUDGEMENTS.find_unsent(older_than=RESEND_AFTER, only=Q(run=run_pk))
-    return enqueue(JUDGEMENTS, unsent)
+enqueue_job = sender_of(AUGMENTATIONS, "job")
+enqueue_judge = sender_of(JUDGEMENTS, "run")
+enqueue_moments = sender_of(MOMENTS, "upload")
+enqueue_sweep = sender_of(DRIVES, "swept__sweep")
 
 
 def sender(kind: WorkKind[Any]) -> Callable[[int], int]:

@@ -4,7 +4,8 @@ Rows are the truth; a Celery message carries the key of a row. Every row that a 
 a URL has a random `code`; primary keys stay inside.
 """
 
-from augment.models.benchmarks import Benchmark, BenchmarkItem, Submission
+from augment.models.benchmarks import Benchmark, BenchmarkItem
+from augment.models.budgets import CappedWork
 from augment.models.contestants import (
     CallLease,
     Contestant,
@@ -24,19 +25,12 @@ from augment.models.jobs import (
     TranscriptNote,
 )
 from augment.models.judging import JudgeRun, PairJudgement, StoredMeasure
-from augment.models.scenes import (
-    SLUG_HELP,
-    BaseScene,
-    Scenario,
-    SceneUpload,
-    Sweep,
-    SweepValue,
-    UploadMoment,
-)
+from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
+from augment.models.submissions import Submission
+from augment.models.sweeps import Sweep, SweepValue
 from augment.models.work import (
     FAILED,
     AppendOnly,
-    CappedWork,
     Event,
     SentFile,
     Work,

@@ -7,9 +7,11 @@ from django.db import models
 from django.db.models import F, Q
 
 from augment.llm.costs import to_usd
+from augment.models.budgets import CappedWork
 from augment.models.contestants import Contestant, Endpoint
-from augment.models.scenes import Scenario, SweepValue
-from augment.models.work import CappedWork, Work, account_column
+from augment.models.scenes import Scenario
+from augment.models.sweeps import SweepValue
+from augment.models.work import Work, account_column
 
 
 class GenerationJob(CappedWork):

@@ -3,9 +3,10 @@
 from django.db import models
 from django.db.models import F, Q
 
+from augment.models.budgets import CappedWork
 from augment.models.contestants import Endpoint
 from augment.models.jobs import Augmentation
-from augment.models.work import CappedWork, Work, account_column
+from augment.models.work import Work, account_column
 
 
 class JudgeRun(CappedWork):

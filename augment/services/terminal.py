@@ -57,25 +57,13 @@ class TerminalCommand(BaseCommand):
         if self.request is not None:
             add_options(parser, to_inputs(self.request))
 
-    # Django sets both again when it is called with streams of its own.
+    stdout: TerminalOutput
+    stderr: TerminalOutput
 
-    @property  # type: ignore[override]
-    def stdout(self) -> TerminalOutput:
-        """Standard output."""
-        return self._stdout
-
-    @stdout.setter
-    def stdout(self, stream: Any) -> None:
-        self._stdout = _wrap(stream)
-
-    @property  # type: ignore[override]
-    def stderr(self) -> TerminalOutput:
-        """Standard error."""
-        return self._stderr
-
-    @stderr.setter
-    def stderr(self, stream: Any) -> None:
-        self._stderr = _wrap(stream)
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute; Django sets its streams again where it is called with some."""
+        is_stream = name in ("stdout", "stderr")
+        super().__setattr__(name, _wrap(value) if is_stream else value)
 
     def execute(self, *args: Any, **options: Any) -> str | None:
         """Run the command; an AugmentError ends it as a CommandError with the same sentence."""

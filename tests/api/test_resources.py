@@ -17,6 +17,12 @@ from arena.results.services.ratings import rate_now as rate
 from arena.site.api_urls import urlpatterns
 from arena.studies.services.opening import close_study
 from augment.models import Contestant, Event, GenerationJob
+from augment.services.endpoints import (
+    ContestantRequest,
+    EndpointRequest,
+    add_contestant,
+    ensure_endpoint,
+)
 from tests.api.asking import error_of
 from tests.api.tokens import program, program_of
 from tests.jobs import rows
@@ -93,6 +99,22 @@ def _queries(client: Client, path: str) -> int:
     with CaptureQueriesContext(connection) as seen:
         assert client.get(API + path).status_code == 200
     return len(seen)
+
+
+def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
+    add_contestant(
+        ContestantRequest(
+            slug="one", variant="otm", endpoint="here", model="m", options={"temperature": 0.7}
+        )
+    )
+    accounts = people()
+    address = reverse("api-contestants")
+    assert signed_in(accounts["expert"]).get(address).status_code == 403
+    (found,) = signed_in(accounts["researcher"]).get(address).json()["results"]
+    assert (found["slug"], found["retired_at"]) == ("one", None)
+    assert (found["options"], found["frozen_options"]) == ({"temperature": 0.7}, None)
+    assert (found["endpoint"], found["model"], found["roles"]) == ("here", "m", {})
 
 
 # --- Changes -----------------------------------------------------------------------------------

@@ -1,15 +1,19 @@
 import uuid
 from datetime import timedelta
+from typing import Any
 
 import pytest
+from django.contrib.auth.models import User
 from django.db import connection
+from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.models import Study, Vote
+from arena.models import Report, Study, Vote
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes
+from arena.voting.queries.keys import voting_switches
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
@@ -190,3 +194,62 @@ def test_a_vote_on_the_wire_costs_eight_queries(study: Study) -> None:
     marks = ("SAVEPOINT", "RELEASE", "BEGIN", "COMMIT")  # not what a vote asks for
     asked = [query["sql"] for query in captured if not query["sql"].startswith(marks)]
     assert len(asked) == 8, asked
+
+
+# --- Preferences and reports ---
+
+
+def post_preferences(client: Client, body: object) -> Any:
+    return client.post("/api/v1/preferences", body, content_type="application/json")
+
+
+def test_a_switch_is_kept_and_the_others_stay(study: Study) -> None:
+    client, eva = signed_in("eva"), User.objects.get(username="eva")
+    assert post_preferences(client, {"legend": False}).json()["legend"] is False
+    assert post_preferences(client, {"keep_zoom": True}).json() == voting_switches(eva)
+    usual = {"single_keys": True, "rings": True}
+    assert voting_switches(eva) == {**usual, "legend": False, "keep_zoom": True}
+    assert post_preferences(client, {"legend": "no"}).status_code == 422
+
+
+def test_nobody_signed_in_has_preferences() -> None:
+    assert post_preferences(Client(), {}).status_code == 401
+
+
+def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
+    matchup = matchups_of(study, "eva")[0]
+    client = signed_in("eva")
+    body = {
+        "key": str(uuid.uuid4()),
+        "matchup": str(matchup.code),
+        "reason": "picture_wrong",
+        "side": "B",
+        "comment": "The truck is cut off.",
+    }
+    for _ in range(2):
+        answer = client.post("/api/v1/reports", body, content_type="application/json")
+        assert (answer.status_code, answer.json()) == (200, {"saved": True})
+    kept = Report.objects.get()
+    assert (kept.matchup, kept.reason, kept.comment) == (matchup, body["reason"], body["comment"])
+    assert kept.side == "right"
+    assert not Vote.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("whose", "changes", "status", "code"),
+    [
+        ("finn", {}, 404, "not_found"),
+        ("eva", {"reason": "dull"}, 422, "invalid"),
+        ("eva", {"comment": "x" * 1001}, 422, "invalid"),
+        ("eva", {"side": "left"}, 422, "invalid"),
+        ("eva", {"vote": 1}, 422, "invalid"),
+    ],
+)
+def test_a_report_that_can_not_be_kept_says_why(
+    study: Study, whose: str, changes: dict[str, object], status: int, code: str
+) -> None:
+    matchup = matchups_of(study, "eva")[0]
+    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other", **changes}
+    answer = signed_in(whose).post("/api/v1/reports", body, content_type="application/json")
+    error_of(answer, status, code)
+    assert not Report.objects.exists()

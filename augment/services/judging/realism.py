@@ -196,10 +196,6 @@ def _list_learned_scenes() -> list[tuple[UUID, str]]:
     return list(scenes.values_list("code", "content_hash")[:MOST_SCENES])
 
 
-def _name_learned_scenes() -> str:
-    return str(_list_learned_scenes())
-
-
 def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
     learned = _LearnedScenes()
     realism: dict[int, metric.Realism] = {}
@@ -225,9 +221,11 @@ def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
     return surroundings
 
 
-REALISM = Measure("realism", metric.Realism, _judge_rows, _name_learned_scenes)
+REALISM = Measure("realism", metric.Realism, _judge_rows, lambda: str(_list_learned_scenes()))
 """The realism of augmentations; none of what can't be judged."""
-SURROUNDINGS = Measure("surroundings", Surroundings, _judge_surroundings, _name_learned_scenes)
+SURROUNDINGS = Measure(
+    "surroundings", Surroundings, _judge_surroundings, lambda: str(_list_learned_scenes())
+)
 
 
 def _key(scene: BaseScene) -> tuple[UUID, str]:

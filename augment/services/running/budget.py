@@ -7,7 +7,7 @@ adds in one conditional UPDATE. A call that ends moves its reservation into what
 whose end nobody saw counts with its worst case if it was sent, and for nothing if it was not.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
@@ -19,9 +19,8 @@ from django.db.models import F, Q, QuerySet
 from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, to_nano_usd
 from augment.llm.messages import Reply
-from augment.models import CappedWork, Contestant, GenerationJob, JudgeRun, ModelCall
+from augment.models import CappedWork, GenerationJob, JudgeRun, ModelCall
 from augment.services.clock import Moment
-from augment.services.endpoints.contestants import list_unpriced_models
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 
@@ -248,16 +247,6 @@ def describe_caps(job: CappedWork) -> str:
         "tokens": job.cap_tokens,
     }
     return ", ".join(f"{cap} {unit}" for unit, cap in caps.items() if cap is not None) or "nothing"
-
-
-def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
-    """Return the caps as columns of a new job.
-
-    Raises:
-        Conflict: A cap can't be, or there is one in USD and an unknown price.
-    """
-    unknown = list_unpriced_models(contestants) if caps.cap_usd is not None else []
-    return cap_columns(caps, unknown)
 
 
 def cap_columns(caps: Caps, unpriced: Collection[str]) -> dict[str, int]:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any
 
 from django.db.models import Count, Q, Sum
 
@@ -63,21 +62,21 @@ class JobEstimate:
     @property
     def tokens_in(self) -> int | None:
         """Tokens of the prompts, as far as known; None if none are."""
-        return self._sum("tokens_in", 0)
+        return None if (known := self._sum("tokens_in")) is None else int(known)
 
     @property
     def tokens_out(self) -> int | None:
         """Tokens of the answers, as far as known; None if none are."""
-        return self._sum("tokens_out", 0)
+        return None if (known := self._sum("tokens_out")) is None else int(known)
 
     @property
     def usd(self) -> Decimal | None:
         """The cost, likewise."""
-        return self._sum("usd", Decimal(0))
+        return self._sum("usd")
 
-    def _sum(self, name: str, zero: Any) -> Any:
+    def _sum(self, name: str) -> Decimal | None:
         known = [value for line in self.lines if (value := getattr(line, name)) is not None]
-        return sum(known, zero) if known or not self.lines else None
+        return sum(known, Decimal(0)) if known or not self.lines else None
 
     @property
     def unpriced(self) -> tuple[ContestantEstimate, ...]:

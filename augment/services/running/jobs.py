@@ -12,10 +12,10 @@ from django.utils import timezone
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment
-from augment.services.endpoints.contestants import loosen_unanswered
+from augment.services.endpoints.contestants import list_unpriced_models, loosen_unanswered
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.running.budget import NO_CAPS, Caps, check_caps, describe_caps, raise_caps
+from augment.services.running.budget import NO_CAPS, Caps, cap_columns, describe_caps, raise_caps
 from augment.services.running.choosing import refuse_impossible
 from augment.services.running.progress import count_rows
 from augment.services.texts import one_line
@@ -93,13 +93,14 @@ def launch(
     if follows is None:
         where = with_followed(where)
     refuse_impossible(who, where, samples=request.samples)
+    unpriced = list_unpriced_models(who) if request.cap_usd is not None else []
     job = GenerationJob.objects.create(
         name=name,
         launched_by=actor,
         samples=request.samples,
         is_fresh=request.is_fresh,
         full_plan=request.full_plan,
-        **check_caps(request, who),
+        **cap_columns(request, unpriced),
     )
     job.contestants.set(who)
     job.scenarios.set(where)
