@@ -56,6 +56,7 @@ class S3Media(S3Storage):  # type: ignore[misc] # it has no types
 
     exists = _describe_fault("look for", S3Storage.exists)
     size = _describe_fault("look for", S3Storage.size)
+    get_modified_time = _describe_fault("look for", S3Storage.get_modified_time)
     delete = _describe_fault("delete", S3Storage.delete)
     listdir = _describe_fault("list", S3Storage.listdir)
 

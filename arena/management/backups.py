@@ -53,6 +53,7 @@ from arena.serving.readiness import find_unapplied_migrations
 from augment.models import Endpoint, Simulation
 from augment.services import is_stored_name
 from augment.services.driving import list_allowed_planners
+from augment.services.judging import COMPUTED
 from augment.services.scenarios import THUMBNAILS
 
 FORMAT, VERSION = "scenario-arena-backup", 1
@@ -137,7 +138,7 @@ def take_backup(path: Path, *, now: datetime, say: Say) -> Manifest:
 
 
 def find_media(folder: str = "") -> Iterator[str]:
-    """Yield the names of all pictures; zips and thumbnails can be made again."""
+    """Yield the names of all pictures; zips, thumbnails and charts can be made again."""
     try:
         folders, files = default_storage.listdir(folder)
     except FileNotFoundError:  # nothing has been drawn yet
@@ -146,7 +147,7 @@ def find_media(folder: str = "") -> Iterator[str]:
         if not name.startswith("."):  # half a file of a worker that was killed
             yield f"{folder}{name}"
     for name in sorted(folders):
-        if f"{folder}{name}" not in (*FOLDERS, THUMBNAILS):
+        if f"{folder}{name}" not in (*FOLDERS, THUMBNAILS, COMPUTED):
             yield from find_media(f"{folder}{name}/")
 
 

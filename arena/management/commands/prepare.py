@@ -3,6 +3,7 @@
 import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ import polib
 from django.conf import settings
 from django.core.management import call_command
 from django.db import connection
+from django.utils import timezone
 
 from arena.exports.files import write_whole
 from arena.scenarios.services import redraw_pictures
 from augment.services import TerminalCommand
 from augment.services.endpoints import ensure_builtin
+from augment.services.judging import delete_computed
 
 GERMAN = settings.BASE_DIR / "arena" / "locale" / "de" / "LC_MESSAGES" / "django.po"
 """The German texts of voters' pages."""
@@ -22,12 +25,16 @@ ADVISORY_LOCK = 7_264_101
 """Of PostgreSQL, per database; any number that nothing else on it uses."""
 
 
+KEPT = timedelta(days=30)
+"""Older charts and bootstraps are computed again; most are of numbers that have changed since."""
+
+
 class Command(TerminalCommand):
     """Do once after every update what must precede serving."""
 
     help = (
         "Apply migrations, add contestants that ask no model, collect the static files, compile "
-        "the German texts, redraw pictures of earlier versions."
+        "the German texts, redraw pictures of earlier versions, delete old charts."
     )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -38,6 +45,7 @@ class Command(TerminalCommand):
             settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
             call_command("collectstatic", interactive=False, verbosity=0)
             compile_catalogue()
+            delete_computed(before=timezone.now() - KEPT)
             for slug, drawn in redraw_pictures():
                 self.stdout.write(f"Pictures of {slug} that were drawn anew: {drawn}")
 

@@ -20,7 +20,7 @@ from augment.services.judging.findings import (
     check_edit,
     guess_faults,
 )
-from augment.services.judging.measures import compute_once, digest_code
+from augment.services.judging.measures import COMPUTED, compute_once, delete_computed, digest_code
 from augment.services.judging.metric_scores import metric_scores
 from augment.services.judging.realism import (
     RANDOM_DRAWS,

@@ -10,6 +10,8 @@ import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
+from datetime import datetime
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -26,6 +28,9 @@ Compute = Callable[[Collection[int]], Mapping[int, Value]]
 
 MEASURING = "metrics", "checks", "scene", "geometry", "simulation", "services/judging"
 """The packages of augment whose code decides what comes out."""
+
+COMPUTED = "computed"
+"""The folder in the media storage of what `compute_once` keeps."""
 
 _ROOT = Path(__file__).parents[2]
 
@@ -149,9 +154,18 @@ def compute_once(suffix: str, compute: Callable[[], bytes], *parts: object) -> b
         compute: Makes the bytes, the same ones of the same parts.
         parts: All that it depends on; the `repr` of each has to say it all.
     """
-    name = f"computed/{_digest(list(map(repr, parts)))}.{suffix}"
-    if default_storage.exists(name):
+    name = f"{COMPUTED}/{_digest(list(map(repr, parts)))}.{suffix}"
+    try:
         with default_storage.open(name) as file:
             return bytes(file.read())
-    store_as(name, made := compute())
-    return made
+    except FileNotFoundError:
+        store_as(name, made := compute())
+        return made
+
+
+def delete_computed(*, before: datetime) -> None:
+    """Delete what was computed before that time; whoever asks for it computes it again."""
+    with suppress(FileNotFoundError):  # nothing was computed yet
+        for name in default_storage.listdir(COMPUTED)[1]:
+            if default_storage.get_modified_time(f"{COMPUTED}/{name}") < before:
+                default_storage.delete(f"{COMPUTED}/{name}")

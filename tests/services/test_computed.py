@@ -1,0 +1,34 @@
+"""Files of what is computed once: used again, in no backup, and deleted when they are old."""
+
+import os
+from datetime import timedelta
+
+from django.core.files.storage import default_storage
+from django.utils import timezone
+
+from arena.management.backups import find_media
+from augment.services.judging import COMPUTED, compute_once, delete_computed
+
+
+def test_what_was_computed_is_kept_until_it_is_old() -> None:
+    asked: list[str] = []
+
+    def ask(*parts: str) -> None:
+        for part in parts:
+
+            def compute(part: str = part) -> bytes:
+                asked.append(part)
+                return part.encode()
+
+            assert compute_once("txt", compute, part) == part.encode()
+
+    delete_computed(before=timezone.now())  # where nothing was computed yet
+    ask("a", "a", "b")
+    assert asked == ["a", "b"]
+    assert not [name for name in find_media() if name.startswith(COMPUTED)]
+    for name in default_storage.listdir(COMPUTED)[1]:
+        os.utime(default_storage.path(f"{COMPUTED}/{name}"), (0, 0))
+    ask("c")
+    delete_computed(before=timezone.now() - timedelta(days=1))
+    ask("a", "c")
+    assert asked == ["a", "b", "c", "a"]
