@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from django.apps import apps
+from django.core.files.base import ContentFile
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.db import connection
 from django.test import Client
@@ -23,10 +24,18 @@ from arena.shell import receipts
 from arena.site.api_urls import urlpatterns as OPERATIONS
 from arena.site.urls import urlpatterns as PAGES
 from arena.studies.services.opening import close_study
-from augment.models import Augmentation, Benchmark, EndpointModel, GenerationJob, Scenario
+from augment.models import (
+    Augmentation,
+    Benchmark,
+    EndpointModel,
+    GenerationJob,
+    Scenario,
+    SceneUpload,
+)
 from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.running import jobs
 from augment.services.running.jobs import JobRequest
+from augment.services.scenarios.uploads import UPLOADS, keep_upload
 from tests import entering, study_rows
 from tests.api.asking import error_of
 from tests.api.test_making import CAR, STREET
@@ -56,6 +65,7 @@ class Cast:
         answer: Can be changed further.
         ranged: A scenario whose intent has a range.
         streets: A benchmark.
+        upload: A recording that was read.
     """
 
     here: World
@@ -63,6 +73,7 @@ class Cast:
     ranged: Scenario
     open_study: Study
     streets: Benchmark
+    upload: SceneUpload
 
     def url(self, name: str) -> str:
         if name == "invite":
@@ -71,6 +82,8 @@ class Cast:
             return reverse(name, args=[self.answer.code])
         if name in ("faults", "job-simulate"):
             return reverse(name, args=[self.answer.job.code])
+        if name in ("upload-show", "api-moments"):
+            return reverse(name, args=[self.upload.code])
         if name == "results-share":
             rating = self.here.study.snapshots.get()
             return reverse(name, args=[self.here.study.code, rating.code])
@@ -116,6 +129,7 @@ class Cast:
             "scenarios-write": ({"scenariofile": 1}, {}),
             "scene": ({"scenario": 1}, drawn),
             "study-write": ({"studyfile": 1}, {}),
+            "upload-show": ({"uploadmoment": 1}, {"stop": "0"}),
             "submission-new": (
                 {"submission": 1},
                 {"benchmark": str(self.streets.code), "file": ("ours.zip", packed)},
@@ -153,6 +167,7 @@ class Cast:
             "api-family": ({"scenario": 1}, {"count": 1, "seed": 5}),
             "api-follow-ups": ({"generationjob": 1}, {"instruction": "Nearer.", "cap_calls": 2}),
             "api-jobs": ({"generationjob": 1}, self.job()),
+            "api-moments": ({"uploadmoment": 1}, {"item": "", "frame": 0}),
             "api-people": ({"user": 1}, {"username": "bob", "role": "expert"}),
             "api-probe": ({"probe": 1}, {}),
             "api-scenarios": ({"scenario": 1}, edit | {"type": "construction_zone"}),
@@ -184,6 +199,8 @@ def cast() -> Cast:
     asked = JobRequest(name="Far", contestants=["llama"], scenarios=["far"])
     answer = ran(only_row(jobs.launch(asked)), Model())
     rate_now(study=close_study(study=here.study), rounds=100)
+    upload = keep_upload(name="street.json", content=ContentFile(STREET), source="")
+    UPLOADS.perform(upload.pk)
     return Cast(
         here=here,
         answer=answer,
@@ -192,6 +209,7 @@ def cast() -> Cast:
         streets=make_benchmark(
             BenchmarkRequest(slug="streets", title="Streets", scenarios=["far"])
         ),
+        upload=upload,
     )
 
 
