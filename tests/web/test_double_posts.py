@@ -201,6 +201,7 @@ def cast() -> Cast:
     rate_now(study=close_study(study=here.study), rounds=100)
     upload = keep_upload(name="street.json", content=ContentFile(STREET), source="")
     UPLOADS.perform(upload.pk)
+    upload.moments.all().delete()  # reading asked for the first
     return Cast(
         here=here,
         answer=answer,
