@@ -63,6 +63,11 @@ class Pose:
         x_m, y_m = self.to_local(np.array([[other.x_m, other.y_m]]))[0].tolist()
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(other.heading_rad - self.heading_rad))
 
+    def pose_to_parent(self, other: Pose) -> Pose:
+        """Return a pose seen from this one, in the frame that this one is given in."""
+        x_m, y_m = self.to_parent(np.array([[other.x_m, other.y_m]]))[0].tolist()
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(other.heading_rad + self.heading_rad))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:

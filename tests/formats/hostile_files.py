@@ -250,7 +250,7 @@ def openscenario_whose_catalogs_lie_elsewhere(root: Path) -> Made:
 
 def openscenario_of_a_power_of_powers(root: Path) -> Made:
     at = '<LanePosition roadId="1" laneId="-1" s="${9 ** 9 ** 9 ** 9}"/>'
-    text = openscenario_files.scenario(other_at=at)
+    text = openscenario_files.scenario().replace(openscenario_files.EGO_AT, at)
     return "openscenario", openscenario_files.write(root, text)
 
 
@@ -266,7 +266,8 @@ def openscenario_of_parameters_that_name_each_other(root: Path) -> Made:
         for a, b in ("ab", "ba")
     )
     head = f"<ParameterDeclarations>{declared}</ParameterDeclarations>"
-    text = openscenario_files.scenario(head=head)
+    at = openscenario_files.EGO_AT.replace('"20"', '"$a"')
+    text = openscenario_files.scenario(head=head).replace(openscenario_files.EGO_AT, at)
     return "openscenario", openscenario_files.write(root, text)
 
 

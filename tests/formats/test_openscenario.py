@@ -52,6 +52,19 @@ def pose_of_other(reading: Reading) -> list[float]:
     return [x_m - 1.4 * math.cos(heading_rad), y_m - 1.4 * math.sin(heading_rad), heading_rad]
 
 
+def route(*waypoints: tuple[int, float], roads: str = "11") -> str:
+    return "".join(
+        f'<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{road}" '
+        f'laneId="{lane}" s="{s}"/></Position></Waypoint>'
+        for road, (lane, s) in zip(roads, waypoints, strict=True)
+    )
+
+
+def on_route(inside: str, *waypoints: tuple[int, float], roads: str = "11") -> str:
+    made = f"<RouteRef><Route>{route(*waypoints, roads=roads)}</Route></RouteRef>"
+    return f"<RoutePosition>{made}<InRoutePosition>{inside}</InRoutePosition></RoutePosition>"
+
+
 @pytest.mark.parametrize(
     ("position", "expected"),
     [
@@ -69,6 +82,12 @@ def pose_of_other(reading: Reading) -> list[float]:
         ('<RelativeRoadPosition entityRef="Ego" ds="10" dt="-2"/>', (30.0, -3.75, 0.0)),
         ('<RelativeObjectPosition entityRef="Ego" dx="10" dy="3"/>', (30.0, 1.25, 0.0)),
         ('<RelativeWorldPosition entityRef="Ego" dx="-5" dy="1"/>', (15.0, -0.75, 0.0)),
+        # From s = 80 on lane 1, which leads back, and from s = 30 on lane -1.
+        (on_route('<FromLaneCoordinates pathS="30" laneId="1" laneOffset="1"/>', (1, 80), (1, 9)),
+         (50.0, 2.75, math.pi)),
+        (on_route('<FromRoadCoordinates pathS="30" t="-2"/>', (-1, 30), (-1, 90)),
+         (60.0, -2.0, 0.0)),
+        (on_route('<FromCurrentEntity entityRef="Ego"/>', (-1, 30), (-1, 90)), (20.0, -1.75, 0.0)),
     ],
 )  # fmt: skip
 def test_a_position_is_where_a_formula_has_it(
@@ -93,6 +112,58 @@ def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
     text = scenario(other_at='<RelativeLanePosition entityRef="Ego" dLane="0" ds="95"/>')
     file = write(tmp_path, text, **{"roads.xodr": roads})
     assert pose_of_other(read(file)) == pytest.approx([115.0, -1.75, 0.0], abs=2e-3)
+
+
+def fork() -> str:
+    """Road 1 of 100 m forks into road 2, straight on, and road 4, which bends to the left."""
+    parts = {"junction": "9", "more": "", "type": "", "x": "100", "offset": "", "end": ""}
+    parts |= {"lanes": LANES.format(width=WIDTH, outer=""), "link": ""}
+    ways = {"2": "<line/>", "4": '<arc curvature="0.01"/>'}
+    roads = "".join(ROAD.format(id=n, shape=shape, **parts) for n, shape in ways.items())
+    joints = "".join(
+        f'<connection incomingRoad="1" connectingRoad="{n}" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection>'
+        for n in ways
+    )
+    link = '<link><successor elementType="junction" elementId="9"/></link>'
+    return by_hand(link=link, rest=f'{roads}<junction id="9">{joints}</junction>')
+
+
+def test_a_place_on_a_route_lies_past_a_junction(tmp_path: Path) -> None:
+    inside = '<FromLaneCoordinates pathS="130" laneId="-1"/>'
+    at = on_route(inside, (-1, 20), (-1, 80), roads="14")
+    reading = read(write(tmp_path, scenario(other_at=at), **{"roads.xodr": fork()}))
+    # 80 m to the end of road 1, and 50 m on round (100, 100), 1.75 m outside of the line.
+    x_m, y_m = 100.0 + 101.75 * math.sin(0.5), 100.0 - 101.75 * math.cos(0.5)
+    assert pose_of_other(reading) == pytest.approx([x_m, y_m, 0.5], abs=2e-3)
+
+
+@pytest.mark.parametrize("way", ["2", "4"])
+@pytest.mark.parametrize("is_in_catalog", [False, True])
+def test_a_route_is_kept_as_lanes(way: str, is_in_catalog: bool, tmp_path: Path) -> None:
+    taken = f'<Route name="r">{route((-1, 20), (-1, 90), roads=f"1{way}")}</Route>'
+    files = {"roads.xodr": fork(), "sub/ways.xosc": catalog(taken, "Ways")}
+    if is_in_catalog:
+        taken = '<CatalogReference catalogName="Ways" entryName="r"/>'
+    assigned = f"<RoutingAction><AssignRouteAction>{taken}</AssignRouteAction></RoutingAction>"
+    does = (speed(10), assigned)
+    reading = read(write(tmp_path, scenario(other_does=does), **files))
+    (other,) = moves(reading).others
+    # From s = 81.4 with the middle of its box, 18.6 m on road 1 and then some 50 m.
+    origin = reading.scene.origin.pose
+    places = origin.to_parent(other.states[:, :2])
+    away_m = np.abs(np.hypot(places[:, 0] - 100.0, places[:, 1] - 100.0) - 101.75)
+    away_m = np.abs(places[:, 1] + 1.75) if way == "2" else np.where(places[:, 0] > 100, away_m, 0)
+    assert places[68, 0] > 140.0
+    assert away_m[:80].max() < 0.05
+
+
+def test_a_route_that_no_road_leads_along_is_lost_with_its_place(tmp_path: Path) -> None:
+    taken = f"<Route>{route((1, 20), (-1, 90), roads='14')}</Route>"
+    assigned = f"<RoutingAction><AssignRouteAction>{taken}</AssignRouteAction></RoutingAction>"
+    text = scenario(event(assigned))
+    reading = read(write(tmp_path, text, **{"roads.xodr": fork()}))
+    assert any("event acts: no road leads from road 1 to road" in n for n in reading.notes)
 
 
 @pytest.mark.parametrize(
@@ -264,6 +335,7 @@ CHANGE = (
     "</LaneChangeAction></LateralAction>"
 )
 RIGHT = '<RelativeTargetLane entityRef="Other" value="-1"/>'
+OF_EGO = '<RelativeTargetLane entityRef="Ego" value="-1"/>'
 AFTER = (
     '<Condition delay="0"><ByValueCondition><StoryboardElementStateCondition storyboardElementRef='
     '"acts" storyboardElementType="event" state="completeState"/></ByValueCondition></Condition>'
@@ -271,7 +343,9 @@ AFTER = (
 
 
 @pytest.mark.parametrize(
-    "target", [RIGHT, '<AbsoluteTargetLane value="-2"/>'], ids=["relative", "absolute"]
+    "target",
+    [RIGHT, '<AbsoluteTargetLane value="-2"/>', OF_EGO],
+    ids=["relative", "absolute", "beside the ego's"],
 )
 @pytest.mark.parametrize(("dimension", "value"), [("time", 3), ("distance", 24)])
 def test_a_lane_change_takes_its_time_or_way(
@@ -280,7 +354,7 @@ def test_a_lane_change_takes_its_time_or_way(
     change = event(CHANGE.format(dimension, value, target), by_time(1))
     file = write(tmp_path, scenario(change, other_does=(speed(8),)))
     (other,) = moves(read(file)).others
-    # From the lane of the ego at once; half of it after 1.5 s, and all of it after 3 s.
+    # From the lane of the ego after 1 s; half of it after 1.5 s more, and all of it after 3 s.
     assert other.states[[10, 25, 41], 1] == pytest.approx([0.0, -1.75, -3.5], abs=0.06)
 
 
@@ -298,6 +372,54 @@ def test_events_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
     assert not [note for note in reading.notes if "Not understood" in note]
 
 
+def test_an_event_waits_for_what_an_actor_does_first(tmp_path: Path) -> None:
+    # The other cuts in as the act begins, and brakes once it is 70 m ahead: 60 m, 2 m a second.
+    state = 'storyboardElementRef="{}" state="{}"/></ByValueCondition></Condition>'
+    act = AFTER[: AFTER.index("storyboardElementRef")] + state.format("a", "startTransition")
+    first = event(speed(12, STEP.replace('"0"', '"-3"')), act, name="starts")
+    gap = by_entity(GAP.format(70, "false").replace("lessThan", "greaterThan"))
+    brakes = speed(
+        0, STEP.replace("step", "linear").replace("time", "rate").replace('"0"', '"-4"')
+    )
+    started = AFTER.replace('"acts"', '"starts"')
+    second = event(brakes, gap + started, name="brakes")
+    file = write(tmp_path, scenario(first, second, other_does=(speed(4),)))
+    reading = read(file)
+    (other,) = moves(reading).others
+    assert other.started_s == 0.0
+    assert other.states[[49, 60], 3] == pytest.approx([12.0, 8.0], abs=0.5)
+    assert other.states[-1, 3] == 0.0
+    assert any("event brakes begins so long after the first" in n for n in reading.notes)
+
+
+def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path) -> None:
+    # 60 m behind the other at first, the ego comes 6 m a second nearer to 10 m behind it.
+    ahead = '<Position><RelativeObjectPosition entityRef="Other" dx="-10" dy="0"/></Position>'
+    near = f'<DistanceCondition value="20.3" freespace="false" rule="lessThan">{ahead}'
+    given = by_entity(f"{near}</DistanceCondition>", "Ego")
+    reading = read(write(tmp_path, scenario(event(BRAKES, given), other_does=(speed(4),))))
+    (other,) = moves(reading).others
+    assert other.started_s == pytest.approx(5.0, abs=0.01)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 2.0])
+def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
+    start_s: float, tmp_path: Path
+) -> None:
+    place = '<Position><RelativeObjectPosition entityRef="Other" dx="0" dy="0"/></Position>'
+    shape = f'<Clothoid curvature="0.02" curvaturePrime="0" length="40">{place}</Clothoid>'
+    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
+    file = write(tmp_path, scenario(event(action, by_time(start_s)), other_does=(speed(8),)))
+    (other,) = moves(read(file)).others
+    # The middle of its box is 1.4 m ahead of the point that goes round in a radius of 50 m.
+    since_rad, x_m = 0.02 * 32.0, 58.6 + 8.0 * start_s
+    middle = x_m + 50.0 * math.sin(since_rad) + 1.4 * math.cos(since_rad)
+    y_m = 50.0 * (1.0 - math.cos(since_rad)) + 1.4 * math.sin(since_rad)
+    reached = other.states[int(10 * start_s) + 40, :2]
+    assert reached == pytest.approx([middle, y_m], abs=0.03)
+    assert other.states[-1, 3] == 8.0
+
+
 FOLLOW = (
     '<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape><Polyline>'
     "{}</Polyline></Shape></Trajectory><TimeReference>{}</TimeReference>"
@@ -309,6 +431,8 @@ TIMING = '<Timing domainAbsoluteRelative="{}" scale="1" offset="0"/>'
 @pytest.mark.parametrize(
     ("times", "condition"),
     [
+        (TIMING.format("absolute").replace('scale="1" offset="0"', 'scale="2" offset="-1"'),
+         by_time(2)),
         (TIMING.format("relative"), by_time(2)),
         (TIMING.format("absolute"), by_time(2)),
         ("<None/>", by_time(2)),
@@ -319,12 +443,9 @@ TIMING = '<Timing domainAbsoluteRelative="{}" scale="1" offset="0"/>'
 def test_a_trajectory_is_followed_by_its_times_or_speed(
     times: str, condition: str, tmp_path: Path
 ) -> None:
-    since_s = 2 if "absolute" in times else 0
-    vertices = "".join(
-        f'<Vertex time="{since_s + n}"><Position><WorldPosition x="{88 + 4 * n}" y="-1.75" h="0"/>'
-        "</Position></Vertex>"
-        for n in range(6)
-    )
+    since_s, scale = (2 if "absolute" in times else 0), (2 if "-1" in times else 1)
+    at = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75" h="0"/></Position></Vertex>'
+    vertices = "".join(at.format((since_s + n + scale - 1) / scale, 88 + 4 * n) for n in range(6))
     action = event(FOLLOW.format(vertices, times), condition)
     (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
     gone_m = other.states[:, 0] - other.states[0, 0]
@@ -336,20 +457,30 @@ def test_a_trajectory_is_followed_by_its_times_or_speed(
     ("made", "note"),
     [
         (scenario(event("<ControllerAction/>")), "ControllerAction was left out, first in event"),
+        (scenario(event("<RoutingAction><AcquirePositionAction/></RoutingAction>")),
+         "AcquirePositionAction was left out"),
         (scenario(event("<RoutingAction><AssignRouteAction/></RoutingAction>")),
-         "AssignRouteAction was left out"),
+         "needs a Route of two waypoints"),
         (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>'))),
          "event acts: unknown 'StandStillCondition'"),
         (scenario(event(BRAKES, by_entity('<SpeedCondition value="99" rule="greaterThan"/>'))),
          "its conditions never hold"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "1")))),
-         "there is no lane 1 lanes to the left"),
-        (scenario(event(CHANGE.format("time", 2, RIGHT.replace("Other", "Ego")))),
-         "a lane relative to somebody else's is not read"),
-        (scenario(event(FOLLOW.format("", "<None/>"))), "needs a Polyline of two vertices"),
+         "neither follows"),
+        (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "-3")))),
+         "road 1.lane: unknown '-4'; known: 1, -1, -2"),
+        (scenario(event(FOLLOW.format("", "<None/>"))), "or a Polyline of two vertices"),
+        (scenario(event(speed("${bad + _ + $v}"))), "SpeedAction.value: expected a finite"),
+        (scenario(event(speed("${bad + _ + $v}"))),
+         "AbsoluteTargetSpeed.value: unknown parameter 'v'"),
+        (scenario(other_does=(speed("fast"),)), "speeds (1); first speed of Other.value"),
+        (scenario(other=CAR.replace("</Vehicle>", "<Trailer/></Vehicle>")), "A trailer was left"),
+        (scenario(event(CHANGE.format("time", 2, RIGHT).replace(
+            "<LaneChangeAction>", '<LaneChangeAction targetLaneOffset="0.5">'))),
+         "The offset after a lane change was left out"),
         (scenario(event(BRAKES, AFTER.replace("acts", "x"))), "event acts: unknown 'x'"),
         (scenario(event(speed(-3))), "backwards, is not read"),
-        (scenario(other_at='<RoutePosition/>'), "entity Other: unknown 'RoutePosition'"),
+        (scenario(other_at='<GeoPosition/>'), "entity Other: unknown 'GeoPosition'"),
         (scenario(other_at='<LanePosition roadId="1" laneId="-1" s="900"/>'),
          "road 1.s: expected a finite number from -0.01 to 400.01"),
         (scenario(other_at='<RelativeObjectPosition entityRef="Other" dx="1" dy="0"/>'),

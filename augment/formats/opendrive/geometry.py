@@ -13,10 +13,11 @@ import numpy as np
 
 from augment import foreign
 from augment.foreign import FURTHEST, FloatArray, fault_at
+from augment.geometry.frames import Pose
 
 LONGEST_M = 100_000.0
 """No road is longer."""
-_SHARPEST_PM = 10.0
+SHARPEST_PM = 10.0
 """No line is more curved, in 1/m: that of a circle of 10 cm."""
 _PANEL_M, _PANEL_RAD, _CUBIC_PANEL_M = 2.0, 0.5, 0.25
 """Integrals are taken over panels that are no longer, and bend no more."""
@@ -33,10 +34,16 @@ _CURVATURES = {
 
 
 def read_float(
-    element: Element, name: str, place: str, least: float = -FURTHEST, most: float = FURTHEST
+    element: Element,
+    name: str,
+    place: str,
+    least: float = -FURTHEST,
+    most: float = FURTHEST,
+    *,
+    default: float | None = None,
 ) -> float:
     """Return an attribute that is a number; raises InvalidDocument as `foreign.read_number`."""
-    return foreign.read_number(element.get(name), f"{place}.{name}", least, most)
+    return foreign.read_number(element.get(name, default), f"{place}.{name}", least, most)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +77,7 @@ class PiecewiseCubic:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Piece:
+class LinePiece:
     """A piece of a reference line.
 
     Attributes:
@@ -79,11 +86,9 @@ class _Piece:
         span: How far the parameter goes; None where u is the parameter.
     """
 
-    s_m: float
-    x_m: float
-    y_m: float
-    heading_rad: float
+    start: Pose
     length_m: float
+    s_m: float = 0.0
     curvatures_pm: tuple[float, float] = (0.0, 0.0)
     cubics: FloatArray | None = None
     span: float | None = None
@@ -96,11 +101,8 @@ class _Piece:
             local = _follow_spiral(*self.curvatures_pm, self.length_m, way_m)
         else:
             local = np.column_stack([way_m, np.zeros((len(way_m), 2))])
-        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        u, v, turn = local.T
-        return np.column_stack(
-            [self.x_m + u * cos - v * sin, self.y_m + u * sin + v * cos, self.heading_rad + turn]
-        )
+        turned_rad = self.start.heading_rad + local[:, 2]
+        return np.column_stack([self.start.to_parent(local[:, :2]), turned_rad])
 
 
 class ReferenceLine:
@@ -142,14 +144,15 @@ class ReferenceLine:
 # Private
 
 
-def _read_piece(element: Element, place: str) -> _Piece:
+def _read_piece(element: Element, place: str) -> LinePiece:
     s_m, x_m, y_m, heading_rad = (read_float(element, n, place) for n in ("s", "x", "y", "hdg"))
     length_m = read_float(element, "length", place, 0.0, LONGEST_M)
-    line = _Piece(s_m=s_m, x_m=x_m, y_m=y_m, heading_rad=heading_rad, length_m=length_m)
+    start = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+    line = LinePiece(s_m=s_m, start=start, length_m=length_m)
     shape = next((child for child in element if child.tag != "userData"), None)
     if shape is None or shape.tag == "line":
         return line
-    bounds = place, -_SHARPEST_PM, _SHARPEST_PM
+    bounds = place, -SHARPEST_PM, SHARPEST_PM
     names = foreign.look_up(_CURVATURES, shape.tag, place)
     if names:
         first_pm, last_pm = (read_float(shape, name, *bounds) for name in names)

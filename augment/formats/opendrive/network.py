@@ -184,6 +184,22 @@ class RoadNetwork:
         rows = ((names[int(row)],) for row in np.unique(number[near]))
         return self.doubts.read_all("roads", self.road, rows)
 
+    def list_exits(self, road: MapRoad, end: str) -> list[tuple[str, str]]:
+        """Return the roads past an end of a road, with the ends at which they are entered."""
+        if end in road.links:
+            return [road.links[end]]
+        link = road.element.find(f"link/{end}")
+        number = None if link is None else link.get("elementId")
+        return [
+            (
+                connection.get("connectingRoad", connection.get("linkedRoad", "")),
+                CONTACTS.get(connection.get("contactPoint", ""), START),
+            )
+            for junction in self.root.findall("junction")
+            for connection in junction.findall("connection")
+            if junction.get("id") == number and connection.get("incomingRoad") == road.id
+        ]
+
     @cached_property
     def lights(self) -> frozenset[str]:
         """Ids of the signals that are lights for cars."""

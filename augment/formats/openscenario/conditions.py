@@ -7,7 +7,7 @@ reached. Frame: the ego frame of t0. T steps.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.openscenario.events import StoryEvent
+from augment.formats.openscenario.events import BEGUN, WAIT, StoryEvent
 from augment.geometry.frames import Pose
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, Trigger
 
@@ -34,6 +34,26 @@ _AHEAD_M = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Done:
+    """When an element of the storyboard begins and ends, in seconds since its actor's start.
+
+    Attributes:
+        start: Of its actor.
+        started_s: When that fires, as far as one can tell.
+    """
+
+    actor: str
+    start: Trigger
+    started_s: float
+    begins_s: float
+    ends_s: float
+
+    def since_s(self, wait: Element) -> float:
+        """Return the moment that a condition on the element waits for."""
+        return self.begins_s if wait.get("state") in BEGUN else self.ends_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Expectation:
     """Where everybody will be while nobody's event begins.
 
@@ -43,6 +63,7 @@ class Expectation:
         sizes_m: Length and width.
         ids: Of agents, by the names of the file.
         find_point: The place that a Position says, in the scene's frame.
+        done: Elements of the storyboard that were read, by name.
     """
 
     times_s: FloatArray
@@ -51,6 +72,12 @@ class Expectation:
     sizes_m: Mapping[str, tuple[float, float]]
     ids: Mapping[str, str]
     find_point: Callable[[Element, str], Pose]
+    done: dict[str, Done] = field(default_factory=dict)
+
+    def find_done(self, wait: Element, place: str) -> Done:
+        """Return the element that a condition waits for."""
+        name = wait.get("storyboardElementRef", "")
+        return foreign.look_up(self.done, name.split("::")[-1], place)
 
     def references(self, name: str, place: str) -> FloatArray:
         """Return where somebody's point of reference is (T, 2)."""
@@ -72,22 +99,9 @@ def find_trigger(
     if (time_s := event.time_s) is not None:
         step = round(time_s / float(expected.times_s[1]))
         return AtTime(after_s=time_s), min(step, len(expected.times_s) - 1)
-    holds, watched = np.zeros(len(expected.times_s), dtype=bool), list[str]()
-    goals = [e for group in event.groups for c in group for e in c.iter("Position")]
-    for group in event.groups:
-        all_hold = np.ones(len(holds), dtype=bool)
-        for condition in group:
-            met, names = _watch(condition, expected, event.place)
-            edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
-            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
-            delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
-            steps = min(round(delay_s / float(expected.times_s[1])), len(met))
-            all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
-            watched += names
-        holds |= all_hold
-    step = int(holds.argmax())
-    if not holds.any():
-        raise fault_at(event.place, "its conditions never hold while everybody goes on as at t0")
+    step, watched = find_step(event, expected)
+    positions = [e for group in event.groups for c in group for e in c.iter("Position")]
+    goals = [position for position in positions if not _list_refs(position)]
     ego = next(name for name, agent_id in expected.ids.items() if agent_id == EGO_ID)
     others = [name for name in watched if name != actor]
     if step == 0 or not others:
@@ -110,6 +124,29 @@ def find_trigger(
     return AtPlace(agent_id=agent_id, x_m=place[0], y_m=place[1], within_m=within_m), step
 
 
+def find_step(event: StoryEvent, expected: Expectation) -> tuple[int, list[str]]:
+    """Return the step at which the conditions of an event first hold, and whose motion they watch.
+
+    Raises:
+        InvalidDocument: A condition is none that is read, or never holds.
+    """
+    holds, watched = np.zeros(len(expected.times_s), dtype=bool), list[str]()
+    for group in event.groups:
+        all_hold = np.ones(len(holds), dtype=bool)
+        for condition in group:
+            met, names = _watch(condition, expected, event.place)
+            edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
+            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
+            delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
+            steps = min(round(delay_s / float(expected.times_s[1])), len(met))
+            all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
+            watched += names
+        holds |= all_hold
+    if not holds.any():
+        raise fault_at(event.place, "its conditions never hold while everybody goes on as at t0")
+    return int(holds.argmax()), watched
+
+
 # Private
 
 
@@ -121,6 +158,9 @@ def _watch(
         (e for path in ("ByValueCondition/*", "ByEntityCondition/EntityCondition/*")
          for e in condition.findall(path)), None)  # fmt: skip
     kind = "nothing" if element is None else element.tag
+    if (wait := condition.find(WAIT)) is not None:
+        done = expected.find_done(wait, place)
+        return expected.times_s >= done.started_s + done.since_s(wait) - 1e-9, []
     measures: dict[str, Callable[[str, Element, Expectation, str], FloatArray]] = {
         "RelativeDistanceCondition": _measure_gap,
         "DistanceCondition": _measure_gap,
@@ -148,8 +188,12 @@ def _watch(
         raise fault_at(place, "nobody triggers it")
     assert triggering is not None
     is_all = triggering.get("triggeringEntitiesRule") == "all"
-    targets = [e.get("entityRef", "") for e in element.iter() if "entityRef" in e.attrib]
-    return (np.all if is_all else np.any)(met, axis=0), [*names, *targets]
+    return (np.all if is_all else np.any)(met, axis=0), [*names, *_list_refs(element)]
+
+
+def _list_refs(element: Element) -> list[str]:
+    """Whom an element names."""
+    return [e.get("entityRef", "") for e in element.iter() if "entityRef" in e.attrib]
 
 
 def _measure_gap(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
@@ -157,10 +201,18 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
     own, position = expected.references(name, place), element.find("Position")
     if position is None:
         position = element.find("TimeToCollisionConditionTarget/Position")
-    other = next((e.get("entityRef", "") for e in element.iter() if "entityRef" in e.attrib), "")
+    other = next(iter(_list_refs(element)), "")
     if position is not None:
         pose = expected.find_point(position, place)
-        way = np.array([pose.x_m, pose.y_m]) - own
+        goals = np.array([[pose.x_m, pose.y_m]])
+        if other:  # a place relative to somebody goes along
+            states = foreign.look_up(expected.states, other, place)
+            begin, *_ = states.tolist()
+            local = Pose(x_m=begin[0], y_m=begin[1], heading_rad=begin[2]).to_local(goals)
+            cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
+            turned = np.column_stack([local @ [cos, -sin], local @ [sin, cos]])  # fmt: skip
+            goals = states[:, :2] + turned.reshape(2, -1).T
+        way = goals - own
     else:
         way = expected.references(other, place) - own
     kind = element.get("relativeDistanceType", element.get("distanceType", ""))

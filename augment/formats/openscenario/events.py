@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from augment import foreign
-from augment.foreign import Doubts, FloatArray, fault_at
+from augment.foreign import Doubts
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.openscenario.sources import ScenarioSource
 
@@ -14,10 +14,14 @@ ACTIONS = {
     "SpeedAction": "LongitudinalAction/SpeedAction",
     "LaneChangeAction": "LateralAction/LaneChangeAction",
     "FollowTrajectoryAction": "RoutingAction/FollowTrajectoryAction",
+    "AssignRouteAction": "RoutingAction/AssignRouteAction",
 }
 GONE = "DeleteEntityAction"
 _COMES = "AddEntityAction"
 _TIME = "ByValueCondition/SimulationTimeCondition"
+WAIT = "ByValueCondition/StoryboardElementStateCondition"
+BEGUN = ("startTransition", "runningState")
+Groups = tuple[tuple[Element, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +36,7 @@ class StoryEvent:
 
     place: str
     names: tuple[str, ...]
-    groups: tuple[tuple[Element, ...], ...]
+    groups: Groups
     actions: tuple[tuple[str, Element], ...] = field(default=())
 
     @property
@@ -50,17 +54,17 @@ class StoryEvent:
 def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
     """Return everybody's events in the order of the file; what is left out is noted."""
     events, doubts = defaultdict[str, list[StoryEvent]](list), source.doubts
-    for act in source.root.findall("Storyboard/Story/Act"):
-        begins = _list_conditions(act)
-        for group in act.findall("ManeuverGroup"):
-            maneuvers = group.findall("Maneuver")
-            for reference in group.findall("CatalogReference"):
-                with doubts.about("maneuvers"):
-                    maneuvers.append(source.resolve_reference(reference))
-            names = [row.get("entityRef", "") for row in group.findall("Actors/EntityRef")]
-            for event in (event for maneuver in maneuvers for event in maneuver.findall("Event")):
-                for actor, made in _split(event, names, begins, doubts):
-                    events[actor].append(made)
+    for story in source.root.findall("Storyboard/Story"):
+        for act in story.findall("Act"):
+            begins = _list_conditions(act, ())
+            for group in act.findall("ManeuverGroup"):
+                actors = [row.get("entityRef", "") for row in group.findall("Actors/EntityRef")]
+                for maneuver in group.findall("Maneuver"):
+                    around = tuple(e.get("name", "") for e in (story, act, group, maneuver))
+                    for event in maneuver.findall("Event"):
+                        groups = _list_conditions(event, around)
+                        for actor, made in _split(event, actors, begins, groups, doubts):
+                            events[actor].append(made)
     return events
 
 
@@ -70,49 +74,33 @@ def describe_action(action: Element) -> str:
     return inner[-1] if inner else action.tag
 
 
-def read_vertices(action: Element, place: str) -> tuple[list[Element], FloatArray | None]:
-    """Return the positions of a trajectory's polyline, and their times unless none count.
-
-    Raises:
-        InvalidDocument: It is none of vertices, or has fewer than two.
-    """
-    vertices = list(action.iter("Vertex"))
-    positions = [position for vertex in vertices for position in vertex.findall("Position")]
-    if len(vertices) < 2 or len(positions) != len(vertices):
-        raise fault_at(place, "a trajectory needs a Polyline of two vertices at least")
-    if action.find("TimeReference/Timing") is None or any(
-        "time" not in v.attrib for v in vertices
-    ):
-        return positions, None
-    times_s = foreign.read_finite([v.get("time") for v in vertices], f"{place}.Vertex", 1)[:, 0]
-    if (times_s[1:] < times_s[:-1]).any():
-        raise fault_at(f"{place}.Vertex", "needs times that ascend")
-    return positions, times_s
-
-
 # Private
 
 
-def _list_conditions(owner: Element) -> tuple[tuple[Element, ...], ...]:
-    """Conditions that say more than that the scenario has begun, by groups."""
+def _list_conditions(owner: Element, around: tuple[str, ...]) -> Groups:
+    """Conditions that say more than that what is around has begun, by groups."""
     groups = []
     for group in owner.findall("StartTrigger/ConditionGroup"):
         conditions = group.findall("Condition")
-        groups.append(tuple(c for c in conditions if not _holds_at_once(c)))
+        groups.append(tuple(c for c in conditions if not _holds_at_once(c, around)))
     return () if not all(groups) else tuple(groups)
 
 
-def _holds_at_once(condition: Element) -> bool:
-    time = condition.find(_TIME)
-    is_zero = time is not None and (time.get("value") or "").strip("0.") == ""
-    return is_zero and not (condition.get("delay") or "0").strip("0.")
+def _holds_at_once(condition: Element, around: tuple[str, ...]) -> bool:
+    if (condition.get("delay") or "0").strip("0."):
+        return False
+    time, state = condition.find(_TIME), condition.find(WAIT)
+    if state is not None:
+        name = state.get("storyboardElementRef", "").split("::")[-1]
+        return state.get("state") in BEGUN and name in around
+    return time is not None and (time.get("value") or "").strip("0.") == ""
 
 
 def _split(
-    event: Element, actors: list[str], begins: tuple[tuple[Element, ...], ...], doubts: Doubts
+    event: Element, actors: list[str], begins: Groups, groups: Groups, doubts: Doubts
 ) -> Iterator[tuple[str, StoryEvent]]:
     """Yield an event for each of those who act in it."""
-    place, groups = f"event {event.get('name', '')[:60]}", _list_conditions(event)
+    place = f"event {event.get('name', '')[:60]}"
     if begins and groups and begins != groups:
         doubts.assume("An act's own start was left out: its events have theirs")
     actions, owners = [], set(actors)

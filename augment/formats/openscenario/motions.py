@@ -6,7 +6,7 @@ for one before, or for a time as well. Frame: the ego frame of t0. V vertices.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -18,122 +18,107 @@ from augment import foreign
 from augment.errors import InvalidModification
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.openscenario.conditions import Expectation, find_trigger
-from augment.formats.openscenario.events import StoryEvent, read_vertices
+from augment.formats.openscenario.conditions import Done, find_step, find_trigger
+from augment.formats.openscenario.events import WAIT, StoryEvent
+from augment.formats.openscenario.stage import Stage
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import TrafficAgent
-from augment.scene.lane_graph import LaneGraph
 from augment.scene.planned_motion import AtTime, LanePath, Path, PlannedMotion, PointPath, Trigger
 from augment.scene.planned_mover import HeldCourse, lane_line, way_and_speed
 from augment.scene.schema import Codec
 
 _MOTION = Codec("motion", TypeAdapter(PlannedMotion))
-_MOST_SPEEDS, _MOST_POINTS = 50, 200
+_MOST_SPEEDS, _MOST_POINTS, _MOST_LANES = 50, 200, 20
+_BESIDE_ROUTE_M = 15.0
+"""Lanes of a route end no further from its roads' middles."""
 _STEP_S = 0.01
 """A step in speed takes so long."""
-_LANE_M = 3.5
+_LANE_M, _ON_M = 3.5, 300.0
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
     "step": lambda share: share,
     "cubic": lambda share: share * share * (3.0 - 2.0 * share),
     "sinusoidal": lambda share: (1.0 - math.cos(math.pi * share)) / 2.0,
 }
-_WAIT = "ByValueCondition/StoryboardElementStateCondition"
-_BEGUN = ("startTransition", "runningState")
 
 
-@dataclass(slots=True, kw_only=True)
-class Done:
-    """When an element of the storyboard begins and ends, in seconds since its actor's start."""
-
-    actor: str
-    start: Trigger
-    begins_s: float
-    ends_s: float
-
-
-@dataclass(slots=True, kw_only=True)
-class MotionReader:
-    """Reads the motions of one scenario.
-
-    Attributes:
-        find_middles: The middles of an actor's box at positions, with headings (V, 3).
-        count_lanes: How many lanes to the left of a pose a lane of an id is.
-        done: Elements that were read, by name.
-    """
-
-    graph: LaneGraph
-    expected: Expectation
-    find_middles: Callable[[str, list[Element], str], FloatArray]
-    count_lanes: Callable[[Pose, int], int]
-    doubts: Doubts
-    done: dict[str, Done] = field(default_factory=dict)
-
-    def read(self, name: str, agent: TrafficAgent, events: Iterable[StoryEvent]) -> TrafficAgent:
-        """Return the agent with the motion in its events; without one where none can be read."""
-        draft = _Draft(self, name, agent)
-        for event in events:
-            with self.doubts.about("events"):
-                draft.add(event)
-        if draft.start is None:
-            return agent
-        motion = PlannedMotion(path=draft.path, speeds=tuple(draft.speeds), start=draft.start)
-        # What breaks a bound of motions is left out.
-        bounded = self.doubts.read("motions", _MOTION.from_parts, _MOTION.dump(motion))
-        return replace(agent, motion=bounded)
+def read_motion(
+    stage: Stage, name: str, agent: TrafficAgent, events: Iterable[StoryEvent], doubts: Doubts
+) -> None:
+    """Give an agent on a stage the motion in its events, without what can't be read."""
+    draft = _Draft(stage, name, agent, doubts)
+    for event in events:
+        with doubts.about("events"):
+            draft.add(event)
+        # Others may wait for somebody who moves so, and its own later events.
+        stage.follow(draft.move_agent())
 
 
 class _Draft:
     """A motion while its events are added."""
 
-    def __init__(self, reader: MotionReader, name: str, agent: TrafficAgent) -> None:
-        self._reader, self._name, self._agent = reader, name, agent
+    def __init__(self, stage: Stage, name: str, agent: TrafficAgent, doubts: Doubts) -> None:
+        self._stage, self._name, self._agent, self._doubts = stage, name, agent, doubts
         self.start: Trigger | None = None
         self.path: Path | None = None
         self.speeds: list[tuple[float, float]] = []
         self._line: Polyline | None = None
 
+    def move_agent(self) -> TrafficAgent:
+        """Return the agent with the motion so far."""
+        if self.start is None or not (self.path or self.speeds):
+            return self._agent
+        motion = PlannedMotion(path=self.path, speeds=tuple(self.speeds), start=self.start)
+        # What breaks a bound of motions is left out.
+        bounded = self._doubts.read("motions", _MOTION.from_parts, _MOTION.dump(motion))
+        return replace(self._agent, motion=bounded)
+
     def add(self, event: StoryEvent) -> None:
         """Add what an event does; raises InvalidDocument if it can't be."""
         begins_s, ends_s = self._begin(event), 0.0
-        start = self.start
+        start, times_s = self.start, self._stage.expected.times_s
         assert start is not None
         for kind, action in event.actions:
             act: dict[str, Callable[[Element, float, str], float]] = {
                 "SpeedAction": self._change_speed,
                 "LaneChangeAction": self._change_lane,
                 "FollowTrajectoryAction": self._follow,
+                "AssignRouteAction": self._take_route,
             }
             lasts_s = foreign.look_up(act, kind, event.place)(action, begins_s, event.place)
             ends_s = max(ends_s, begins_s + lasts_s)
-        done = Done(actor=self._name, start=start, begins_s=begins_s, ends_s=ends_s)
-        self._reader.done |= dict.fromkeys(event.names, done)
+        started_s = float(times_s[self._step])
+        own = {"actor": self._name, "start": start, "started_s": started_s}
+        done = Done(**own, begins_s=begins_s, ends_s=ends_s)
+        self._stage.expected.done.update(dict.fromkeys(event.names, done))
 
     def _begin(self, event: StoryEvent) -> float:
         """Set the start by the first event, and return how long after it an event begins."""
-        waits = [c.find(_WAIT) for group in event.groups for c in group]
+        expected, doubts = self._stage.expected, self._doubts
+        waits = [c.find(WAIT) for group in event.groups for c in group]
         start: Trigger
-        if waits and waits[0] is not None:
-            state, name = waits[0].get("state"), waits[0].get("storyboardElementRef", "")
-            done = foreign.look_up(self._reader.done, name.split("::")[-1], event.place)
-            since_s = done.begins_s if state in _BEGUN else done.ends_s
+        if len(waits) == 1 and waits[0] is not None:
+            done = expected.find_done(waits[0], event.place)
             if done.actor == self._name and self.start is not None:
-                return since_s
+                return done.since_s(waits[0])
             if not isinstance(done.start, AtTime):
-                raise fault_at(event.place, f"waits for {name[:40]}, which starts by no time")
-            time_s = done.start.after_s + since_s
-            start, self._step = AtTime(after_s=time_s), self._step_at(time_s)
-        elif self.start is None or event.time_s is None:
-            if self.start is not None:
-                raise fault_at(event.place, "a second start of one actor's is left out")
-            arguments = event, self._name, self._reader.expected, self._reader.doubts
-            start, self._step = find_trigger(*arguments)
+                raise fault_at(event.place, "waits for what starts by no time")
+            time_s = done.start.after_s + done.since_s(waits[0])
+            start, step = AtTime(after_s=time_s), self._step_at(time_s)
+        elif self.start is None:
+            start, step = find_trigger(event, self._name, expected, doubts)
+        elif event.time_s is None:
+            step, _ = find_step(event, expected)
+            if step < self._step:
+                raise fault_at(event.place, "begins before its actor's first event")
+            doubts.assume(f"{event.place} begins so long after the first as its conditions hold")
+            return float(expected.times_s[step] - expected.times_s[self._step])
         else:
             start = AtTime(after_s=event.time_s)
         if self.start is None:
-            self.start = start
-            state_row = self._reader.expected.states[self._name][self._step].tolist()
+            self.start, self._step = start, step
+            state_row = expected.states[self._name][step].tolist()
             self._here = Pose(x_m=state_row[0], y_m=state_row[1], heading_rad=state_row[2])
             return 0.0
         assert isinstance(start, AtTime)
@@ -141,8 +126,11 @@ class _Draft:
             raise fault_at(event.place, "begins by a time, and not after the actor's first event")
         return start.after_s - self.start.after_s
 
+    def _step_since(self, at_s: float) -> int:
+        return self._step_at(float(self._stage.expected.times_s[self._step]) + at_s)
+
     def _step_at(self, time_s: float) -> int:
-        times_s = self._reader.expected.times_s
+        times_s = self._stage.expected.times_s
         return min(int(np.searchsorted(times_s, time_s - 1e-9)), len(times_s) - 1)
 
     # Actions; each returns how long it takes
@@ -152,7 +140,10 @@ class _Draft:
         now_mps = way_and_speed(tuple(self.speeds), own_mps, at_s)[1]
         goal_mps = read_speed_target(action, self._mps_of, f"{place}.SpeedAction")
         dynamics = _find(action, "SpeedActionDynamics", place)
-        by, value = dynamics.get("dynamicsDimension"), read_float(dynamics, "value", place, 0.0)
+        by, value = (
+            dynamics.get("dynamicsDimension"),
+            abs(read_float(dynamics, "value", place, default=0.0)),
+        )
         shape = foreign.look_up(_SHAPES, dynamics.get("dynamicsShape"), place)
         change_mps, mean_mps = abs(goal_mps - now_mps), max((goal_mps + now_mps) / 2.0, 0.1)
         spans = {
@@ -171,36 +162,29 @@ class _Draft:
         return lasts_s
 
     def _mps_of(self, name: str) -> float:
-        states = foreign.look_up(self._reader.expected.states, name, "entityRef")
+        states = foreign.look_up(self._stage.expected.states, name, "entityRef")
         return float(states[0, 3])
 
     def _change_lane(self, action: Element, at_s: float, place: str) -> float:
         gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)
         dynamics = _find(action, "LaneChangeActionDynamics", place)
-        value = read_float(dynamics, "value", place, 0.0)
+        value = abs(read_float(dynamics, "value", place))
         by = {"time": value, "rate": _LANE_M / max(value, 1e-3), "distance": 0.0}
         lasts_s = foreign.look_up(by, dynamics.get("dynamicsDimension"), place)
         later_m = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s + lasts_s)[0]
         change_m = (later_m - gone_m) or value
         here = self._pose_after(gone_m, place)
-        graph, target = self._reader.graph, action.find("LaneChangeTarget/*")
+        graph, target = self._stage.graph, _find(action, "LaneChangeTarget/*", place)
         lane_id = graph.under(here.x_m, here.y_m, here.heading_rad)
-        if target is None or lane_id is None:
-            raise fault_at(place, "a lane change needs a target, and a lane where it begins")
-        number = foreign.read_whole(target.get("value"), f"{place}.LaneChangeTarget")
-        if target.tag == "AbsoluteTargetLane":
-            number = self._reader.count_lanes(here, number)
-        elif target.get("entityRef") != self._name:
-            raise fault_at(place, "a lane relative to somebody else's is not read")
-        onto = lane_id
-        for _ in range(abs(number)):
-            lane = graph.lane(onto)
-            side = "left_neighbor" if number > 0 else "right_neighbor"
-            beside = getattr(lane, side, None)
-            if beside is None:
-                raise fault_at(place, f"there is no lane {number} lanes to the left to change to")
-            onto = beside
-        lanes = LanePath(lane_ids=(lane_id, onto), change_m=min(max(change_m, 1.0), 200.0))
+        step = self._step_since(at_s)
+        goal = self._stage.find_lane(self._name, here, target, step, place)
+        onto = graph.under(goal.x_m, goal.y_m, goal.heading_rad)
+        if onto is None:
+            raise fault_at(place, "there is no lane to change to")
+        is_offset = read_float(action, "targetLaneOffset", place, default=0.0) != 0.0
+        self._doubts.assume("The offset after a lane change was left out", is_offset)
+        lane_ids = tuple(dict.fromkeys(name for name in (lane_id, onto) if name))
+        lanes = LanePath(lane_ids=lane_ids, change_m=min(max(change_m, 1.0), 200.0))
         try:
             line = lane_line(graph, lanes, (here.x_m, here.y_m))
         except InvalidModification as fault:
@@ -210,14 +194,21 @@ class _Draft:
         if gone_m == 0.0 and self._line is None:
             self.path, self._line = lanes, line
         else:
-            before = [self._pose_after(m, place) for m in np.arange(2.0, gone_m, 2.0)]
-            rows = [(pose.x_m, pose.y_m) for pose in before]
-            ahead = line.between(0.0, 300.0).resample(2.0).points_m.tolist()
-            points = [*rows, *ahead]
-            every = math.ceil(len(points) / _MOST_POINTS)
-            self._line = Polyline([(self._here.x_m, self._here.y_m), *points])
-            self.path = PointPath(points_m=tuple((x, y) for x, y in points[::every]))
+            self._go_on(gone_m, line.between(0.0, _ON_M).resample(2.0).points_m, place)
         return lasts_s or change_m / max(now_mps, 1.0)
+
+    def _go_on(self, gone_m: float, points: FloatArray, place: str) -> None:
+        """Follow points (V, 2) once it has gone so far."""
+        before = [self._pose_after(m, place) for m in np.arange(2.0, gone_m, 2.0)]
+        rows = np.array([*((pose.x_m, pose.y_m) for pose in before), *points]).reshape(-1, 2)
+        apart = np.append(np.hypot(*np.diff(rows, axis=0).T) > 0.005, True)
+        kept = rows[apart]
+        every = math.ceil(len(kept) / _MOST_POINTS)
+        thinned = np.round([*kept[::every][: _MOST_POINTS - 1], kept[-1]], 4)
+        self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
+        here = np.array([[self._here.x_m, self._here.y_m]])
+        line = np.vstack([here, kept])
+        self._line = Polyline(line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > 0.005)])
 
     def _pose_after(self, gone_m: float, place: str) -> Pose:
         """Return where it is so far after its start."""
@@ -227,26 +218,49 @@ class _Draft:
         agent = replace(
             self._agent, x_m=here.x_m, y_m=here.y_m, heading_rad=here.heading_rad, lane_id=None
         )
-        row = HeldCourse(agent, self._reader.graph).pose_at(gone_m)
+        row = HeldCourse(agent, self._stage.graph).pose_at(gone_m)
         if row is None:
             raise fault_at(place, "is past the map when it begins")
         return Pose(x_m=row[0], y_m=row[1], heading_rad=row[2])
 
     def _follow(self, action: Element, at_s: float, place: str) -> float:
-        if at_s > 0.0 or self.path is not None:
-            raise fault_at(place, "a trajectory after another motion of the actor is left out")
-        positions, times_s = read_vertices(action, place)
-        points = self._reader.find_middles(self._name, positions, place)[:, :2]
+        middles, times_s = self._stage.trace(self._name, action, place, self._step_since(at_s))
+        gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)
+        points = middles[:, :2]
         ways_m = np.cumsum(np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T))
-        apart = np.append(np.diff(np.round(ways_m, 2)) > 0.0, True)
-        kept = points[apart][:: math.ceil(apart.sum() / _MOST_POINTS)]
-        rows = [(float(x), float(y)) for x, y in np.round(kept, 4)]
-        last = float(points[-1, 0]), float(points[-1, 1])
-        self.path = PointPath(points_m=(*rows[: _MOST_POINTS - 1], last))
         if times_s is None:
-            return float(ways_m[-1]) / max(self._agent.speed_mps, 0.1)
-        self.speeds = fit_speeds(times_s - times_s[0], ways_m)
+            # It goes on at its end, where it had no time to be there.
+            x_m, y_m, heading_rad = middles[-1].tolist()
+            end = replace(self._agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, lane_id=None)
+            course = HeldCourse(end, self._stage.graph)
+            further = (course.pose_at(m) for m in np.arange(2.0, _ON_M, 2.0))
+            points = np.array([*points, *(row[:2] for row in further if row is not None)])
+        self._go_on(gone_m, points, place)
+        if times_s is None:
+            return float(ways_m[-1]) / max(now_mps, 0.1)
+        fitted = fit_speeds(times_s - times_s[0], ways_m)
+        before = [row for row in self.speeds if row[0] < at_s - _STEP_S]
+        self.speeds = [*before, *((round(at_s + since_s, 4), mps) for since_s, mps in fitted)]
         return float(times_s[-1] - times_s[0])
+
+    def _take_route(self, action: Element, at_s: float, place: str) -> float:
+        """Go the lanes of a route, as far as the map goes."""
+        gone_m = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)[0]
+        here, graph = self._pose_after(gone_m, place), self._stage.graph
+        lane_id = graph.under(here.x_m, here.y_m, here.heading_rad)
+        if lane_id is None or self.path is not None or at_s > 0.0:
+            raise fault_at(place, "a route needs a lane where it begins, and no motion before it")
+        route = shapely.LineString(self._stage.find_route(here, action, place))
+        lane_ids = [lane_id]
+        while len(lane_ids) < _MOST_LANES and (after := graph.successors(lane_ids[-1])):
+            ends = [shapely.Point(graph.lane(name).centerline.points_m[-1]) for name in after]
+            away_m, nearest = min((route.distance(e), n) for n, e in enumerate(ends))
+            if away_m > _BESIDE_ROUTE_M:
+                break
+            lane_ids.append(after[nearest])
+        self.path = LanePath(lane_ids=tuple(lane_ids))
+        self._line = lane_line(graph, self.path, (here.x_m, here.y_m))
+        return 0.0
 
 
 def fit_speeds(times_s: FloatArray, ways_m: FloatArray) -> list[tuple[float, float]]:
@@ -293,7 +307,7 @@ def read_speed_target(action: Element, mps_of: Callable[[str], float], place: st
     if target.tag == "RelativeTargetSpeed":
         other_mps = mps_of(target.get("entityRef", ""))
         by = {"delta": other_mps + value, "factor": other_mps * value}
-        value = foreign.look_up(by, target.get("speedTargetValueType"), place)
+        value = foreign.look_up(by, target.get("speedTargetValueType", "delta"), place)
     if value < 0.0:
         raise fault_at(place, f"a speed of {value:g} m/s, backwards, is not read")
     return value

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from augment.foreign import fault_at
+from augment.foreign import Doubts, fault_at
 
 Values = Mapping[str, str]
 
@@ -33,33 +33,41 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def resolve(element: Element, values: Values, assigned: Values | None = None) -> Element:
+def resolve(
+    element: Element, values: Values, doubts: Doubts, assigned: Values | None = None
+) -> Element:
     """Return a copy in which parameters and expressions are replaced by their values.
 
     Args:
         element: May declare parameters for what is in it.
         values: Of the parameters around it.
+        doubts: Told of what is unknown or has no value, and stays as it is.
         assigned: Values that replace those which it declares.
-
-    Raises:
-        InvalidDocument: A parameter is unknown, or an expression has no value.
     """
+
+    def read(text: str, place: str) -> str:
+        return doubts.read("parameters", resolve_text, text, values, place) or text
+
     for declared in element.findall("ParameterDeclarations/ParameterDeclaration"):
         name = declared.get("name", "").removeprefix("$")
-        own = resolve_text(declared.get("value", ""), values, f"parameter {name[:40]}")
+        own = read(declared.get("value", ""), f"parameter {name[:40]}")
         values = {**values, name: (assigned or {}).get(name, own)}
     copy = Element(element.tag)
     for name, text in element.items():
-        copy.set(name, resolve_text(text, values, f"{element.tag}.{name}"))
+        copy.set(name, read(text, f"{element.tag}.{name}"))
     copy.text = element.text
     for child in element:
         if child.tag != "ParameterDeclarations":
-            copy.append(resolve(child, values))
+            copy.append(resolve(child, values, doubts))
     return copy
 
 
 def resolve_text(text: str, values: Values, place: str) -> str:
-    """Return a text, or the value of the parameter or expression that it is; raises as above."""
+    """Return a text, or the value of the parameter or expression that it is.
+
+    Raises:
+        InvalidDocument: A parameter is unknown, or an expression has no value.
+    """
     if not text.startswith("$"):
         return text
     if not text.startswith("${"):

@@ -17,14 +17,13 @@ from augment import foreign
 from augment.foreign import fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.opendrive.network import END, START, MapRoad, RoadNetwork
+from augment.formats.openscenario.routes import Place, find_legs, walk_legs
 from augment.geometry.frames import Pose, difference, wrap
 
 _REACH_M: Final = 30.0
 """So far from a reference line a place can be on its road."""
 _MOST_ROADS = 200
 """A way along roads that is longer is none."""
-Place = tuple[MapRoad, float, float, int]
-"""Road, s and t there, and the id of the lane."""
 
 
 class PositionReader:
@@ -38,6 +37,12 @@ class PositionReader:
     def __init__(self, network: RoadNetwork, positions: Mapping[str, Element]) -> None:
         self._network, self._positions = network, positions
         self._poses, self._open = dict[str, Pose](), set[str]()
+
+    def at(self, poses: Mapping[str, Pose]) -> "PositionReader":
+        """Return a reader for whom entities are elsewhere."""
+        later = PositionReader(self._network, self._positions)
+        later._poses |= poses
+        return later
 
     def entity_pose(self, name: str) -> Pose:
         """Return where an entity is at t0.
@@ -72,6 +77,7 @@ class PositionReader:
             "RelativeRoadPosition": self._find_relative_road,
             "RelativeObjectPosition": self._find_relative_object,
             "RelativeWorldPosition": self._find_relative_world,
+            "RoutePosition": self._find_on_route,
         }
         find = foreign.look_up(finders, kind, place)
         assert element is not None
@@ -79,7 +85,7 @@ class PositionReader:
         pose, orientation = find(element, place), element.find("Orientation")
         if orientation is None:
             return pose
-        turn_rad = read_float(orientation, "h", place) if "h" in orientation.attrib else 0.0
+        turn_rad = _number(orientation, "h")
         if orientation.get("type", "absolute") == "relative":
             return pose.turn(turn_rad)
         return replace(pose, heading_rad=wrap(turn_rad))
@@ -104,7 +110,7 @@ class PositionReader:
         return min(best, key=lambda row: row[:2])[2]
 
     def _find_world(self, element: Element, place: str) -> Pose:
-        heading_rad = read_float(element, "h", place) if "h" in element.attrib else 0.0
+        heading_rad = _number(element, "h")
         x_m, y_m = (read_float(element, name, place) for name in "xy")
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
@@ -118,17 +124,54 @@ class PositionReader:
         s_m = read_float(element, "s", place, 0.0, road.line.length_m + 0.01)
         return road.pose_at(s_m, read_float(element, "t", place))
 
+    def _find_on_route(self, element: Element, place: str) -> Pose:
+        inside = element.find("InRoutePosition/*")
+        kind = "nothing" if inside is None else inside.tag
+        if inside is not None and kind == "FromCurrentEntity":
+            return self.entity_pose(inside.get("entityRef", ""))
+        names = {"FromLaneCoordinates": "laneId", "FromRoadCoordinates": "t"}
+        name = foreign.look_up(names, kind, place)
+        assert inside is not None
+        places = self.find_waypoints(element, place)
+        s_name = "s" if "pathS" not in inside.attrib else "pathS"
+        way_m = read_float(inside, s_name, place, 0.0)
+        road, s_m, is_along = walk_legs(find_legs(self._network, places, place), way_m, place)
+        if name == "laneId":
+            lane_id = foreign.read_whole(inside.get(name), f"{place}.{name}")
+            return road.lane_pose(lane_id, s_m, _number(inside, "laneOffset"))
+        pose = road.pose_at(s_m, read_float(inside, name, place))
+        return pose if is_along == road.is_forward(-1) else pose.turn(math.pi)
+
+    def find_waypoints(self, holder: Element, place: str) -> list[Place]:
+        """Return where the waypoints of a route lie."""
+        positions = holder.findall(".//Waypoint/Position")
+        if len(positions) < 2:
+            raise fault_at(place, "needs a Route of two waypoints at least")
+        return [self._find_waypoint(position, place) for position in positions]
+
+    def _find_waypoint(self, position: Element, place: str) -> Place:
+        element = position.find("LanePosition")
+        if element is None:
+            return self.locate(self.find_pose(position, place), place)
+        # Where roads meet, a pose is on several of them.
+        lane_id = foreign.read_whole(element.get("laneId"), f"{place}.laneId")
+        road = self._network.road(element.get("roadId", ""), f"{place}.roadId")
+        return road, read_float(element, "s", place), 0.0, lane_id
+
     def _find_relative_lane(self, element: Element, place: str) -> Pose:
         road, s_m, _, lane_id = self._locate_other(element, place)
         step = foreign.read_whole(element.get("dLane"), f"{place}.dLane")
-        other = lane_id + step
-        # No lane has the id 0, so it is no step.
-        if other == 0 or (other > 0) != (lane_id > 0):
-            other += 1 if step > 0 else -1
+        other = step_lanes(lane_id, step)
         along_m = _number(element, "ds")
         along_m += _number(element, "dsLane") * (1 if road.is_forward(lane_id) else -1)
+        away_rad = difference(
+            self.entity_pose(element.get("entityRef", "")).heading_rad,
+            road.pose_at(s_m, 0.0, lane_id).heading_rad,
+        )
         road, s_m, other = self._advance(road, s_m, other, along_m, place)
-        return road.lane_pose(other, s_m, _number(element, "offset"))
+        pose = road.lane_pose(other, s_m, _number(element, "offset"))
+        # Beside who drives against the lane one does too.
+        return pose if abs(away_rad) <= math.pi / 2.0 else pose.turn(math.pi)
 
     def _find_relative_road(self, element: Element, place: str) -> Pose:
         road, s_m, t_m, lane_id = self._locate_other(element, place)
@@ -170,11 +213,18 @@ class PositionReader:
         raise fault_at(place, f"leads over more than {_MOST_ROADS} roads")
 
 
+def step_lanes(lane_id: int, step: int) -> int:
+    """Return the id so many lanes to the left along s; no lane has 0, so it is no step."""
+    other = lane_id + step
+    is_across = other == 0 or (other > 0) != (lane_id > 0)
+    return other + is_across * (1 if step > 0 else -1)
+
+
 # Private
 
 
 def _number(element: Element, name: str) -> float:
-    return read_float(element, name, element.tag) if name in element.attrib else 0.0
+    return read_float(element, name, element.tag, default=0.0)
 
 
 def _project(road: MapRoad, pose: Pose) -> tuple[float, float]:

@@ -5,9 +5,8 @@ a trajectory by the clock alone was recorded, as it were; whatever else moves ge
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -18,23 +17,22 @@ from augment.foreign import FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.opendrive.maps import map_around
 from augment.formats.opendrive.reader import parse_place
-from augment.formats.openscenario.conditions import Expectation
 from augment.formats.openscenario.events import (
     ACTIONS,
     GONE,
     StoryEvent,
     describe_action,
     list_events,
-    read_vertices,
 )
-from augment.formats.openscenario.motions import MotionReader, read_speed_target
+from augment.formats.openscenario.motions import read_motion, read_speed_target
 from augment.formats.openscenario.positions import PositionReader
 from augment.formats.openscenario.sources import EGO_NAMES, Entity, ScenarioSource, is_catalog
+from augment.formats.openscenario.stage import Stage
+from augment.formats.openscenario.trajectories import find_middle, trace
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap
-from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, Scene, TrafficLight
-from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import STEP_S, Motion, find_motion, read_at
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
+from augment.scene.motion import STEP_S, read_at
 
 _LIGHT_ACTION = "TrafficSignalStateAction"
 LONGEST_S = 60.0
@@ -99,11 +97,15 @@ class _Scenario:
         for action in self._source.root.findall("Storyboard/Init/Actions/GlobalAction"):
             if (kind := describe_action(action)) != _LIGHT_ACTION:
                 self._doubts.assume(f"{kind} at t0 was left out")
+        read = self._doubts.read
+        self._mps = {name: read("speeds", self._read_speed, name) for name in self._speeds}
         self._placer = PositionReader(self._network, self._positions)
         self._middles = dict[str, FloatArray]()
         for name in self._entities.keys() & self._positions.keys():
             with self._doubts.about("entities"):
-                self._middles[name] = self._middle(name, self._placer.entity_pose(name))
+                self._middles[name] = find_middle(
+                    self._placer.entity_pose(name), self._entities[name].centre_m
+                )
         cars = (AgentType.VEHICLE, AgentType.BUS)
         self.drivers = [
             n for n, e in self._entities.items() if n in self._middles and e.type in cars
@@ -156,22 +158,25 @@ class _Scenario:
         recording = replace(recording, tracks=kept) if is_recorded else None
         ids = {name: agent_id for agent_id, name in names.items()}
         ids[self.ego_name or ""] = scene.ego.id
-        reader = self._motion_reader(scene, find_motion(scene, recording=recording), ids)
+        stage = Stage(
+            scene,
+            recording,
+            network=self._network,
+            placer=self._placer,
+            entities=self._entities,
+            ids=ids,
+        )
         if self.ego_name in self._events.keys() - self._tracks.keys():
-            self._doubts.assume("The ego's own events were left out: a planner drives it")
+            self._doubts.assume(
+                "The ego's own events and route were left out: a planner drives it"
+            )
         for name in self._order_actors():
             agent = next((agent for agent in scene.agents if agent.id == ids.get(name)), None)
-            if agent is None or name in self._tracks:
-                continue
-            agent = reader.read(name, agent, self._choose_events(self._events[name]))
-            if agent.motion is not None:
-                agents = (agent if a.id == agent.id else a for a in scene.agents)
-                scene = replace(scene, agents=tuple(agents))
-                # Others may wait for somebody who moves so.
-                motion = find_motion(scene, recording=recording)
-                reader.expected.states.update(_states_by_name(motion, ids))
+            if agent is not None and name not in self._tracks:
+                events = self._choose_events(self._events[name])
+                read_motion(stage, name, agent, events, self._doubts)
         notes = *reading.notes, *self._doubts.notes
-        return replace(reading, scene=scene, recording=recording, notes=notes)
+        return replace(reading, scene=stage.scene, recording=recording, notes=notes)
 
     def _order_actors(self) -> list[str]:
         """Return who has events, those who wait for none of the others first."""
@@ -182,42 +187,6 @@ class _Scenario:
             return len(watched & (self._events.keys() - {name, self.ego_name}))
 
         return sorted(self._events, key=count)
-
-    def _motion_reader(self, scene: Scene, motion: Motion, ids: dict[str, str]) -> MotionReader:
-        origin, states = scene.origin.pose, _states_by_name(motion, ids)
-
-        def find_middles(name: str, positions: list[Element], place: str) -> FloatArray:
-            world = self._find_middles(name, positions, place)
-            local = origin.to_local(world[:, :2])
-            return np.column_stack([local, world[:, 2] - origin.heading_rad])
-
-        def find_point(position: Element, place: str) -> Pose:
-            pose = self._placer.find_pose(position, place)
-            x_m, y_m = origin.to_local(np.array([[pose.x_m, pose.y_m]]))[0].tolist()
-            return Pose(x_m=x_m, y_m=y_m, heading_rad=0.0)
-
-        def count_lanes(pose: Pose, lane_id: int) -> int:
-            x_m, y_m = origin.to_parent(np.array([[pose.x_m, pose.y_m]]))[0].tolist()
-            world = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(pose.heading_rad + origin.heading_rad))
-            road, _, _, own_id = self._placer.locate(world, "LaneChangeTarget")
-            steps = lane_id - own_id - ((lane_id > 0) - (own_id > 0))
-            return steps if road.is_forward(own_id) else -steps
-
-        entities = {name: self._entities[name] for name in states if name}
-        return MotionReader(
-            graph=LaneGraph(scene),
-            expected=Expectation(
-                times_s=motion.times_s,
-                states=states,
-                centres_m={"": (0.0, 0.0)} | {n: e.centre_m for n, e in entities.items()},
-                sizes_m={"": scene.ego.size_m} | {n: e.size_m for n, e in entities.items()},
-                ids=ids,
-                find_point=find_point,
-            ),
-            find_middles=find_middles,
-            count_lanes=count_lanes,
-            doubts=self._doubts,
-        )
 
     def _choose_events(self, events: list[StoryEvent]) -> list[StoryEvent]:
         """Return the events of a motion, without trajectories before one that waits."""
@@ -257,30 +226,11 @@ class _Scenario:
         else:
             self._doubts.assume(f"{kind} at t0 was left out")
 
-    def _speed_mps(self, name: str, depth: int = 0) -> float:
+    def _read_speed(self, name: str, depth: int = 0) -> float:
         if name not in self._speeds or depth > len(self._speeds):
             return 0.0
         place, action = f"speed of {name[:40]}", self._speeds[name]
-        return read_speed_target(action, lambda other: self._speed_mps(other, depth + 1), place)
-
-    def _middle(self, name: str, pose: Pose) -> FloatArray:
-        """Return x, y, heading (3,) of the middle of a box whose point of reference is there."""
-        entity = self._entities[name]
-        x_m, y_m = pose.to_parent(np.array([entity.centre_m]))[0].tolist()
-        return np.array([x_m, y_m, pose.heading_rad])
-
-    def _find_middles(self, name: str, positions: list[Element], place: str) -> FloatArray:
-        """Return the middles (V, 3) at positions; without a heading, that of the way on."""
-        poses = [self._placer.find_pose(position, place) for position in positions]
-        for row, (here, following) in enumerate(pairwise(poses)):
-            world = positions[row].find("WorldPosition")
-            way = following.x_m - here.x_m, following.y_m - here.y_m
-            if world is not None and "h" not in world.attrib and math.hypot(*way) > 1e-6:
-                poses[row] = replace(here, heading_rad=math.atan2(way[1], way[0]))
-        last = positions[-1].find("WorldPosition")
-        if last is not None and "h" not in last.attrib and len(poses) > 1:
-            poses[-1] = replace(poses[-1], heading_rad=poses[-2].heading_rad)
-        return np.array([self._middle(name, pose) for pose in poses])
+        return read_speed_target(action, lambda other: self._read_speed(other, depth + 1), place)
 
     def _find_ego(self, item: str | None) -> str | None:
         if item is not None and item.startswith("@"):
@@ -329,14 +279,14 @@ class _Scenario:
         rows = np.empty((0, 4))
         for event in sorted(timed, key=lambda event: event.time_s or 0.0):
             (_, action), *_ = event.actions
-            positions, times_s = read_vertices(action, event.place)
+            centre_m = self._entities[name].centre_m
+            middles, times_s = trace(action, centre_m, self._placer, event.place)
             if times_s is None:
                 return
             start_s, timing = event.time_s or 0.0, action.find("TimeReference/Timing")
             assert timing is not None
             if timing.get("domainAbsoluteRelative") == "relative":
                 times_s = times_s + start_s
-            middles = self._find_middles(name, positions, event.place)
             rows = rows[rows[:, 0] < start_s - 1e-6]
             made = np.column_stack([times_s, middles])[times_s >= start_s - 1e-6]
             rows = np.vstack([rows, made])
@@ -345,7 +295,7 @@ class _Scenario:
             return
         if name in self._middles and rows[0, 0] > 1e-6:
             waits = [[s, *self._middles[name]] for s in (0.0, rows[0, 0] - 1e-3)]
-            rows = np.vstack([waits[: 1 if self._speed_mps(name) else 2], rows])
+            rows = np.vstack([waits[: 1 if self._mps.get(name) else 2], rows])
         gone = [e for e in events if any(kind == GONE for kind, _ in e.actions)]
         ends = [e.time_s for e in gone if e.time_s is not None]
         # Who is taken away without a time is so where its trajectory ends.
@@ -365,7 +315,7 @@ class _Scenario:
             absent = (times_s < track_s[0] - 1e-6) | (times_s > self._gone_s[name] + 1e-6)
             states[absent] = np.nan
         if name in self._middles:
-            states[0] = [*self._middles[name], self._speed_mps(name)]
+            states[0] = [*self._middles[name], self._mps.get(name) or 0.0]
         return states
 
     def _track(self, name: str, states: FloatArray) -> LoggedTrack:
@@ -374,11 +324,6 @@ class _Scenario:
         return LoggedTrack(
             name=name, type=entity.type, length_m=length_m, width_m=width_m, states=states
         )
-
-
-def _states_by_name(motion: Motion, ids: Mapping[str, str]) -> dict[str, FloatArray]:
-    moves = {one.agent.id: one.states for one in (motion.ego, *motion.others)}
-    return {name: moves[agent_id] for name, agent_id in ids.items() if agent_id in moves}
 
 
 def _is_step(action: Element) -> bool:

@@ -19,6 +19,8 @@ from augment.scene.entities import AgentType
 from augment.scene.planned_motion import EGO_ID
 
 _CATALOG = b"<Catalog "
+_REFERRING = ("ManeuverGroup", "RouteRef", "AssignRouteAction", "TrajectoryRef")
+"""What may name an entry of a catalog in place of its content, but for entities."""
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
@@ -83,7 +85,11 @@ class ScenarioSource:
             raise fault_at(path.name, text)
         if root.find("Storyboard") is None:
             raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
-        self.root = resolve(root, {})
+        self.root = resolve(root, {}, self.doubts)
+        for holder in [part for part in self.root.iter() if part.tag in _REFERRING]:
+            for reference in holder.findall("CatalogReference"):
+                with self.doubts.about("references to catalogs"):
+                    holder.append(self.resolve_reference(reference))
         for tag in _IGNORED:
             self.doubts.assume(f"{tag} was left out", len([*self.root.iter(tag)]))
         stops = len(self.root.findall(".//Act/StopTrigger//Condition"))
@@ -105,10 +111,9 @@ class ScenarioSource:
         suffix = "" if name.lower().endswith(".xodr") else ".xodr"
         file = self._find(f"{name}{suffix}")
         if file is None:
-            text = (
-                f"the map {name[:80]!r} is not beside the scenario: put it there, or both in a zip"
-            )
-            raise fault_at("RoadNetwork.LogicFile", text)
+            text = f"the map {name[:80]!r} is not beside the scenario: put it there, or both in a"
+            reasons = [f"{text} zip", *self.doubts.notes]
+            raise fault_at("RoadNetwork.LogicFile", "; ".join(reasons))
         return RoadNetwork(file)
 
     def entities(self) -> dict[str, Entity]:
@@ -135,7 +140,7 @@ class ScenarioSource:
             row.get("parameterRef", "").removeprefix("$"): row.get("value", "")
             for row in reference.findall("ParameterAssignments/ParameterAssignment")
         }
-        return resolve(foreign.look_up(entries, entry, place), {}, assigned)
+        return resolve(foreign.look_up(entries, entry, place), {}, self.doubts, assigned)
 
     def _find(self, name: str) -> Path | None:
         wanted = PurePosixPath(name.replace("\\", "/"))
@@ -175,6 +180,7 @@ class ScenarioSource:
         if category in SCENERY:
             self.doubts.assume(f"A {category} was left out: it is scenery")
             return None
+        self.doubts.assume("A trailer was left out", body.find("Trailer") is not None)
         centre, size = body.find("BoundingBox/Center"), body.find("BoundingBox/Dimensions")
         ahead_m, left_m, length_m, width_m = (
             0.0 if box is None else foreign.read_number(box.get(n, "0"), f"{place}.{n}")
