@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
+from augment.formats.apart import UntrustedInput
 from augment.formats.openscenario.parameters import resolve_text
 from augment.formats.openscenario.scenario import OpenScenario
 from augment.formats.openscenario.writer import write as write_scenarios
@@ -30,6 +31,7 @@ from tests.formats.openscenario_files import (
     speed,
     write,
 )
+from tests.formats.test_archive import folder_as_zip
 from tests.formats.test_opendrive import JUNCTION, SIGNAL
 from tests.formats.test_openscenario_writer import scene_of_motions
 from tests.scenes import vehicle
@@ -97,6 +99,14 @@ def test_a_position_is_where_a_formula_has_it(
     assert pose_of_other(reading) == pytest.approx(expected, abs=2e-3)
     assert reading.scene.agents[0].size_m == (5.0, 2.0)
     assert reading.scene.ego.speed_mps == 10.0
+
+
+def test_world_positions_of_carlas_own_frame_are_mirrored(tmp_path: Path) -> None:
+    text = scenario(other_at='<WorldPosition x="50" y="1.75" h="0.5"/>')
+    text = text.replace("<FileHeader", '<FileHeader description="CARLA:Crossing"')
+    reading = read(write(tmp_path, text.replace('y="-1.75"', 'y="1.75"')))
+    assert pose_of_other(reading) == pytest.approx([50.0, -1.75, -0.5], abs=2e-3)
+    assert any("World positions are CARLA's" in note for note in reading.notes)
 
 
 def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
@@ -358,16 +368,27 @@ def test_a_lane_change_takes_its_time_or_way(
     assert other.states[[10, 25, 41], 1] == pytest.approx([0.0, -1.75, -3.5], abs=0.06)
 
 
+def test_who_drives_on_the_oncoming_lane_changes_onto_the_egos(tmp_path: Path) -> None:
+    at = '<LanePosition roadId="1" laneId="1" s="80"><Orientation type="relative" h="3.141593"/>'
+    target = OF_EGO.replace("-1", "0")
+    change = event(CHANGE.format("time", 3, target), by_time(1))
+    text = scenario(change, other_at=f"{at}</LanePosition>", other_does=(speed(8),))
+    (other,) = moves(read(write(tmp_path, text))).others
+    assert other.states[[0, 10, 41], 1] == pytest.approx([3.5, 3.5, 0.0], abs=0.06)
+    assert other.states[-1, 0] > other.states[41, 0] + 50.0
+
+
 def test_events_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
     first = event(speed(12, STEP.replace("step", "linear").replace('"0"', '"2"')), by_time(1))
-    second = event(CHANGE.format("time", 2, RIGHT), AFTER, name="changes")
+    later = AFTER.replace('delay="0"', 'delay="0.5"')
+    second = event(CHANGE.format("time", 2, RIGHT), later, name="changes")
     third = event(BRAKES, by_time(6), name="brakes")
     file = write(tmp_path, scenario(first, second, third, other_does=(speed(4),)))
     reading = read(file)
     (other,) = moves(reading).others
     x_m, y_m = (other.states[:, :2] - other.states[0, :2]).T
     assert x_m[30] == pytest.approx(4.0 + 16.0, abs=0.01)
-    assert y_m[[30, 51]] == pytest.approx([0.0, -3.5], abs=0.05)
+    assert y_m[[35, 56]] == pytest.approx([0.0, -3.5], abs=0.05)
     assert x_m[-1] == pytest.approx(4.0 + 16.0 + 36.0 + 12.0, abs=0.5)
     assert not [note for note in reading.notes if "Not understood" in note]
 
@@ -400,6 +421,18 @@ def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path)
     reading = read(write(tmp_path, scenario(event(BRAKES, given), other_does=(speed(4),))))
     (other,) = moves(reading).others
     assert other.started_s == pytest.approx(5.0, abs=0.01)
+
+
+def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
+    place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
+    shape = '<Clothoid curvature="{}" curvaturePrime="0" length="40">' + f"{place}</Clothoid>"
+    follow = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
+    first = event(follow.format(0.01), by_time(2))
+    second = event(follow.format(-0.01), AFTER, name="then")
+    (other,) = moves(read(write(tmp_path, scenario(first, second, other_does=(speed(8),))))).others
+    # Two bends of 0.4 rad in a radius of 100 m, the other way round.
+    x_m, y_m = 200.0 * math.sin(0.4), 200.0 * (1.0 - math.cos(0.4))
+    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.5)
 
 
 @pytest.mark.parametrize("start_s", [0.0, 2.0])
@@ -466,7 +499,7 @@ def test_a_trajectory_is_followed_by_its_times_or_speed(
         (scenario(event(BRAKES, by_entity('<SpeedCondition value="99" rule="greaterThan"/>'))),
          "its conditions never hold"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "1")))),
-         "neither follows"),
+         "there is no lane in its direction to change to"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "-3")))),
          "road 1.lane: unknown '-4'; known: 1, -1, -2"),
         (scenario(event(FOLLOW.format("", "<None/>"))), "or a Polyline of two vertices"),
@@ -496,6 +529,14 @@ def test_a_trajectory_is_followed_by_its_times_or_speed(
                                          f"{by_time(9)}</ConditionGroup></StopTrigger></Act>"),
          "The condition that stops an act was left out"),
         (scenario(more="<VariableDeclaration/>"), "VariableDeclaration was left out"),
+        (scenario(event(BRAKES)).replace('"Other"/></Actors>', '"X"/></Actors>'),
+         "Events of somebody who is not there were left out"),
+        (scenario(event(BRAKES, by_time(2).replace("greater", "more"))), "unknown 'moreThan'"),
+        (scenario(event(BRAKES), event(BRAKES, AFTER.replace("completeState", "skipTransition"))),
+         "unknown 'skipTransition'; known: startTransition"),
+        (scenario(event(BRAKES, by_entity(GAP.format(30, "maybe")))), "unknown 'maybe'; known"),
+        (scenario(event(CHANGE.format("time", 2, RIGHT).replace("sinusoidal", "linear"))),
+         "A linear lane change became a smooth one"),
         (scenario(more="<GlobalAction><EnvironmentAction/></GlobalAction>"),
          "EnvironmentAction at t0 was left out"),
     ],
@@ -594,18 +635,29 @@ def test_our_own_files_come_back_whole(make: object, tmp_path: Path) -> None:
         assert lane.width_m == pytest.approx(before.width_m, abs=0.01)
 
 
-def test_an_edit_is_written_back_without_touching_others(tmp_path: Path) -> None:
+def test_an_edit_of_a_zip_is_written_back_without_touching_others(tmp_path: Path) -> None:
     change = event(CHANGE.format("time", 3, RIGHT), by_time(1))
-    source = read(write(tmp_path, scenario(change, other_does=(speed(8),))))
+    lorry = f'<Vehicle name="lorry" vehicleCategory="bus">{BOX.replace("5", "12")}</Vehicle>'
+    refers = '<CatalogReference catalogName="Cars" entryName="lorry"/>'
+    taken = f"<AssignRouteAction><Route>{route((-1, 20), (-1, 90))}</Route></AssignRouteAction>"
+    does = f"<PrivateAction>{speed(10)}</PrivateAction>"
+    routed = f"{does}<PrivateAction><RoutingAction>{taken}</RoutingAction></PrivateAction>"
+    text = scenario(change, other=refers, other_does=(speed(8),)).replace(does, routed, 1)
+    (tmp_path / "in").mkdir()
+    write(tmp_path / "in", text, **{"sub/cars.xosc": catalog(lorry)})
+    packed = UntrustedInput(path=folder_as_zip(tmp_path / "in.zip", tmp_path / "in"))
+    _, source = packed.read(item=None, frame=None, name="made")
+    assert any("own events and route were left out" in note for note in source.notes)
     before = moves(source)
     added = (vehicle("Agent9", 30.0, -3.5, 0.0),)
     given = cell(source.scene, added=added, keeps_traffic=True, recording=source.recording)
-    folder = tmp_path / "out"
-    folder.mkdir()
-    after = write_and_read(given, folder)
-    assert {agent.size_m for agent in after.scene.agents} == {(5.0, 2.0), added[0].size_m}
-    (name,) = (n for n, theirs in after.names.items() if theirs == before.others[0].agent.id)
-    (kept,) = (one for one in moves(after).others if one.agent.id == name)
+    (tmp_path / "out").mkdir()
+    after = write_and_read(given, tmp_path / "out")
+    assert {a.size_m: a.type for a in after.scene.agents} == {
+        (12.0, 2.0): AgentType.BUS,
+        added[0].size_m: AgentType.VEHICLE,
+    }
+    (kept,) = (m for m in moves(after).others if m.agent.type is AgentType.BUS)
     steps = min(len(kept.states), len(before.others[0].states))
     gaps_m = np.hypot(*(kept.states[:steps, :2] - before.others[0].states[:steps, :2]).T)
     assert np.nanmax(gaps_m) < 0.01

@@ -15,7 +15,7 @@ import numpy as np
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.openscenario.events import BEGUN, WAIT, StoryEvent
+from augment.formats.openscenario.events import BEGUN, ENDED, WAIT, StoryEvent
 from augment.geometry.frames import Pose
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, Trigger
 
@@ -29,6 +29,7 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "falling": lambda now, before: ~now & before,
     "risingOrFalling": lambda now, before: now != before,
 }
+_SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _MARGIN_M = 1e-3
 _AHEAD_M = 2.0
 
@@ -50,7 +51,8 @@ class Done:
 
     def since_s(self, wait: Element) -> float:
         """Return the moment that a condition on the element waits for."""
-        return self.begins_s if wait.get("state") in BEGUN else self.ends_s
+        moments = dict.fromkeys(BEGUN, self.begins_s) | dict.fromkeys(ENDED, self.ends_s)
+        return foreign.look_up(moments, wait.get("state"), "state of a storyboard element")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,8 +189,10 @@ def _watch(
     if not met:
         raise fault_at(place, "nobody triggers it")
     assert triggering is not None
-    is_all = triggering.get("triggeringEntitiesRule") == "all"
-    return (np.all if is_all else np.any)(met, axis=0), [*names, *_list_refs(element)]
+    unite = foreign.look_up(
+        {"any": np.any, "all": np.all}, triggering.get("triggeringEntitiesRule", "any"), place
+    )
+    return unite(met, axis=0), [*names, *_list_refs(element)]
 
 
 def _list_refs(element: Element) -> list[str]:
@@ -221,7 +225,7 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
     left = way[:, 1] * np.cos(heading_rad) - way[:, 0] * np.sin(heading_rad)
     gap_m = np.hypot(ahead, left)
     gap_m = {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}.get(kind, gap_m)
-    if element.get("freespace") == "true":
+    if foreign.look_up(_SWITCH, element.get("freespace", "false").lower(), place):
         sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
         gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
     return np.asarray(gap_m)

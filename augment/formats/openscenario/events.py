@@ -21,6 +21,9 @@ _COMES = "AddEntityAction"
 _TIME = "ByValueCondition/SimulationTimeCondition"
 WAIT = "ByValueCondition/StoryboardElementStateCondition"
 BEGUN = ("startTransition", "runningState")
+ENDED = ("endTransition", "completeState", "stopTransition")
+_SINCE = ("greaterThan", "greaterOrEqual", "equalTo")
+"""The rules by which a time is one from which on something holds."""
 Groups = tuple[tuple[Element, ...], ...]
 
 
@@ -45,10 +48,16 @@ class StoryEvent:
         if not self.groups:
             return 0.0
         times = [condition.find(_TIME) for group in self.groups for condition in group]
-        if len(times) != 1 or times[0] is None:
+        if len(times) != 1 or times[0] is None or times[0].get("rule", _SINCE[0]) not in _SINCE:
             return None
         delay_s = foreign.read_number(self.groups[0][0].get("delay") or "0", self.place)
         return max(read_float(times[0], "value", self.place) + delay_s, 0.0)
+
+    @property
+    def waits_for(self) -> Element | None:
+        """What it waits for if one element of the storyboard alone says when, None otherwise."""
+        conditions = [condition for group in self.groups for condition in group]
+        return conditions[0].find(WAIT) if len(conditions) == 1 else None
 
 
 def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
@@ -93,7 +102,8 @@ def _holds_at_once(condition: Element, around: tuple[str, ...]) -> bool:
     if state is not None:
         name = state.get("storyboardElementRef", "").split("::")[-1]
         return state.get("state") in BEGUN and name in around
-    return time is not None and (time.get("value") or "").strip("0.") == ""
+    is_since = time is not None and time.get("rule", _SINCE[0]) in _SINCE
+    return time is not None and is_since and (time.get("value") or "").strip("0.") == ""
 
 
 def _split(

@@ -19,7 +19,7 @@ from augment.errors import InvalidModification
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.openscenario.conditions import Done, find_step, find_trigger
-from augment.formats.openscenario.events import WAIT, StoryEvent
+from augment.formats.openscenario.events import StoryEvent
 from augment.formats.openscenario.stage import Stage
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
@@ -34,7 +34,7 @@ _BESIDE_ROUTE_M = 15.0
 """Lanes of a route end no further from its roads' middles."""
 _STEP_S = 0.01
 """A step in speed takes so long."""
-_LANE_M, _ON_M = 3.5, 300.0
+_LANE_M, _ON_M = 3.5, 1_000.0
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
     "step": lambda share: share,
@@ -64,6 +64,7 @@ class _Draft:
         self.path: Path | None = None
         self.speeds: list[tuple[float, float]] = []
         self._line: Polyline | None = None
+        self._step = 0
 
     def move_agent(self) -> TrafficAgent:
         """Return the agent with the motion so far."""
@@ -88,23 +89,28 @@ class _Draft:
             }
             lasts_s = foreign.look_up(act, kind, event.place)(action, begins_s, event.place)
             ends_s = max(ends_s, begins_s + lasts_s)
-        started_s = float(times_s[self._step])
-        own = {"actor": self._name, "start": start, "started_s": started_s}
-        done = Done(**own, begins_s=begins_s, ends_s=ends_s)
+        done = Done(
+            actor=self._name,
+            start=start,
+            started_s=float(times_s[self._step]),
+            begins_s=begins_s,
+            ends_s=ends_s,
+        )
         self._stage.expected.done.update(dict.fromkeys(event.names, done))
 
     def _begin(self, event: StoryEvent) -> float:
         """Set the start by the first event, and return how long after it an event begins."""
         expected, doubts = self._stage.expected, self._doubts
-        waits = [c.find(WAIT) for group in event.groups for c in group]
         start: Trigger
-        if len(waits) == 1 and waits[0] is not None:
-            done = expected.find_done(waits[0], event.place)
+        if (wait := event.waits_for) is not None:
+            done = expected.find_done(wait, event.place)
+            delay_s = foreign.read_number(event.groups[0][0].get("delay") or "0", event.place, 0.0)
+            since_s = done.since_s(wait) + delay_s
             if done.actor == self._name and self.start is not None:
-                return done.since_s(waits[0])
+                return since_s
             if not isinstance(done.start, AtTime):
                 raise fault_at(event.place, "waits for what starts by no time")
-            time_s = done.start.after_s + done.since_s(waits[0])
+            time_s = done.start.after_s + since_s
             start, step = AtTime(after_s=time_s), self._step_at(time_s)
         elif self.start is None:
             start, step = find_trigger(event, self._name, expected, doubts)
@@ -175,15 +181,20 @@ class _Draft:
         change_m = (later_m - gone_m) or value
         here = self._pose_after(gone_m, place)
         graph, target = self._stage.graph, _find(action, "LaneChangeTarget/*", place)
-        lane_id = graph.under(here.x_m, here.y_m, here.heading_rad)
         step = self._step_since(at_s)
         goal = self._stage.find_lane(self._name, here, target, step, place)
         onto = graph.under(goal.x_m, goal.y_m, goal.heading_rad)
-        if onto is None:
-            raise fault_at(place, "there is no lane to change to")
+        if onto is None or not self._drives_along(onto, here):
+            raise fault_at(place, "there is no lane in its direction to change to")
+        lane_id = graph.under(here.x_m, here.y_m, here.heading_rad)
+        lane_id = lane_id if lane_id and self._drives_along(lane_id, here) else onto
+        shape = dynamics.get("dynamicsShape")
+        foreign.look_up(_SHAPES, shape, f"{place}.LaneChangeActionDynamics")
+        is_sharp = shape in ("linear", "step")
+        self._doubts.assume(f"A {shape} lane change became a smooth one", is_sharp)
         is_offset = read_float(action, "targetLaneOffset", place, default=0.0) != 0.0
         self._doubts.assume("The offset after a lane change was left out", is_offset)
-        lane_ids = tuple(dict.fromkeys(name for name in (lane_id, onto) if name))
+        lane_ids = tuple(dict.fromkeys((lane_id, onto)))
         lanes = LanePath(lane_ids=lane_ids, change_m=min(max(change_m, 1.0), 200.0))
         try:
             line = lane_line(graph, lanes, (here.x_m, here.y_m))
@@ -196,6 +207,11 @@ class _Draft:
         else:
             self._go_on(gone_m, line.between(0.0, _ON_M).resample(2.0).points_m, place)
         return lasts_s or change_m / max(now_mps, 1.0)
+
+    def _drives_along(self, lane_id: str, here: Pose) -> bool:
+        line = self._stage.graph.lane(lane_id).centerline
+        along_rad = line.heading_at(line.project(here.x_m, here.y_m).s_m)
+        return math.cos(along_rad - here.heading_rad) > 0.0
 
     def _go_on(self, gone_m: float, points: FloatArray, place: str) -> None:
         """Follow points (V, 2) once it has gone so far."""

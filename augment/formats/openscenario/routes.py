@@ -58,6 +58,7 @@ def _connect(network: RoadNetwork, first: Place, last: Place, place: str) -> Ite
         yield Leg(road=road, from_m=from_m, to_m=to_m)
         return
     # By length, and in the order of finding: roads entered at an end, with the legs before.
+    queue: list[tuple[float, int, MapRoad, float, str, list[Leg]]]
     queue = [(0.0, 0, road, from_m, end, [])]
     seen, number = set[tuple[str, str]](), 0
     while queue:

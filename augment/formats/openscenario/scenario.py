@@ -170,6 +170,8 @@ class _Scenario:
             self._doubts.assume(
                 "The ego's own events and route were left out: a planner drives it"
             )
+        unknown = len(self._events.keys() - self._entities.keys())
+        self._doubts.assume("Events of somebody who is not there were left out", unknown)
         for name in self._order_actors():
             agent = next((agent for agent in scene.agents if agent.id == ids.get(name)), None)
             if agent is not None and name not in self._tracks:
@@ -192,7 +194,7 @@ class _Scenario:
         """Return the events of a motion, without trajectories before one that waits."""
         kinds = [{kind for kind, _ in event.actions} for event in events]
         waits = any(
-            event.time_s is None and "FollowTrajectoryAction" in own
+            event.time_s is None and event.waits_for is None and "FollowTrajectoryAction" in own
             for event, own in zip(events, kinds, strict=True)
         )
         chosen = []

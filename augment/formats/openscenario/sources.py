@@ -86,6 +86,8 @@ class ScenarioSource:
         if root.find("Storyboard") is None:
             raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
         self.root = resolve(root, {}, self.doubts)
+        if header is not None and header.get("description", "").startswith("CARLA:"):
+            self._mirror_places()
         for holder in [part for part in self.root.iter() if part.tag in _REFERRING]:
             for reference in holder.findall("CatalogReference"):
                 with self.doubts.about("references to catalogs"):
@@ -97,6 +99,16 @@ class ScenarioSource:
         counts = [element.get("maximumExecutionCount", "1") for element in self.root.iter()]
         repeated = sum(count.strip() != "1" for count in counts)
         self.doubts.assume("What may happen several times happens once", repeated)
+
+    def _mirror_places(self) -> None:
+        """Turn world positions of CARLA's own frame, which counts y to the right, into ours."""
+        worlds = [*self.root.iter("WorldPosition")]
+        for world in worlds:
+            for name in ("y", "h"):
+                with self.doubts.about("world positions"):
+                    value = foreign.read_number(world.get(name, 0.0), f"WorldPosition.{name}")
+                    world.set(name, repr(-value))
+        self.doubts.assume("World positions are CARLA's, with y to the right", len(worlds) > 0)
 
     def open_map(self) -> RoadNetwork:
         """Return the map that the scenario names.

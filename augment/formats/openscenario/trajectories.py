@@ -40,6 +40,8 @@ def trace(
     if timing is None:
         times_s = None
     elif times_s is not None:
+        domain = timing.get("domainAbsoluteRelative")
+        foreign.look_up(dict.fromkeys(("absolute", "relative")), domain, f"{place}.Timing")
         scale, offset_s = (read_float(timing, n, place, default=d) for n, d in _TIMING.items())
         times_s = times_s * scale + offset_s
     return np.array([find_middle(pose, centre_m) for pose in poses]), times_s
@@ -97,5 +99,5 @@ def _follow_clothoid(
     poses = [Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(rad)) for x_m, y_m, rad in rows]
     if not {"startTime", "stopTime"} <= spiral.attrib.keys():
         return poses, None
-    ends_s = (read_float(spiral, name, place, 0.0) for name in ("startTime", "stopTime"))
-    return poses, np.linspace(*ends_s, len(poses))
+    start_s, stop_s = (read_float(spiral, n, place, 0.0) for n in ("startTime", "stopTime"))
+    return poses, np.linspace(start_s, stop_s, len(poses))
