@@ -1,6 +1,7 @@
 """Tested against the published schema: nobody may pass on a file of the data set."""
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,12 @@ def fault_of(file: Path, item: str | None = START) -> str:
 def log(tmp_path: Path) -> Path:
     write_map(tmp_path, "sg-one-north")
     return write_log(tmp_path, "sg-one-north")
+
+
+def change_base(log: Path, file: str, change: str) -> None:
+    (path,) = log.parent.rglob(file)
+    with closing(sqlite3.connect(path)) as base:
+        base.executescript(change)
 
 
 # WGS 84's meridian is 4 984 944.378 m long up to 45 degrees; the CN Tower's published place.
@@ -73,12 +80,8 @@ def test_the_ego_is_its_centre_and_boxes_are_theirs(log: Path) -> None:
 
 
 def test_a_box_without_a_size_gets_the_usual_one_and_that_is_said(log: Path) -> None:
-    base = sqlite3.connect(log)
-    base.execute(
-        "UPDATE lidar_box SET width = 0, length = NULL WHERE track_token = ?", (token(60),)
-    )
-    base.commit()
-    base.close()
+    change = "UPDATE lidar_box SET width = 0, length = NULL WHERE hex(track_token) = '{}'"
+    change_base(log, "made.db", change.format(token(60).hex().upper()))
     reading = read(log)
     (car,) = reading.scene.agents
     assert (car.length_m, car.width_m) == (4.8, 2.0)
@@ -157,11 +160,7 @@ def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
 def test_a_broken_log_or_map_says_what_is_wrong(
     log: Path, file: str, change: str, said: str
 ) -> None:
-    (path,) = log.parent.rglob(file)
-    base = sqlite3.connect(path)
-    base.executescript(change)
-    base.commit()
-    base.close()
+    change_base(log, file, change)
     assert said in fault_of(log)
 
 
@@ -183,9 +182,5 @@ def test_a_broken_log_or_map_says_what_is_wrong(
 def test_one_bad_part_is_left_out_with_a_note(
     log: Path, file: str, change: str, said: str
 ) -> None:
-    (path,) = log.parent.rglob(file)
-    base = sqlite3.connect(path)
-    base.executescript(change)
-    base.commit()
-    base.close()
+    change_base(log, file, change)
     assert said in " ".join(read(log, START).notes)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
+from augment.formats.readers import recognise
 from augment.formats.reading import Reading
 from augment.formats.scenarionet.scenario import ScenarioNet
 from augment.scene.codec import scene_to_document
@@ -76,13 +77,13 @@ def store(path: Path, value: object, protocol: int = 4) -> Path:
     return file
 
 
-def read(file: Path, frame: int | None = None) -> Reading:
-    return ScenarioNet().read(file, item=None, frame=frame, name="made")
+def read(file: Path, frame: int | None = None, item: str | None = None) -> Reading:
+    return ScenarioNet().read(file, item=item, frame=frame, name="made")
 
 
-def fault_of(file: Path) -> str:
+def fault_of(file: Path, item: str | None = None) -> str:
     with pytest.raises(InvalidDocument) as caught:
-        read(file)
+        read(file, 0 if item else None, item)
     return str(caught.value)
 
 
@@ -172,3 +173,37 @@ def test_odd_parts_are_left_out_with_a_note(
     assert "ego is no ego. Not understood" in fault_of(store(tmp_path, made))
     del made["tracks"]["ego"]
     assert "unknown 'ego'; known" in fault_of(store(tmp_path, made))
+
+
+# A data set of several
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two scenarios, the second in a folder of its own, and an index that nobody needs."""
+    root = tmp_path / "set"
+    (root / "more").mkdir(parents=True)
+    for name, made in (("one", {"id": "one"}), ("more/two", {"id": "two"})):
+        file = root / name
+        store(root, description() | made).rename(file.with_name(f"sd_{file.name}.pkl"))
+    (root / "dataset_summary.pkl").write_bytes(pickle.dumps([1]))
+    return root
+
+
+@pytest.mark.parametrize(("item", "said"), [(None, "two"), ("sd_one.pkl", "one")])
+def test_a_scenario_is_named_by_its_file(folder: Path, item: str | None, said: str) -> None:
+    assert recognise(folder) is not None
+    reading = read(folder, 0, item)
+    assert f"by ScenarioNet, {said}," in reading.scene.provenance
+    assert reading.moment.item == f"sd_{said}.pkl"
+
+
+def test_moments_are_those_of_all_scenarios(folder: Path) -> None:
+    found = [(one.item, one.frame) for one in ScenarioNet().moments(folder, every_s=0.2)]
+    assert found == [(f"sd_{name}.pkl", step) for name in ("two", "one") for step in (0, 2)]
+
+
+def test_what_is_not_there_is_named(folder: Path) -> None:
+    for item in ("sd_x.pkl", "../set/sd_one.pkl"):
+        assert "item: unknown" in (told := fault_of(folder, item))
+        assert "known: sd_two.pkl, sd_one.pkl" in told

@@ -7,7 +7,7 @@ import csv
 import io
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import yaml
 
@@ -16,11 +16,9 @@ from augment.errors import InvalidDocument
 MODIFICATIONS = "interplan.yaml"
 TOKENS, SCRIPT = "nuplan_tokens.csv", "run_nuplan.sh"
 MOST_TOKENS = 20_000
-_COLUMNS = ("scenario", "augmentation", "contestant", "name")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NuplanScenario:
+class NuplanScenario(NamedTuple):
     """One changed scenario as nuPlan's results call it.
 
     Attributes:
@@ -34,6 +32,9 @@ class NuplanScenario:
     augmentation: str
     contestant: str
     name: str
+
+
+_COLUMNS = NuplanScenario._fields
 
 
 def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
@@ -53,7 +54,7 @@ def run_files(scenarios: Iterable[NuplanScenario]) -> dict[str, bytes]:
     for slug, runs in sorted(by_contestant.items()):
         files[f"scenario_filter/arena-{slug}.yaml"] = _filter(runs)
         commands += f'run arena-{slug} "$@"   # {len(runs)} scenarios\n'
-        rows.writerows([getattr(run, column) for column in _COLUMNS] for run in runs)
+        rows.writerows(runs)
     return files | {SCRIPT: (_SCRIPT + commands).encode(), TOKENS: table.getvalue().encode()}
 
 

@@ -72,7 +72,8 @@ def write(cells: Sequence[Cell]) -> Output:
         name = f"{entry.token}-s{index}"
         comments.append(f"{name} {entry.cell.scene.name}: {entry.cell.name}")
         if entry.token not in made_up:
-            runs.append(entry.run_as(name))
+            cell = entry.cell
+            runs.append(NuplanScenario(name, cell.augmentation, cell.contestant, cell.name))
         comments += [f"  lost: {loss.text}" for loss in entry.report.losses]
     sources = {
         entry.token: entry.source for entry in reversed(entries) if entry.source.index is not None
@@ -133,16 +134,6 @@ class _Entry:
         scene = without_traffic(self.cell.scene)
         special = interplan.SpecialScenario.model_validate(entry)
         return interplan.read_entry(self.token, self.source.index or "0", special, scene)[0]
-
-    def run_as(self, name: str) -> NuplanScenario:
-        """Return the scenario's name in nuPlan's results."""
-        cell = self.cell
-        return NuplanScenario(
-            scenario=name,
-            augmentation=cell.augmentation,
-            contestant=cell.contestant,
-            name=cell.name,
-        )
 
     def to_entry(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""

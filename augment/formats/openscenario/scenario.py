@@ -26,7 +26,7 @@ from augment.formats.openscenario.events import (
 )
 from augment.formats.openscenario.motions import read_motion, read_speed_target
 from augment.formats.openscenario.positions import PositionReader
-from augment.formats.openscenario.sources import EGO_NAMES, Entity, ScenarioSource, is_catalog
+from augment.formats.openscenario.sources import EGO_NAMES, ScenarioSource, is_catalog
 from augment.formats.openscenario.stage import Stage
 from augment.formats.openscenario.trajectories import find_middle, trace
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
@@ -37,12 +37,14 @@ from augment.scene.motion import STEP_S, read_at
 _LIGHT_ACTION = "TrafficSignalStateAction"
 LONGEST_S = 60.0
 """Trajectories are read so far."""
-_STATES = {
-    **dict.fromkeys(("green", "go"), TrafficLight.GREEN),
-    **dict.fromkeys(("yellow", "amber", "attention"), TrafficLight.YELLOW),
-    **dict.fromkeys(("red", "stop"), TrafficLight.RED),
-    "off": TrafficLight.UNKNOWN,
-}
+_STATES = foreign.name_all(
+    {
+        TrafficLight.GREEN: "green go",
+        TrafficLight.YELLOW: "yellow amber attention",
+        TrafficLight.RED: "red stop",
+        TrafficLight.UNKNOWN: "off",
+    }
+)
 NO_EGO = (
     "nobody is called {}, and not just one vehicle is here; who could be, as the item (--ego): {}"
 )
@@ -120,11 +122,8 @@ class _Scenario:
         """Return everybody's states, of those without a trajectory by the clock at t0 alone."""
         last_s = min(max([0.0, *(times[-1] for times, _ in self._tracks.values())]), LONGEST_S)
         times_s = np.arange(round(last_s / STEP_S) + 1) * STEP_S
-        states = {
-            name: self._states(name, times_s)
-            for name in self._entities
-            if name in self._middles or name in self._tracks
-        }
+        placed = [n for n in self._entities if n in self._middles or n in self._tracks]
+        states = {name: self._states(name, times_s) for name in placed}
         lost = len(self._entities) - len(states)
         self._doubts.assume("Somebody who is put nowhere at t0 was left out", lost)
         ego = states.pop(self.ego_name, None) if self.ego_name else None
@@ -192,20 +191,12 @@ class _Scenario:
 
     def _choose_events(self, events: list[StoryEvent]) -> list[StoryEvent]:
         """Return the events of a motion, without trajectories before one that waits."""
-        kinds = [{kind for kind, _ in event.actions} for event in events]
-        waits = any(
-            event.time_s is None and event.waits_for is None and "FollowTrajectoryAction" in own
-            for event, own in zip(events, kinds, strict=True)
-        )
-        chosen = []
-        for event, own in zip(events, kinds, strict=True):
-            is_before = waits and event.time_s is not None and "FollowTrajectoryAction" in own
-            self._doubts.assume(
-                "Before a trajectory that waits, somebody holds speed and lane", is_before
-            )
-            if own & ACTIONS.keys() and not is_before:
-                chosen.append(event)
-        return chosen
+        following = [e for e in events if "FollowTrajectoryAction" in dict(e.actions)]
+        waits = any(e.time_s is None and e.waits_for is None for e in following)
+        before = [e for e in following if waits and e.time_s is not None]
+        text = "Before a trajectory that waits, somebody holds speed and lane"
+        self._doubts.assume(text, len(before))
+        return [e for e in events if dict(e.actions).keys() & ACTIONS.keys() and e not in before]
 
     # Entities at t0
 
@@ -244,9 +235,11 @@ class _Scenario:
         if item is not None:
             foreign.look_up(drivers, item, "item")
             return item
-        told = [name for name in drivers if self._entities[name].is_ego]
-        named = [name for name in EGO_NAMES if name in drivers]
-        candidates = [*told, *named] or ([] if len(drivers) != 1 else [*drivers])
+        told = [name for name, entity in self._entities.items() if entity.is_ego]
+        meant = [*told, *(name for name in EGO_NAMES if name in self._entities)]
+        # Nobody takes the place of one that can't be read.
+        is_alone = len(drivers) == 1 and not meant
+        candidates = [*drivers] if is_alone else [name for name in meant if name in drivers]
         if not candidates:
             offer = ", ".join([*drivers][:12]) or "nobody"
             reasons = [NO_EGO.format(" or ".join(EGO_NAMES), offer), *self._doubts.notes]
@@ -321,11 +314,8 @@ class _Scenario:
         return states
 
     def _track(self, name: str, states: FloatArray) -> LoggedTrack:
-        entity: Entity = self._entities[name]
-        length_m, width_m = entity.size_m
-        return LoggedTrack(
-            name=name, type=entity.type, length_m=length_m, width_m=width_m, states=states
-        )
+        kind, (length_m, width_m) = self._entities[name].type, self._entities[name].size_m
+        return LoggedTrack(name=name, type=kind, length_m=length_m, width_m=width_m, states=states)
 
 
 def _is_step(action: Element) -> bool:

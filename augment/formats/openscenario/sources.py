@@ -24,13 +24,15 @@ _REFERRING = ("ManeuverGroup", "RouteRef", "AssignRouteAction", "TrajectoryRef")
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
-_CLASSES = {
-    **dict.fromkeys(("car", "van", "truck", "trailer", "semitrailer"), AgentType.VEHICLE),
-    **dict.fromkeys(("train", "tram"), AgentType.VEHICLE),
-    **dict.fromkeys(("bicycle", "motorbike"), AgentType.BICYCLE),
-    **{"bus": AgentType.BUS, "barrier": AgentType.BARRIER, "guardRail": AgentType.BARRIER},
-    **dict.fromkeys(("pedestrian", "wheelchair"), AgentType.PEDESTRIAN),
-}
+_CLASSES = foreign.name_all(
+    {
+        AgentType.VEHICLE: "car van truck trailer semitrailer train tram",
+        AgentType.BICYCLE: "bicycle motorbike",
+        AgentType.BUS: "bus",
+        AgentType.BARRIER: "barrier guardRail",
+        AgentType.PEDESTRIAN: "pedestrian wheelchair",
+    }
+)
 """By the category; whatever else is an object."""
 SCENERY = ("building", "roadMark", "none", "wind", "patch", "gantry", "etc", "vegetation", "tree")
 _KINDS = {

@@ -14,8 +14,7 @@ from augment import foreign
 from augment.foreign import FloatArray, fault_at
 from augment.formats.opendrive.network import RoadNetwork
 from augment.formats.openscenario.conditions import Expectation
-from augment.formats.openscenario.positions import PositionReader, step_lanes
-from augment.formats.openscenario.routes import find_legs
+from augment.formats.openscenario.positions import PositionReader, find_legs, step_lanes
 from augment.formats.openscenario.sources import Entity
 from augment.formats.openscenario.trajectories import trace
 from augment.geometry.frames import Pose

@@ -39,13 +39,10 @@ EXAMPLES = (
     "under scenario/training, scenario/validation or scenario/testing"
 )
 UNSET = 0
-TYPE_OF = {
-    UNSET: AgentType.GENERIC_OBJECT,
-    1: AgentType.VEHICLE,
-    2: AgentType.PEDESTRIAN,
-    3: AgentType.BICYCLE,
-    4: AgentType.GENERIC_OBJECT,
-}
+_OTHER = AgentType.GENERIC_OBJECT
+TYPE_OF = dict(
+    enumerate((_OTHER, AgentType.VEHICLE, AgentType.PEDESTRIAN, AgentType.BICYCLE, _OTHER))
+)
 AREA_OF = {"crosswalk": AreaKind.CROSSWALK, "driveway": AreaKind.DRIVABLE}
 BICYCLE_LANE = 3
 LANE_TYPES = dict.fromkeys((0, 1, 2, BICYCLE_LANE))
