@@ -218,36 +218,19 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
         if other.source is not MotionSource.RECORDED
         and (other.agent.walk_to_m or other.agent.motion)
     ]
-    waiting = [
-        participant.agent.id
-        for participant in own
-        if participant.started_s is None and participant.agent.walk_to_m
-    ]
+    waiting = [other.agent for other in own if other.started_s is None]
     text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
-    report.lose_of(waiting, text, changes_scene=True)
-    waiting = [
-        participant.agent.id
-        for participant in own
-        if participant.started_s is None and participant.agent.motion
-    ]
+    report.lose_of([agent.id for agent in waiting if agent.walk_to_m], text, changes_scene=True)
     text = "has a motion but never sets out: its trigger does not fire"
-    report.lose_of(waiting, text, changes_scene=True)
+    report.lose_of([agent.id for agent in waiting if agent.motion], text, changes_scene=True)
     if can_trigger:
         return
     text = "sets out at a fixed time, not when its trigger fires"
-    names = [
-        participant.agent.id
-        for participant in own
-        if participant.started_s is not None and _waits(participant.agent)
-    ]
-    report.lose_of(names, text)
+    going = [other.agent for other in own if other.started_s is not None]
+    by_clock = [one for one in going if one.motion and isinstance(one.motion.start, AtTime)]
+    report.lose_of([agent.id for agent in going if agent not in by_clock], text)
     text = "the walk or motion is written as it goes, without end point, path and trigger"
-    report.lose_of([participant.agent.id for participant in own], text)
-
-
-def _waits(agent: entities.TrafficAgent) -> bool:
-    """Return whether the start of its walk or motion depends on others."""
-    return agent.motion is None or not isinstance(agent.motion.start, AtTime)
+    report.lose_of([other.agent.id for other in own], text)
 
 
 _ASSUMED = {

@@ -27,6 +27,7 @@ from tests.formats.openscenario_files import (
     by_time,
     catalog,
     event,
+    init,
     scenario,
     speed,
     write,
@@ -451,6 +452,24 @@ def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
     reached = other.states[int(10 * start_s) + 40, :2]
     assert reached == pytest.approx([middle, y_m], abs=0.03)
     assert other.states[-1, 3] == 8.0
+
+
+def test_who_waits_for_another_is_read_after_them(tmp_path: Path) -> None:
+    waits = event(speed(0), AFTER.replace('"acts"', '"brakes"'))
+    text = scenario(waits, other_does=(speed(4),)).replace(
+        "</Entities>", f'<ScenarioObject name="Third">{CAR}</ScenarioObject></Entities>'
+    )
+    third = init("Third", '<LanePosition roadId="1" laneId="-2" s="60"/>', speed(6))
+    text = text.replace("</Actions></Init>", f"{third}</Actions></Init>")
+    group = '<ManeuverGroup name="h"><Actors><EntityRef entityRef="Third"/></Actors><Maneuver>'
+    brakes = event(BRAKES, by_time(1), name="brakes")
+    text = text.replace(
+        "</ManeuverGroup>", f"</ManeuverGroup>{group}{brakes}</Maneuver></ManeuverGroup>"
+    )
+    reading = read(write(tmp_path, text))
+    started_s = {m.agent.speed_mps: m.started_s for m in moves(reading).others}
+    # The third brakes over 2 s from 1 s on, and the other stops then.
+    assert started_s == pytest.approx({6.0: 1.0, 4.0: 3.0}, abs=0.01)
 
 
 FOLLOW = (

@@ -240,8 +240,8 @@ def _is_static(movement: Movement) -> bool:
 
 
 def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
-    others = sorted(cell.motion.others, key=lambda participant: not _is_static(participant))
-    later = [participant.agent.id for participant in others if writing.appears_later(participant)]
+    others = sorted(cell.motion.others, key=lambda other: not _is_static(other))
+    later = [other.agent.id for other in others if writing.appears_later(other)]
     text = "is left out: it appears after t0, and all obstacles are there from t0 on"
     report.lose_of(later, text, changes_scene=True)
     for movement in others:
@@ -302,29 +302,20 @@ def _report(cell: Cell, report: LossReport) -> None:
     )
     report.lose("names become numbers; a comment in the file has both")
     report.lose_types(_BECOMES)
-    things = [
-        participant.agent
-        for participant in others
-        if participant.agent.type in _STATIC and not _is_static(participant)
-    ]
+    moving = [other for other in others if not _is_static(other)]
+    things = [other.agent for other in moving if other.agent.type in _STATIC]
     report.lose_of([agent.id for agent in things], "moves, so it becomes one of unknown type")
     names = [agent.id for agent in things if writing.keeps_heading(agent)]
     report.lose_of(names, "moves without turning; its speed is written as if along its heading")
-    names = [
-        participant.agent.id
-        for participant in others
-        if writing.has_gaps(participant) and not _is_static(participant)
-    ]
+    names = [other.agent.id for other in moving if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
-    connectors = scene.connectors
-    turned = [connector.id for connector in connectors if connector.turn_type is TurnType.U_TURN]
+    ways, unknown = scene.connectors, TrafficLight.UNKNOWN
+    turned = [connector.id for connector in ways if connector.turn_type is TurnType.U_TURN]
     report.lose_of(turned, "a U-turn becomes a turn to the left")
-    entered = [connector.id for connector in connectors if connector.from_lane is None]
+    entered = [connector.id for connector in ways if connector.from_lane is None]
     report.lose_of(entered, "its turn type is not said: no lane leads into it")
-    dark = [
-        connector.id for connector in connectors if connector.traffic_light is TrafficLight.UNKNOWN
-    ]
+    dark = [connector.id for connector in ways if connector.traffic_light is unknown]
     report.lose_of(dark, "a light of unknown state becomes one that is off")
-    if any(connector.traffic_light is not TrafficLight.NONE for connector in connectors):
+    if any(connector.traffic_light is not TrafficLight.NONE for connector in ways):
         report.lose("lights stay as they are at t0; how they go on is not known")
     report.lose("on which side people drive and where the ego is in the world is not said")

@@ -83,11 +83,12 @@ class Expectation:
 
     def references(self, name: str, place: str) -> FloatArray:
         """Return where somebody's point of reference is (T, 2)."""
-        states = foreign.look_up(self.states, name, place)
-        ahead_m, left_m = self.centres_m[name]
-        cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-        back = np.column_stack([ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos])
-        return np.asarray(states[:, :2] - back)
+        states, (ahead_m, left_m) = self.find_states(name, place), self.centres_m[name]
+        return _place_beside(states, -ahead_m, -left_m)
+
+    def find_states(self, name: str, place: str) -> FloatArray:
+        """Return where somebody's middle is (T, 4)."""
+        return foreign.look_up(self.states, name, place)
 
 
 def find_trigger(
@@ -152,6 +153,13 @@ def find_step(event: StoryEvent, expected: Expectation) -> tuple[int, list[str]]
 # Private
 
 
+def _place_beside(states: FloatArray, ahead_m: float, left_m: float) -> FloatArray:
+    """Places (T, 2) so far ahead and to the left of states (T, 4)."""
+    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
+    away = np.column_stack([ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos])
+    return np.asarray(states[:, :2] + away)
+
+
 def _watch(
     condition: Element, expected: Expectation, place: str
 ) -> tuple[np.ndarray, Sequence[str]]:
@@ -210,12 +218,10 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
         pose = expected.find_point(position, place)
         goals = np.array([[pose.x_m, pose.y_m]])
         if other:  # a place relative to somebody goes along
-            states = foreign.look_up(expected.states, other, place)
-            begin, *_ = states.tolist()
-            local = Pose(x_m=begin[0], y_m=begin[1], heading_rad=begin[2]).to_local(goals)
-            cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-            turned = np.column_stack([local @ [cos, -sin], local @ [sin, cos]])  # fmt: skip
-            goals = states[:, :2] + turned.reshape(2, -1).T
+            states = expected.find_states(other, place)
+            x_m, y_m, heading_rad, _ = states[0].tolist()
+            first = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+            goals = _place_beside(states, *first.to_local(goals)[0].tolist())
         way = goals - own
     else:
         way = expected.references(other, place) - own
@@ -245,13 +251,13 @@ def _measure_collision(
 
 
 def _measure_way(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
-    places = foreign.look_up(expected.states, name, place)[:, :2]
+    places = expected.find_states(name, place)[:, :2]
     steps_m = np.hypot(*np.diff(places, axis=0, prepend=places[:1]).T)
     return np.asarray(np.cumsum(steps_m) + 1e-9)
 
 
 def _measure_speed(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
-    return np.asarray(foreign.look_up(expected.states, name, place)[:, 3])
+    return np.asarray(expected.find_states(name, place)[:, 3])
 
 
 def _measure_time(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:

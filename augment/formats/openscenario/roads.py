@@ -148,10 +148,8 @@ class _Links:
                 if is_fork or name in exited or following in entered or not road.leads_to(other):
                     left_out.append(f"{name} to {following}")
                     continue
-                self.after[name], self.before[following] = (
-                    ("road", other.number),
-                    ("road", road.number),
-                )
+                self.after[name] = "road", other.number
+                self.before[following] = "road", road.number
                 tangent = road.tangents[-1] + other.tangents[0]
                 road.tangents[-1] = other.tangents[0] = tangent / np.hypot(*tangent)
                 road.edges[-1] = other.edges[0] = (road.edges[-1] + other.edges[0]) / 2.0
@@ -161,16 +159,12 @@ class _Links:
         """Join the connectors of a junction to their lanes, whose ends they take over."""
         for connector in members:
             road = self._roads[connector.id]
-            before, after = (
-                self._roads[str(connector.from_lane)],
-                self._roads[str(connector.to_lane)],
-            )
+            before = self._roads[str(connector.from_lane)]
+            after = self._roads[str(connector.to_lane)]
             road.junction = number
             self.after[before.way.id] = self.before[after.way.id] = ("junction", number)
-            self.before[connector.id], self.after[connector.id] = (
-                ("road", before.number),
-                ("road", after.number),
-            )
+            self.before[connector.id] = "road", before.number
+            self.after[connector.id] = "road", after.number
             road.tangents[0], road.edges[0] = before.tangents[-1], before.edges[-1]
             road.tangents[-1], road.edges[-1] = after.tangents[0], after.edges[0]
 
@@ -258,15 +252,11 @@ def _report(scene: Scene, report: LossReport) -> None:
     report.lose("roads are smooth through our points and meet at common ends: edges may lie off")
     lanes = [lane.id for lane in scene.lanes if lane.left_neighbor or lane.right_neighbor]
     report.lose_of(lanes, "that lanes lie side by side is not said: each is a road of its own")
-    lit = [
-        connector.id
-        for connector in scene.connectors
-        if connector.traffic_light is not TrafficLight.NONE
-    ]
+    ways = scene.connectors
+    lit = [way.id for way in ways if way.traffic_light is not TrafficLight.NONE]
     report.lose_of(lit, "the map has no lights")
     report.lose_of([area.id for area in scene.areas], "areas are left out of the map")
-    connectors = [connector.id for connector in scene.connectors]
-    report.lose_of(connectors, "turn types are not said, only the lines")
+    report.lose_of([way.id for way in ways], "turn types are not said, only the lines")
 
 
 def _text(root: ET.Element, cell: Cell) -> bytes:

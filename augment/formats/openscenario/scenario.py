@@ -181,10 +181,15 @@ class _Scenario:
 
     def _order_actors(self) -> list[str]:
         """Return who has events, those who wait for none of the others first."""
+        owners = {
+            n: name for name, events in self._events.items() for e in events for n in e.names
+        }
 
         def count(name: str) -> int:
             conditions = [c for e in self._events[name] for group in e.groups for c in group]
-            watched = {e.get("entityRef") for c in conditions for e in c.iter()}
+            parts = [part for condition in conditions for part in condition.iter()]
+            elements = (part.get("storyboardElementRef", "").split("::")[-1] for part in parts)
+            watched = {part.get("entityRef") for part in parts} | set(map(owners.get, elements))
             return len(watched & (self._events.keys() - {name, self.ego_name}))
 
         return sorted(self._events, key=count)

@@ -88,9 +88,7 @@ def distance_condition(
         started_s: When it starts in the cell, None where it never does.
         ahead_m: From an agent's point of reference to its centre.
     """
-    moves = {
-        participant.agent.id: participant for participant in (cell.motion.ego, *cell.motion.others)
-    }
+    moves = {move.agent.id: move for move in (cell.motion.ego, *cell.motion.others)}
     waits_for_ego = isinstance(start, NearEgo)
     watched = moves[EGO_ID if isinstance(start, NearEgo) else start.agent_id]
     back_m = ahead_m(watched.agent)

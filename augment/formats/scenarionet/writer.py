@@ -104,8 +104,7 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "provenance": scene.provenance,
         },
         "tracks": {
-            participant.agent.id: _track(participant)
-            for participant in (motion.ego, *motion.others)
+            movement.agent.id: _track(movement) for movement in (motion.ego, *motion.others)
         },
         "dynamic_map_states": {
             connector.id: _light(connector, steps)
@@ -132,15 +131,9 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_types(_BECOMES)
     text = "left out: there is no type for a {} area"
     report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
-    odd = [
-        connector.id
-        for connector in connectors
-        if connector.turn_type is not classify_turn(connector.centerline)
-    ]
+    odd = [way.id for way in connectors if way.turn_type is not classify_turn(way.centerline)]
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
-    dark = [
-        connector.id for connector in connectors if connector.traffic_light is TrafficLight.NONE
-    ]
+    dark = [way.id for way in connectors if way.traffic_light is TrafficLight.NONE]
     report.lose_of(dark, "that it has no light is not said")
     if any(way.left_boundary or way.right_boundary for way in writing.list_ways(scene)):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
