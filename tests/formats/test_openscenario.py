@@ -472,6 +472,25 @@ def test_who_waits_for_another_is_read_after_them(tmp_path: Path) -> None:
     assert started_s == pytest.approx({6.0: 1.0, 4.0: 3.0}, abs=0.01)
 
 
+def test_forty_actors_with_events_are_read_within_the_sandbox(tmp_path: Path) -> None:
+    entities, begins, groups = "", "", ""
+    for number in range(40):
+        name = f"N{number}"
+        at = f'<LanePosition roadId="1" laneId="-{1 + number % 2}" s="{30 + 3 * number}"/>'
+        entities += f'<ScenarioObject name="{name}">{CAR}</ScenarioObject>'
+        begins += init(name, at, speed(6))
+        first = event(BRAKES, by_time(1), name=f"{name} brakes")
+        after = AFTER.replace('"acts"', f'"{name} brakes"')
+        actors = f'<ManeuverGroup name="{name}"><Actors><EntityRef entityRef="{name}"/></Actors>'
+        events = f"{first}{event(speed(9), after, name=f'{name} goes')}"
+        groups += f"{actors}<Maneuver>{events}</Maneuver></ManeuverGroup>"
+    text = scenario().replace("</Entities>", f"{entities}</Entities>")
+    text = text.replace("</Actions></Init>", f"{begins}</Actions></Init>")
+    file = write(tmp_path, text.replace("</ManeuverGroup>", f"</ManeuverGroup>{groups}", 1))
+    _, reading = UntrustedInput(path=file).read(item=None, frame=None, name="many")
+    assert sum(agent.motion is not None for agent in reading.scene.agents) == 40
+
+
 FOLLOW = (
     '<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape><Polyline>'
     "{}</Polyline></Shape></Trajectory><TimeReference>{}</TimeReference>"

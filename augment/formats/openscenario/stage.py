@@ -21,6 +21,7 @@ from augment.geometry.frames import Pose
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.motion import find_motion
+from augment.scene.planned_motion import AtPlace
 from augment.scene.recording import Recording
 
 
@@ -57,13 +58,18 @@ class Stage:
             ids=ids,
             find_point=self.find_point,
         )
-        self._expect()
+        self._expect(scene)
 
     def follow(self, agent: TrafficAgent) -> None:
         """Put an agent with its motion into the scene, and where it will be then."""
         agents = tuple(agent if other.id == agent.id else other for other in self.scene.agents)
-        self.scene = replace(self.scene, agents=agents)
-        self._expect()
+        self.scene, by_id = replace(self.scene, agents=agents), {a.id: a for a in agents}
+        # With those alone whom it waits for, and whom they do: a scene has many.
+        needed, name = dict[str, TrafficAgent](), agent.id
+        while name in by_id and name not in needed:
+            needed[name], motion = by_id[name], by_id[name].motion
+            name = motion.start.agent_id if motion and isinstance(motion.start, AtPlace) else ""
+        self._expect(replace(self.scene, agents=tuple(needed.values())))
 
     def find_point(self, position: Element, place: str) -> Pose:
         """Return the pose that a Position says at t0."""
@@ -110,8 +116,8 @@ class Stage:
         rows = [leg.road.line.poses_at(np.linspace(leg.from_m, leg.to_m, 100)) for leg in legs]
         return self._origin.to_local(np.vstack(rows)[:, :2])
 
-    def _expect(self) -> None:
-        motion = find_motion(self.scene, recording=self._recording)
+    def _expect(self, scene: Scene) -> None:
+        motion = find_motion(scene, recording=self._recording)
         states = {one.agent.id: one.states for one in (motion.ego, *motion.others)}
         self.expected.states.update(
             {name: states[number] for name, number in self._ids.items() if number in states}
