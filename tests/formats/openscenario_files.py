@@ -5,7 +5,10 @@ The road is 400 m long along x, with the lanes -1 and -2 that way and 1 back, 3.
 
 from pathlib import Path
 
-from tests.formats.opendrive_maps import WIDTH, by_hand
+from augment.formats.openscenario.scenario import OpenScenario
+from augment.formats.reading import Reading
+from augment.scene.motion import Motion, find_motion
+from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 
 ROADS = by_hand(outer=f'<lane id="-2" type="driving">{WIDTH}</lane>').replace("100", "400")
 BOX = (
@@ -92,3 +95,65 @@ def write(folder: Path, text: str, **others: str) -> Path:
 def catalog(body: str, name: str = "Cars") -> str:
     head = '<FileHeader revMajor="1" revMinor="0"/>'
     return f'<OpenSCENARIO>{head}<Catalog name="{name}">{body}</Catalog></OpenSCENARIO>'
+
+
+# Parts of events
+
+BRAKES = speed(0, STEP.replace("step", "linear").replace('"0"', '"2"'))
+GAP = (
+    '<RelativeDistanceCondition entityRef="Ego" value="{}" rule="lessThan" freespace="{}" '
+    'relativeDistanceType="longitudinal"/>'
+)
+CHANGE = (
+    '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="sinusoidal" '
+    'dynamicsDimension="{}" value="{}"/><LaneChangeTarget>{}</LaneChangeTarget>'
+    "</LaneChangeAction></LateralAction>"
+)
+RIGHT = '<RelativeTargetLane entityRef="Other" value="-1"/>'
+OF_EGO = '<RelativeTargetLane entityRef="Ego" value="-1"/>'
+AFTER = (
+    '<Condition delay="0"><ByValueCondition><StoryboardElementStateCondition storyboardElementRef='
+    '"acts" storyboardElementType="event" state="completeState"/></ByValueCondition></Condition>'
+)
+FOLLOW = (
+    '<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape><Polyline>'
+    "{}</Polyline></Shape></Trajectory><TimeReference>{}</TimeReference>"
+    '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>'
+)
+TIMING = '<Timing domainAbsoluteRelative="{}" scale="1" offset="0"/>'
+
+
+def read(file: Path, item: str | None = None) -> Reading:
+    return OpenScenario().read(file, item=item, frame=None, name="made")
+
+
+def moves(reading: Reading) -> Motion:
+    return find_motion(reading.scene, recording=reading.recording, with_later=True)
+
+
+def route(*waypoints: tuple[int, float], roads: str = "11") -> str:
+    return "".join(
+        f'<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{road}" '
+        f'laneId="{lane}" s="{s}"/></Position></Waypoint>'
+        for road, (lane, s) in zip(roads, waypoints, strict=True)
+    )
+
+
+def on_route(inside: str, *waypoints: tuple[int, float], roads: str = "11") -> str:
+    made = f"<RouteRef><Route>{route(*waypoints, roads=roads)}</Route></RouteRef>"
+    return f"<RoutePosition>{made}<InRoutePosition>{inside}</InRoutePosition></RoutePosition>"
+
+
+def fork() -> str:
+    """Road 1 of 100 m forks into road 2, straight on, and road 4, which bends to the left."""
+    parts = {"junction": "9", "more": "", "type": "", "x": "100", "offset": "", "end": ""}
+    parts |= {"lanes": LANES.format(width=WIDTH, outer=""), "link": ""}
+    ways = {"2": "<line/>", "4": '<arc curvature="0.01"/>'}
+    roads = "".join(ROAD.format(id=n, shape=shape, **parts) for n, shape in ways.items())
+    joints = "".join(
+        f'<connection incomingRoad="1" connectingRoad="{n}" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection>'
+        for n in ways
+    )
+    link = '<link><successor elementType="junction" elementId="9"/></link>'
+    return by_hand(link=link, rest=f'{roads}<junction id="9">{joints}</junction>')

@@ -16,18 +16,27 @@ from augment.formats.openscenario.writer import write as write_scenarios
 from augment.formats.reading import Reading
 from augment.formats.writing import Cell
 from augment.scene.entities import AgentType, Modification, TrafficLight
-from augment.scene.motion import Motion, find_motion
 from tests.formats.cells import cell, recorded_street, ruled
 from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 from tests.formats.openscenario_files import (
+    AFTER,
     BOX,
+    BRAKES,
     CAR,
+    CHANGE,
+    FOLLOW,
+    GAP,
+    RIGHT,
     STEP,
     by_entity,
     by_time,
     catalog,
     event,
-    init,
+    fork,
+    moves,
+    on_route,
+    read,
+    route,
     scenario,
     speed,
     write,
@@ -38,14 +47,6 @@ from tests.formats.test_openscenario_writer import scene_of_motions
 from tests.scenes import vehicle
 
 
-def read(file: Path, item: str | None = None) -> Reading:
-    return OpenScenario().read(file, item=item, frame=None, name="made")
-
-
-def moves(reading: Reading) -> Motion:
-    return find_motion(reading.scene, recording=reading.recording, with_later=True)
-
-
 def pose_of_other(reading: Reading) -> list[float]:
     """Where the other's point of reference is in the map's frame; its middle is 1.4 m ahead."""
     (other,) = reading.scene.agents
@@ -53,19 +54,6 @@ def pose_of_other(reading: Reading) -> list[float]:
     ((x_m, y_m),) = origin.to_parent(np.array([[other.x_m, other.y_m]])).tolist()
     heading_rad = other.heading_rad + origin.heading_rad
     return [x_m - 1.4 * math.cos(heading_rad), y_m - 1.4 * math.sin(heading_rad), heading_rad]
-
-
-def route(*waypoints: tuple[int, float], roads: str = "11") -> str:
-    return "".join(
-        f'<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{road}" '
-        f'laneId="{lane}" s="{s}"/></Position></Waypoint>'
-        for road, (lane, s) in zip(roads, waypoints, strict=True)
-    )
-
-
-def on_route(inside: str, *waypoints: tuple[int, float], roads: str = "11") -> str:
-    made = f"<RouteRef><Route>{route(*waypoints, roads=roads)}</Route></RouteRef>"
-    return f"<RoutePosition>{made}<InRoutePosition>{inside}</InRoutePosition></RoutePosition>"
 
 
 @pytest.mark.parametrize(
@@ -125,21 +113,6 @@ def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
     assert pose_of_other(read(file)) == pytest.approx([115.0, -1.75, 0.0], abs=2e-3)
 
 
-def fork() -> str:
-    """Road 1 of 100 m forks into road 2, straight on, and road 4, which bends to the left."""
-    parts = {"junction": "9", "more": "", "type": "", "x": "100", "offset": "", "end": ""}
-    parts |= {"lanes": LANES.format(width=WIDTH, outer=""), "link": ""}
-    ways = {"2": "<line/>", "4": '<arc curvature="0.01"/>'}
-    roads = "".join(ROAD.format(id=n, shape=shape, **parts) for n, shape in ways.items())
-    joints = "".join(
-        f'<connection incomingRoad="1" connectingRoad="{n}" contactPoint="start">'
-        '<laneLink from="-1" to="-1"/></connection>'
-        for n in ways
-    )
-    link = '<link><successor elementType="junction" elementId="9"/></link>'
-    return by_hand(link=link, rest=f'{roads}<junction id="9">{joints}</junction>')
-
-
 def test_a_place_on_a_route_lies_past_a_junction(tmp_path: Path) -> None:
     inside = '<FromLaneCoordinates pathS="130" laneId="-1"/>'
     at = on_route(inside, (-1, 20), (-1, 80), roads="14")
@@ -147,34 +120,6 @@ def test_a_place_on_a_route_lies_past_a_junction(tmp_path: Path) -> None:
     # 80 m to the end of road 1, and 50 m on round (100, 100), 1.75 m outside of the line.
     x_m, y_m = 100.0 + 101.75 * math.sin(0.5), 100.0 - 101.75 * math.cos(0.5)
     assert pose_of_other(reading) == pytest.approx([x_m, y_m, 0.5], abs=2e-3)
-
-
-@pytest.mark.parametrize("way", ["2", "4"])
-@pytest.mark.parametrize("is_in_catalog", [False, True])
-def test_a_route_is_kept_as_lanes(way: str, is_in_catalog: bool, tmp_path: Path) -> None:
-    taken = f'<Route name="r">{route((-1, 20), (-1, 90), roads=f"1{way}")}</Route>'
-    files = {"roads.xodr": fork(), "sub/ways.xosc": catalog(taken, "Ways")}
-    if is_in_catalog:
-        taken = '<CatalogReference catalogName="Ways" entryName="r"/>'
-    assigned = f"<RoutingAction><AssignRouteAction>{taken}</AssignRouteAction></RoutingAction>"
-    does = (speed(10), assigned)
-    reading = read(write(tmp_path, scenario(other_does=does), **files))
-    (other,) = moves(reading).others
-    # From s = 81.4 with the middle of its box, 18.6 m on road 1 and then some 50 m.
-    origin = reading.scene.origin.pose
-    places = origin.to_parent(other.states[:, :2])
-    away_m = np.abs(np.hypot(places[:, 0] - 100.0, places[:, 1] - 100.0) - 101.75)
-    away_m = np.abs(places[:, 1] + 1.75) if way == "2" else np.where(places[:, 0] > 100, away_m, 0)
-    assert places[68, 0] > 140.0
-    assert away_m[:80].max() < 0.05
-
-
-def test_a_route_that_no_road_leads_along_is_lost_with_its_place(tmp_path: Path) -> None:
-    taken = f"<Route>{route((1, 20), (-1, 90), roads='14')}</Route>"
-    assigned = f"<RoutingAction><AssignRouteAction>{taken}</AssignRouteAction></RoutingAction>"
-    text = scenario(event(assigned))
-    reading = read(write(tmp_path, text, **{"roads.xodr": fork()}))
-    assert any("event acts: no road leads from road 1 to road" in n for n in reading.notes)
 
 
 @pytest.mark.parametrize(
@@ -276,252 +221,6 @@ def test_a_speed_may_be_relative(value: float, kind: str, mps: float, tmp_path: 
     does = RELATIVE.format(value, kind)
     (agent,) = read(write(tmp_path, scenario(other_does=(does,)))).scene.agents
     assert agent.speed_mps == mps
-
-
-BRAKES = speed(0, STEP.replace("step", "linear").replace('"0"', '"2"'))
-GAP = (
-    '<RelativeDistanceCondition entityRef="Ego" value="{}" rule="lessThan" freespace="{}" '
-    'relativeDistanceType="longitudinal"/>'
-)
-
-
-@pytest.mark.parametrize(
-    ("condition", "started_s"),
-    [
-        (by_time(2.5), 2.5),
-        # The ego drives from 20 at 10 m/s; the other from 80 at 4 m/s: 60 m, closing at 6 m/s.
-        (by_entity(GAP.format(30.3, "false")), 5.0),
-        (by_entity(GAP.format(25.3, "true")), 5.0),
-        (by_entity('<TimeHeadwayCondition entityRef="Other" value="3.03" rule="lessThan" '
-                   'freespace="false"/>', "Ego"), 5.0),
-        (by_entity('<TimeToCollisionCondition value="5.05" rule="lessThan" freespace="false">'
-                   '<TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
-                   "</TimeToCollisionConditionTarget></TimeToCollisionCondition>", "Ego"), 5.0),
-        (by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego"), 2.0),
-        (by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego").replace(
-            "<Condition>", '<Condition conditionEdge="rising">'), 2.0),
-        (by_entity('<TraveledDistanceCondition value="19.9" rule="lessThan"/>', "Ego").replace(
-            "<Condition>", '<Condition conditionEdge="falling">'), 2.0),
-        (by_entity('<TraveledDistanceCondition value="19.9"/>'), 5.0),
-        (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
-                   'y="-1.75"/></Position></ReachPositionCondition>', "Ego"), 3.0),
-        (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
-                   'y="-1.75"/></Position></ReachPositionCondition>', "Ego") + by_time(3.35), 3.4),
-    ],
-)  # fmt: skip
-def test_a_condition_starts_a_motion_when_a_formula_says(
-    condition: str, started_s: float, tmp_path: Path
-) -> None:
-    reading = read(write(tmp_path, scenario(event(BRAKES, condition), other_does=(speed(4),))))
-    (other,) = moves(reading).others
-    assert other.started_s == pytest.approx(started_s, abs=0.01)
-    # Over 2 s from 4 m/s to a stop.
-    x_m = other.states[:, 0] - other.states[0, 0]
-    assert x_m[-1] == pytest.approx(4.0 * started_s + 4.0, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("shape", "dimension", "value", "gone_m"),
-    [
-        ("linear", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
-        ("linear", "rate", 4, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
-        ("linear", "distance", 16, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
-        ("sinusoidal", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
-        ("step", "time", 0, 4.0 * 1.0 + 12.0 * 4.0),
-    ],
-)
-def test_a_speed_is_reached_by_its_dynamics(
-    shape: str, dimension: str, value: float, gone_m: float, tmp_path: Path
-) -> None:
-    dynamics = STEP.replace("step", shape).replace('"time"', f'"{dimension}"')
-    action = speed(12, dynamics.replace('"0"', f'"{value}"'))
-    file = write(tmp_path, scenario(event(action, by_time(1)), other_does=(speed(4),)))
-    (other,) = moves(read(file)).others
-    assert other.states[50, 0] - other.states[0, 0] == pytest.approx(gone_m, abs=0.05)
-
-
-CHANGE = (
-    '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="sinusoidal" '
-    'dynamicsDimension="{}" value="{}"/><LaneChangeTarget>{}</LaneChangeTarget>'
-    "</LaneChangeAction></LateralAction>"
-)
-RIGHT = '<RelativeTargetLane entityRef="Other" value="-1"/>'
-OF_EGO = '<RelativeTargetLane entityRef="Ego" value="-1"/>'
-AFTER = (
-    '<Condition delay="0"><ByValueCondition><StoryboardElementStateCondition storyboardElementRef='
-    '"acts" storyboardElementType="event" state="completeState"/></ByValueCondition></Condition>'
-)
-
-
-@pytest.mark.parametrize(
-    "target",
-    [RIGHT, '<AbsoluteTargetLane value="-2"/>', OF_EGO],
-    ids=["relative", "absolute", "beside the ego's"],
-)
-@pytest.mark.parametrize(("dimension", "value"), [("time", 3), ("distance", 24)])
-def test_a_lane_change_takes_its_time_or_way(
-    target: str, dimension: str, value: int, tmp_path: Path
-) -> None:
-    change = event(CHANGE.format(dimension, value, target), by_time(1))
-    file = write(tmp_path, scenario(change, other_does=(speed(8),)))
-    (other,) = moves(read(file)).others
-    # From the lane of the ego after 1 s; half of it after 1.5 s more, and all of it after 3 s.
-    assert other.states[[10, 25, 41], 1] == pytest.approx([0.0, -1.75, -3.5], abs=0.06)
-
-
-def test_who_drives_on_the_oncoming_lane_changes_onto_the_egos(tmp_path: Path) -> None:
-    at = '<LanePosition roadId="1" laneId="1" s="80"><Orientation type="relative" h="3.141593"/>'
-    target = OF_EGO.replace("-1", "0")
-    change = event(CHANGE.format("time", 3, target), by_time(1))
-    text = scenario(change, other_at=f"{at}</LanePosition>", other_does=(speed(8),))
-    (other,) = moves(read(write(tmp_path, text))).others
-    assert other.states[[0, 10, 41], 1] == pytest.approx([3.5, 3.5, 0.0], abs=0.06)
-    assert other.states[-1, 0] > other.states[41, 0] + 50.0
-
-
-def test_events_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
-    first = event(speed(12, STEP.replace("step", "linear").replace('"0"', '"2"')), by_time(1))
-    later = AFTER.replace('delay="0"', 'delay="0.5"')
-    second = event(CHANGE.format("time", 2, RIGHT), later, name="changes")
-    third = event(BRAKES, by_time(6), name="brakes")
-    file = write(tmp_path, scenario(first, second, third, other_does=(speed(4),)))
-    reading = read(file)
-    (other,) = moves(reading).others
-    x_m, y_m = (other.states[:, :2] - other.states[0, :2]).T
-    assert x_m[30] == pytest.approx(4.0 + 16.0, abs=0.01)
-    assert y_m[[35, 56]] == pytest.approx([0.0, -3.5], abs=0.05)
-    assert x_m[-1] == pytest.approx(4.0 + 16.0 + 36.0 + 12.0, abs=0.5)
-    assert not [note for note in reading.notes if "Not understood" in note]
-
-
-def test_an_event_waits_for_what_an_actor_does_first(tmp_path: Path) -> None:
-    # The other cuts in as the act begins, and brakes once it is 70 m ahead: 60 m, 2 m a second.
-    state = 'storyboardElementRef="{}" state="{}"/></ByValueCondition></Condition>'
-    act = AFTER[: AFTER.index("storyboardElementRef")] + state.format("a", "startTransition")
-    first = event(speed(12, STEP.replace('"0"', '"-3"')), act, name="starts")
-    gap = by_entity(GAP.format(70, "false").replace("lessThan", "greaterThan"))
-    brakes = speed(
-        0, STEP.replace("step", "linear").replace("time", "rate").replace('"0"', '"-4"')
-    )
-    started = AFTER.replace('"acts"', '"starts"')
-    second = event(brakes, gap + started, name="brakes")
-    file = write(tmp_path, scenario(first, second, other_does=(speed(4),)))
-    reading = read(file)
-    (other,) = moves(reading).others
-    assert other.started_s == 0.0
-    assert other.states[[49, 60], 3] == pytest.approx([12.0, 8.0], abs=0.5)
-    assert other.states[-1, 3] == 0.0
-    assert any("event brakes begins so long after the first" in n for n in reading.notes)
-
-
-def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path) -> None:
-    # 60 m behind the other at first, the ego comes 6 m a second nearer to 10 m behind it.
-    ahead = '<Position><RelativeObjectPosition entityRef="Other" dx="-10" dy="0"/></Position>'
-    near = f'<DistanceCondition value="20.3" freespace="false" rule="lessThan">{ahead}'
-    given = by_entity(f"{near}</DistanceCondition>", "Ego")
-    reading = read(write(tmp_path, scenario(event(BRAKES, given), other_does=(speed(4),))))
-    (other,) = moves(reading).others
-    assert other.started_s == pytest.approx(5.0, abs=0.01)
-
-
-def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
-    place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
-    shape = '<Clothoid curvature="{}" curvaturePrime="0" length="40">' + f"{place}</Clothoid>"
-    follow = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    first = event(follow.format(0.01), by_time(2))
-    second = event(follow.format(-0.01), AFTER, name="then")
-    (other,) = moves(read(write(tmp_path, scenario(first, second, other_does=(speed(8),))))).others
-    # Two bends of 0.4 rad in a radius of 100 m, the other way round.
-    x_m, y_m = 200.0 * math.sin(0.4), 200.0 * (1.0 - math.cos(0.4))
-    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.5)
-
-
-@pytest.mark.parametrize("start_s", [0.0, 2.0])
-def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
-    start_s: float, tmp_path: Path
-) -> None:
-    place = '<Position><RelativeObjectPosition entityRef="Other" dx="0" dy="0"/></Position>'
-    shape = f'<Clothoid curvature="0.02" curvaturePrime="0" length="40">{place}</Clothoid>'
-    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    file = write(tmp_path, scenario(event(action, by_time(start_s)), other_does=(speed(8),)))
-    (other,) = moves(read(file)).others
-    # The middle of its box is 1.4 m ahead of the point that goes round in a radius of 50 m.
-    since_rad, x_m = 0.02 * 32.0, 58.6 + 8.0 * start_s
-    middle = x_m + 50.0 * math.sin(since_rad) + 1.4 * math.cos(since_rad)
-    y_m = 50.0 * (1.0 - math.cos(since_rad)) + 1.4 * math.sin(since_rad)
-    reached = other.states[int(10 * start_s) + 40, :2]
-    assert reached == pytest.approx([middle, y_m], abs=0.03)
-    assert other.states[-1, 3] == 8.0
-
-
-def test_who_waits_for_another_is_read_after_them(tmp_path: Path) -> None:
-    waits = event(speed(0), AFTER.replace('"acts"', '"brakes"'))
-    text = scenario(waits, other_does=(speed(4),)).replace(
-        "</Entities>", f'<ScenarioObject name="Third">{CAR}</ScenarioObject></Entities>'
-    )
-    third = init("Third", '<LanePosition roadId="1" laneId="-2" s="60"/>', speed(6))
-    text = text.replace("</Actions></Init>", f"{third}</Actions></Init>")
-    group = '<ManeuverGroup name="h"><Actors><EntityRef entityRef="Third"/></Actors><Maneuver>'
-    brakes = event(BRAKES, by_time(1), name="brakes")
-    text = text.replace(
-        "</ManeuverGroup>", f"</ManeuverGroup>{group}{brakes}</Maneuver></ManeuverGroup>"
-    )
-    reading = read(write(tmp_path, text))
-    started_s = {m.agent.speed_mps: m.started_s for m in moves(reading).others}
-    # The third brakes over 2 s from 1 s on, and the other stops then.
-    assert started_s == pytest.approx({6.0: 1.0, 4.0: 3.0}, abs=0.01)
-
-
-def test_forty_actors_with_events_are_read_within_the_sandbox(tmp_path: Path) -> None:
-    entities, begins, groups = "", "", ""
-    for number in range(40):
-        name = f"N{number}"
-        at = f'<LanePosition roadId="1" laneId="-{1 + number % 2}" s="{30 + 3 * number}"/>'
-        entities += f'<ScenarioObject name="{name}">{CAR}</ScenarioObject>'
-        begins += init(name, at, speed(6))
-        first = event(BRAKES, by_time(1), name=f"{name} brakes")
-        after = AFTER.replace('"acts"', f'"{name} brakes"')
-        actors = f'<ManeuverGroup name="{name}"><Actors><EntityRef entityRef="{name}"/></Actors>'
-        events = f"{first}{event(speed(9), after, name=f'{name} goes')}"
-        groups += f"{actors}<Maneuver>{events}</Maneuver></ManeuverGroup>"
-    text = scenario().replace("</Entities>", f"{entities}</Entities>")
-    text = text.replace("</Actions></Init>", f"{begins}</Actions></Init>")
-    file = write(tmp_path, text.replace("</ManeuverGroup>", f"</ManeuverGroup>{groups}", 1))
-    _, reading = UntrustedInput(path=file).read(item=None, frame=None, name="many")
-    assert sum(agent.motion is not None for agent in reading.scene.agents) == 40
-
-
-FOLLOW = (
-    '<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape><Polyline>'
-    "{}</Polyline></Shape></Trajectory><TimeReference>{}</TimeReference>"
-    '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>'
-)
-TIMING = '<Timing domainAbsoluteRelative="{}" scale="1" offset="0"/>'
-
-
-@pytest.mark.parametrize(
-    ("times", "condition"),
-    [
-        (TIMING.format("absolute").replace('scale="1" offset="0"', 'scale="2" offset="-1"'),
-         by_time(2)),
-        (TIMING.format("relative"), by_time(2)),
-        (TIMING.format("absolute"), by_time(2)),
-        ("<None/>", by_time(2)),
-        (TIMING.format("relative"),
-         by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego")),
-    ],
-)  # fmt: skip
-def test_a_trajectory_is_followed_by_its_times_or_speed(
-    times: str, condition: str, tmp_path: Path
-) -> None:
-    since_s, scale = (2 if "absolute" in times else 0), (2 if "-1" in times else 1)
-    at = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75" h="0"/></Position></Vertex>'
-    vertices = "".join(at.format((since_s + n + scale - 1) / scale, 88 + 4 * n) for n in range(6))
-    action = event(FOLLOW.format(vertices, times), condition)
-    (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
-    gone_m = other.states[:, 0] - other.states[0, 0]
-    # 8 m by then, and 4 m a second: to the last point after 7 s.
-    assert gone_m[[10, 20, 30, 60, 70]] == pytest.approx([4.0, 8.0, 12.0, 24.0, 28.0], abs=0.02)
 
 
 @pytest.mark.parametrize(
