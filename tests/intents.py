@@ -47,11 +47,11 @@ CENTRED = towards(wish.LateralTarget.LANE_CENTRE)
 
 
 def parked(ahead_m: float = 21.4, *, body: wish.Body = wish.Body.CAR, **where: Any) -> wish.Intent:
-    """One vehicle that stands."""
-    what = {name: where.pop(name) for name in ("facing", "speed_mps", "turn_deg") if name in where}
-    request = wish.VehicleRequest(
-        spot=spot(ahead_m, **where), body=body, count=1, **{"speed_mps": 0.0, **what}
-    )
+    """One vehicle that stands, or several."""
+    names = ("facing", "speed_mps", "turn_deg", "count", "spacing")
+    what = {name: where.pop(name) for name in names if name in where}
+    what = {"speed_mps": 0.0, "count": 1} | what
+    request = wish.VehicleRequest(spot=spot(ahead_m, **where), body=body, **what)
     return wish.Intent(requests=(request,))
 
 

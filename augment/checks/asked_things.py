@@ -6,10 +6,9 @@ from itertools import combinations
 
 from augment.checks.bodies import end_of_walk, name_type
 from augment.checks.finding import Finding, FindingKind, find
-from augment.checks.ground import STOPPED_BELOW_MPS
 from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Bounds, Case, apart_m, hold
 from augment.geometry.frames import difference
-from augment.scene.entities import TrafficAgent
+from augment.scene.entities import STOPPED_BELOW_MPS, TrafficAgent
 from augment.scene.intent import Body, CrashRequest, Facing, Side, VehicleRequest, WalkRequest
 
 _ON_ROAD_M = 1.0

@@ -7,9 +7,9 @@ import numpy as np
 import shapely
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
-from augment.checks.ground import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
+from augment.checks.ground import VEHICLES, ChangedScene
 from augment.geometry import frames
-from augment.scene.entities import STEERED, AgentType, Point, TrafficAgent
+from augment.scene.entities import STEERED, STOPPED_BELOW_MPS, AgentType, Point, TrafficAgent
 from augment.scene.planned_motion import PointPath
 
 TOUCH_M = 0.01
@@ -87,7 +87,7 @@ def _overlap_severity(body: TrafficAgent, other: TrafficAgent, share: float) -> 
     fine, doubtful = 0.0, SLIGHT_SHARE
     if any(_is_door(a) and b.type in VEHICLES for a, b in ((body, other), (other, body))):
         fine = 1.0
-    elif all(agent.type in VEHICLES and is_stopped(agent) for agent in (body, other)):
+    elif all(agent.type in VEHICLES and agent.is_stopped for agent in (body, other)):
         fine, doubtful = CRASH_SHARE, GROSS_CRASH_SHARE
     elif body.type in RIDERS and other.type in RIDERS:
         doubtful = CROWD_SHARE
@@ -161,7 +161,7 @@ def end_of_walk(agent: TrafficAgent) -> Point | None:
     """Return where a walk ends: as the agent says, else straight on; None for who stands."""
     if agent.motion is not None and isinstance(agent.motion.path, PointPath):
         return agent.motion.path.points_m[-1]
-    if agent.walk_to_m is not None or is_stopped(agent):
+    if agent.walk_to_m is not None or agent.is_stopped:
         return agent.walk_to_m
     return (
         agent.x_m + ASSUMED_WALK_M * math.cos(agent.heading_rad),
@@ -180,7 +180,7 @@ def walk_blocked(situation: ChangedScene) -> Iterator[Finding]:
             continue
         walk = shapely.LineString([(agent.x_m, agent.y_m), end])
         for other in situation.everyone:
-            if not is_stopped(other) or other.type is AgentType.PEDESTRIAN:
+            if not other.is_stopped or other.type is AgentType.PEDESTRIAN:
                 continue
             box = shapely.Polygon(situation.boxes[other.id].corners_m)
             # Along the walk, so that who only passes a corner goes through little of it.

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from augment.checks.bodies import end_of_walk
 from augment.checks.derived_motions import find_wish
-from augment.checks.ground import Ground, is_stopped
+from augment.checks.ground import Ground
 from augment.checks.lanes_across import (
     LanePlace,
     LanesAcross,
@@ -162,7 +162,7 @@ def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
 
 
 def _wishes(change: Modification, scene: Scene) -> _Wishes:
-    cars = [agent for agent in apply(scene, change).agents if is_stopped(agent)]
+    cars = [agent for agent in apply(scene, change).agents if agent.is_stopped]
     found = ((agent.id, find_wish(agent, scene, cars)) for agent in change.changed)
     return {name: asked for name, asked in found if asked is not None}
 
@@ -227,7 +227,7 @@ def _stays(agent: TrafficAgent, before: TrafficAgent) -> bool:
 def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
     """Return the sentence's name of a road user of the scene; None if it has none."""
     kind = {
-        AgentType.VEHICLE: wish.Sight.PARKED if is_stopped(agent) else wish.Sight.MOVING,
+        AgentType.VEHICLE: wish.Sight.PARKED if agent.is_stopped else wish.Sight.MOVING,
         AgentType.BUS: wish.Sight.BUS,
         AgentType.BICYCLE: wish.Sight.BICYCLE,
         AgentType.PEDESTRIAN: wish.Sight.PEDESTRIAN,
@@ -380,7 +380,7 @@ def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | 
             return f"a pedestrian who walks from {ends[0]} to {ends[1]}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
-    what, drives = agent.type.lower().replace("_", " "), not is_stopped(agent)
+    what, drives = agent.type.lower().replace("_", " "), not agent.is_stopped
     if agent.type in (AgentType.VEHICLE, AgentType.BUS) and not drives:
         what = f"{'crashed' if kind is ScenarioType.ACCIDENT_SITE else 'parked'} {what}"
     pace = f", driving at {agent.speed_mps:.1f} m/s" if drives else ""

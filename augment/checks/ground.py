@@ -24,7 +24,6 @@ SEAM_M = 0.3
 VEHICLES = frozenset(
     {entities.AgentType.VEHICLE, entities.AgentType.BUS, entities.AgentType.EGO_VEHICLE}
 )
-STOPPED_BELOW_MPS = 0.5
 CRASH_GAP_M = 1.5
 """Between cars of one accident; those placed by hand for interPlan are up to 1.43 m apart."""
 # Least length and width of a box.
@@ -305,7 +304,7 @@ class ChangedScene:
     @cached_property
     def crashed(self) -> frozenset[str]:
         """Changed vehicles that stand so close to another changed one that they look crashed."""
-        cars = [agent for agent in self.changed if agent.type in VEHICLES and is_stopped(agent)]
+        cars = [agent for agent in self.changed if agent.type in VEHICLES and agent.is_stopped]
         if len(cars) < 2:
             return frozenset()
         corners_m = np.array([self.boxes[car.id].corners_m for car in cars])
@@ -315,8 +314,3 @@ class ChangedScene:
         np.fill_diagonal(gaps, np.inf)
         near = gaps.min(axis=1) <= CRASH_GAP_M
         return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)
-
-
-def is_stopped(agent: entities.TrafficAgent) -> bool:
-    """Return whether an agent stands."""
-    return abs(agent.speed_mps) < STOPPED_BELOW_MPS

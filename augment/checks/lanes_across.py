@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import shapely
 
-from augment.checks.ground import Ground, is_stopped
+from augment.checks.ground import Ground
 from augment.geometry.frames import difference
 from augment.scene import entities
 from augment.scene import intent as intents
@@ -344,7 +344,7 @@ def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
 def _fits(
     lanes: LanesAcross, pick: intents.Pick, agent: entities.TrafficAgent, place: RoutePosition
 ) -> bool:
-    stands = is_stopped(agent)
+    stands = agent.is_stopped
     if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
         return False
     if stands is not {intents.Sight.PARKED: True, intents.Sight.MOVING: False}.get(

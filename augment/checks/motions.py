@@ -10,12 +10,12 @@ import numpy as np
 
 from augment.checks.bodies import FAR_OFF, GRAZED_M, RIDERS, name_type
 from augment.checks.finding import Finding, FindingKind, Severity, find
-from augment.checks.ground import STOPPED_BELOW_MPS, ChangedScene
+from augment.checks.ground import ChangedScene
 from augment.checks.places import name_stray, stray
 from augment.geometry import frames
 from augment.geometry.frames import Box, Pose
 from augment.geometry.polyline import FloatArray
-from augment.scene.entities import AgentType
+from augment.scene.entities import STOPPED_BELOW_MPS, AgentType
 from augment.scene.motion import STEP_S, MotionSource, Movement
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime
 

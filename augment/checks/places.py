@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
-from augment.checks.ground import VEHICLES, ChangedScene, Ground, is_stopped
+from augment.checks.ground import VEHICLES, ChangedScene, Ground
 from augment.checks.lanes_across import LanesAcross, find_place
 from augment.geometry.frames import Box, difference
 from augment.scene.entities import STEERED, AgentType, TrafficAgent
@@ -113,7 +113,7 @@ def heading(situation: ChangedScene) -> Iterator[Finding]:
 
 
 def _heading_severity(agent: TrafficAgent, turn_deg: float, situation: ChangedScene) -> Severity:
-    is_bicycle, stands = agent.type is AgentType.BICYCLE, is_stopped(agent)
+    is_bicycle, stands = agent.type is AgentType.BICYCLE, agent.is_stopped
     if turn_deg <= ALONG_BELOW_DEG or agent.id in situation.crashed or (is_bicycle and stands):
         return Severity.FACT
     if stands and situation.ground.carparks.distance_m(agent.x_m, agent.y_m) == 0.0:

@@ -11,7 +11,7 @@ import shapely
 from shapely.ops import substring
 
 from augment.checks.finding import Finding, FindingKind, find
-from augment.checks.ground import ChangedScene, is_stopped
+from augment.checks.ground import ChangedScene
 from augment.checks.parties import Bounds, Case, hold
 from augment.geometry.frames import Pose, corners
 from augment.geometry.polyline import FloatArray
@@ -142,7 +142,7 @@ def measure_passage(situation: ChangedScene) -> float:
 
 
 def _stays(agent: TrafficAgent) -> bool:
-    return is_stopped(agent) and agent.motion is None and agent.walk_to_m is None
+    return agent.is_stopped and agent.motion is None and agent.walk_to_m is None
 
 
 def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:

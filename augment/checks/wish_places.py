@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from augment.checks.ground import VEHICLES, is_stopped
+from augment.checks.ground import VEHICLES
 from augment.checks.lanes_across import LanesAcross, find_mark, list_crosswalks
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
@@ -234,7 +234,7 @@ def _find_parked_row(lanes: LanesAcross, sign: float) -> Span | None:
     parked = (
         (lanes.route.locate_agent(agent), agent.length_m / 2.0)
         for agent in lanes.route.scene.agents
-        if agent.type in VEHICLES and is_stopped(agent)
+        if agent.type in VEHICLES and agent.is_stopped
     )
     ends = [
         (here.ahead_m - half_m, here.ahead_m + half_m)

@@ -17,6 +17,7 @@ from augment.geometry.frames import Box, Pose
 from augment.scene import schema
 from augment.scene.planned_motion import PlannedMotion
 
+STOPPED_BELOW_MPS = 0.5
 MOST_AGENTS = 5_000
 MOST_WAYS = 50_000
 
@@ -125,6 +126,11 @@ class TrafficAgent:
     def box(self) -> Box:
         """The ground that it takes up."""
         return Box(pose=self.pose, length_m=self.length_m, width_m=self.width_m)
+
+    @property
+    def is_stopped(self) -> bool:
+        """True if it stands."""
+        return abs(self.speed_mps) < STOPPED_BELOW_MPS
 
     @property
     def size_m(self) -> tuple[float, float]:

@@ -38,7 +38,6 @@ TURN_RADIUS_M = 4.5
 _MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _NUMBERS = ("braking_mps2", "speed_mps", "duration_s")
 _SPEEDING_UP_MPS2 = 3.0
-_STANDS_BELOW_MPS = 0.5
 _STARTS_WALKING_S = 0.5
 _KERB_M = 1.0
 """So far past the last lane a walk ends."""
@@ -205,10 +204,6 @@ class _Case:
         )
         return replace(self.agent, motion=motion)
 
-    @property
-    def stands(self) -> bool:
-        return self.agent.speed_mps < _STANDS_BELOW_MPS
-
     def number(self, name: str) -> float:
         """One that was said, else the usual one."""
         stated = getattr(self.numbers, name)
@@ -228,7 +223,7 @@ class _Case:
             raise self.refusal(f"it is not what a {kind} does.")
         if ahead and self.place.ahead_m <= 0.0:
             raise self.refusal("it has to be ahead of the ego.")
-        if drives is not None and drives is self.stands:
+        if drives is not None and drives is self.agent.is_stopped:
             raise self.refusal("it has to drive." if drives else "it has to stand.")
 
     def own_lane(self) -> str:
@@ -320,7 +315,7 @@ def _u_turn(case: _Case) -> entities.TrafficAgent:
     case.require()
     agent, turn_mps = case.agent, case.number("speed_mps")
     start, gone_m = case.numbers.start, 0.0
-    if not case.stands:
+    if not case.agent.is_stopped:
         # Where it is when the ego comes near, nobody knows before.
         start = start or AtTime()
         if not isinstance(start, AtTime):
@@ -398,7 +393,7 @@ def _red_light(case: _Case) -> entities.TrafficAgent:
         # So far the ego is from the crossing when both have the same time to it.
         within_m = round(max(ego_pace_mps(case.route.scene) * arrives_s, 2.0), 1)
         meets = AtPlace(x_m=crossing[0], y_m=crossing[1], within_m=within_m)
-        start = case.numbers.start or (meets if case.stands else AtTime())
+        start = case.numbers.start or (meets if case.agent.is_stopped else AtTime())
         return case.moving(path, speeds, start)
     raise case.refusal("no way from its lane over a junction crosses the ego's.")
 

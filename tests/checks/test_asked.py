@@ -19,7 +19,6 @@ from tests.intents import (
     crash,
     metres,
     parked,
-    spot,
     towards,
     walk,
 )
@@ -253,8 +252,7 @@ def test_ahead_without_a_number_is_anywhere_ahead() -> None:
 
 
 def test_a_row_is_measured_from_centre_to_centre_along_its_lane_or_straight() -> None:
-    one = wish.VehicleRequest(spot=spot(20.0), count=3, speed_mps=0.0, spacing=metres(8.0))
-    row = wish.Intent(requests=(one,))
+    row = parked(20.0, count=3, spacing=metres(8.0))
     cars = [vehicle(f"Agent{n + 2}", 20.0 + 8.0 * n, 0.0) for n in range(3)]
     assert faults(row, *cars) == set()
     gaps = [vehicle(f"Agent{n + 2}", 20.0 + 12.8 * n, 0.0) for n in range(3)]  # 8 m between boxes

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -95,15 +96,7 @@ def test_findings_do_not_ask_where_the_world_lies(
 
 @given(st.floats(1e-320, 1e-3))
 def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
-    speck = TrafficAgent(
-        id="Agent2",
-        type=AgentType.VEHICLE,
-        x_m=0.0,
-        y_m=0.0,
-        heading_rad=0.0,
-        width_m=size_m,
-        length_m=size_m,
-    )
+    speck = replace(vehicle("Agent2", 0.0, 0.0), width_m=size_m, length_m=size_m)
     kinds = {one.kind for one in findings(scene(), Modification(added=(speck,)))}
     assert {FindingKind.SIZE, FindingKind.OVERLAP} <= kinds
 

@@ -51,21 +51,21 @@ def car(ahead_m: float, left_m: float, number: int = 2) -> TrafficAgent:
     return vehicle(f"Agent{number}", ahead_m, left_m)
 
 
+def standing(where: wish.Spot) -> wish.Intent:
+    """One car at a spot."""
+    car = wish.VehicleRequest(spot=where, body=wish.Body.CAR, speed_mps=0.0, count=1)
+    return wish.Intent(requests=(car,))
+
+
 def named(*settings: wish.Setting) -> wish.Intent:
     """One car in the ego's lane at a named place."""
-    where = wish.Spot(lane=wish.LaneChoice.OWN, settings=settings)
-    return wish.Intent(
-        requests=(wish.VehicleRequest(spot=where, body=wish.Body.CAR, speed_mps=0.0, count=1),)
-    )
+    return standing(wish.Spot(lane=wish.LaneChoice.OWN, settings=settings))
 
 
 def by_zebra(relation: wish.Relation | None) -> wish.Intent:
     """One car 5 m from the zebra, or on it."""
     five = metres(5.0) if relation else None
-    where = wish.Spot(distance=five, relation=relation, mark=wish.MapPlace.CROSSWALK)
-    return wish.Intent(
-        requests=(wish.VehicleRequest(spot=where, body=wish.Body.CAR, speed_mps=0.0, count=1),)
-    )
+    return standing(wish.Spot(distance=five, relation=relation, mark=wish.MapPlace.CROSSWALK))
 
 
 def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
@@ -88,17 +88,7 @@ WORKED = cones(
 )
 PAIR = crash(20.0, 2, wish.CrashedCar(gap=metres(4.0), bearing=wish.Bearing.LEFT))
 WALK = walk(20.0, wish.Side.LEFT)
-QUEUE = wish.Intent(
-    requests=(
-        wish.VehicleRequest(
-            spot=parked(20.0).requests[0].spot,
-            body=wish.Body.CAR,
-            count=3,
-            spacing=metres(6.0, 8.0),
-            speed_mps=0.0,
-        ),
-    )
-)
+QUEUE = parked(20.0, count=3, spacing=metres(6.0, 8.0))
 FILE = walk(20.0, wish.Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
 
 HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[float]]] = [
