@@ -17,7 +17,7 @@ from augment.checks.ground import rings, strips
 from augment.errors import CannotDrive
 from augment.geometry.frames import difference
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight
+from augment.scene.entities import DRIVEN_ON, AreaKind, LaneConnector, Scene, TrafficLight
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph
 from augment.scene.recording import Recording
 from augment.simulation.path import SPACING_M, Path, Region, dense
@@ -30,7 +30,6 @@ RUN_OUT_M = 300.0
 # From a way's centreline to an ego that stands on none, at most; and their directions.
 _NEAR_M = 3.0
 _ALIGNED_RAD = math.radians(60.0)
-_DRIVABLE = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _JOINT_M = 3.0
 """Ends of following ways that are further apart than this are not joined by ground."""
 
@@ -172,7 +171,7 @@ class Road:
     @cached_property
     def drivable(self) -> Region:
         """Lanes, connectors, and areas that cars may use; no tolerance."""
-        areas = [area for area in self.scene.areas if area.kind in _DRIVABLE]
+        areas = [area for area in self.scene.areas if area.kind in DRIVEN_ON]
         return _region(self.strips, self._joints(self.names), rings(areas), self._aprons())
 
     @cached_property

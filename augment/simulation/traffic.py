@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
+from augment.scene.entities import STEERED, AgentType, Modification, Scene, TrafficAgent, apply
 from augment.scene.motion import LENGTH_S, read_at
 from augment.scene.planned_motion import EGO_ID
 from augment.scene.planned_mover import HeldCourse, PlannedMover
@@ -48,9 +48,6 @@ PATH_M = 400.0
 _LOOK_M = 80.0
 _KEPT_WAYS = 5
 """nuPlan keeps this many ways of a driver's route; the limit of the last one is its wish."""
-STANDS_BELOW_MPS = 0.5
-"""Recorded speeds of what is parked are not quite 0."""
-_ON_LANES = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -395,7 +392,7 @@ def _set_moving(
     """
     standing = [agent for agent in agents if agent.speed_mps <= 0.0]
     moving = [agent for agent in agents if agent.speed_mps > 0.0]
-    driving = [agent for agent in moving if agent.type in _ON_LANES and lane_under(road, agent)]
+    driving = [agent for agent in moving if agent.type in STEERED and lane_under(road, agent)]
     straight_on = StraightOn([*standing, *(agent for agent in moving if agent not in driving)])
     if start_clear_of is not None:
         taken, clear = np.vstack([start_clear_of[None], to_objects(standing).boxes]), []
@@ -457,7 +454,8 @@ class Traffic:
         if self._replay is not None and self._replay.steps_left == 0:
             # Who hardly moves at the end stands from then on.
             going_on = [
-                replace(agent, speed_mps=0.0) if agent.speed_mps < STANDS_BELOW_MPS else agent
+                # Recorded speeds of what is parked are not quite 0.
+                replace(agent, speed_mps=0.0) if agent.is_stopped else agent
                 for agent in self._replay.agents()
             ]
             self._movers += _set_moving(going_on, self._road)
@@ -480,7 +478,7 @@ def _list_replayed(setting: DriveSetting, road: Road) -> list[Track]:
             continue
         if agent is not None and (agent.motion is not None or agent.walk_to_m is not None):
             continue
-        answers = setting.reactive and track.type in _ON_LANES and _moves(track)
+        answers = setting.reactive and track.type in STEERED and _moves(track)
         # Who comes into sight later has no lane at t0 to start on; it stays away.
         if answers and (agent is None or lane_under(road, agent) is not None):
             continue
