@@ -79,11 +79,6 @@ class WishDistance:
         """The distance of every object."""
         return tuple(match.distance_m for match in self.matches)
 
-    @property
-    def mean_m(self) -> float | None:
-        """The mean distance, None without an object."""
-        return fmean(self.distances_m) if self.matches else None
-
 
 def measure_wish(
     ground: Ground, modification: Modification, intent: wish.Intent
