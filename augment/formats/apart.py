@@ -36,6 +36,7 @@ _UNREADABLE = (
 )
 _MOMENT, _MOMENTS = TypeAdapter(Moment), TypeAdapter(list[Moment])
 _TEXTS = TypeAdapter(tuple[str, ...])
+_PLACES = TypeAdapter(dict[str, list[tuple[float, float, float]]])
 _SIZES = TypeAdapter(dict[str, list[tuple[float, float]]])
 
 
@@ -76,6 +77,7 @@ class UntrustedInput:
             recording=None if recording is None else codec.recording_from_document(recording),
             notes=_TEXTS.validate_python(document["notes"]),
             moment=_MOMENT.validate_python(document["moment"]),
+            places=_PLACES.validate_python(document["places"]),
         )
 
     def vehicles(self, tokens: Sequence[str]) -> dict[str, list[tuple[float, float]]]:
@@ -135,6 +137,7 @@ def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> 
         else codec.recording_to_document(reading.recording),
         "notes": reading.notes,
         "moment": asdict(reading.moment),
+        "places": dict(reading.places),
     }
 
 

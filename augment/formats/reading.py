@@ -74,6 +74,8 @@ class Reading:
         notes: A sentence on every loss and assumption.
         moment: What was taken.
         names: What the source calls the agents, by their ids; empty where these are the same.
+        places: Of a map alone, where else the ego can be put: s_m of the source, x_m and y_m of
+            the ego frame along each lane, by what comes before S in "@LANE,S".
     """
 
     scene: Scene
@@ -81,6 +83,7 @@ class Reading:
     notes: tuple[str, ...] = ()
     moment: Moment = Moment()
     names: Mapping[str, str] = field(default_factory=dict)
+    places: Mapping[str, list[tuple[float, float, float]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

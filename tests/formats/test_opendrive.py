@@ -61,6 +61,18 @@ def test_lanes_that_follow_each_other_are_joined_and_meet(seed: int, tmp_path: P
     assert bool(scene.connectors) == (seed == 3)
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_an_ego_can_be_put_at_every_place_that_a_map_names(seed: int, tmp_path: Path) -> None:
+    file = write(make_map(seed), tmp_path / "made.xodr")
+    first = read(file)
+    origin = first.scene.origin.pose
+    assert len(first.places) >= 2
+    for lane, rows in first.places.items():
+        s_m, *middle = rows[len(rows) // 2]
+        put = read(file, f"@{lane},{s_m}").scene.origin.pose
+        assert math.dist(origin.to_local(np.array([[put.x_m, put.y_m]]))[0], middle) < 0.1, lane
+
+
 SIGNAL = (
     '<signals><signal s="90" t="-4" id="7" dynamic="yes" orientation="+" type="1000001"/>'
     '<signal s="50" t="-4" id="8" dynamic="no" orientation="+" type="206"/></signals>'

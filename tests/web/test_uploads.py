@@ -12,6 +12,7 @@ from django.urls import reverse
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.scene.codec import scene_to_document
 from augment.services.scenarios import pictures, uploads
+from tests.formats.openscenario_files import ROADS
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in
@@ -64,6 +65,35 @@ def test_from_a_file_to_a_scene(researcher: Client) -> None:
     for view in ("kept", "backdrop"):
         assert is_picture(researcher, reverse("picture", args=[view, scene_row.code]))
     assert "picture" in researcher.get(page).content.decode()
+
+
+def test_the_ego_of_a_map_is_put_where_somebody_clicks(researcher: Client) -> None:
+    shown = send(researcher, ROADS.encode(), "roads.xodr")
+    upload = SceneUpload.objects.get()
+    (moment,) = upload.moments.exclude(report=None)
+    assert moment.report is not None
+    # 160 by 120 m of the road in 1200 by 900 pixels; the ego stands at s = 200, in lane 1.
+    assert ('id="places"' in shown, moment.item) == (True, "@1,1,200")
+    rows = moment.report["places"]["1,-1"]
+    assert [rows[0], rows[-1]] == [[100.0, 1200.0, 424.0], [260.0, 0.0, 424.0]]
+
+    def put(place: str) -> str:
+        page = reverse("upload-show", args=[upload.code])
+        answer = researcher.post(page, {"put": "1", "place": place}, follow=True)
+        return answer.content.decode()
+
+    assert "put on lane -2 of road 1, at s = 300 m" in put("1,-2,300")
+    placed = UploadMoment.objects.get(item="@1,-2,300")
+    assert (placed.state, placed.report and placed.report["lanes"]) == ("drawn", 3)
+    assert 'value="1,-2,300"' in put(" 1,-2,300.0 "), "the same place once more"
+    assert UploadMoment.objects.filter(item="@1,-2,300").count() == 1
+    assert "unknown &#x27;9&#x27;; known: 1" in put("9,-1,5"), "a worker says so"
+    for place in ("here", "1,-1", "1,-1,nan"):
+        assert "no place; needs ROAD,LANE,S" in put(place) or "place: " in put(place)
+    assert "too long" in put(f"{'1' * 200},-1,5")
+    send(researcher)
+    upload = SceneUpload.objects.get(name="street.json")
+    assert "no map alone" in put("1,-2,300")
 
 
 def test_several_files_become_uploads_of_their_own(researcher: Client) -> None:

@@ -92,8 +92,11 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @act_for(*STAFF, back="upload")
 def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Have one moment drawn by a worker, or kept as a scene, which its page goes on to."""
+    """Have a moment, or a place of a map, drawn by a worker, or kept, which leads to its scene."""
     row = get_object_or_404(SceneUpload, code=code)
+    if "put" in request.POST:
+        place = request.POST.get("place", "")
+        return _send_moment(request, uploads.ask_for_place(row, place, actor=get_user(request)))
     is_kept = "keep" in request.POST
     try:
         chosen = _stops(row)[int(request.POST.get("stop", ""))]
@@ -104,9 +107,13 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         slug=free_scene_slug(request.POST.get("name", "") or row.name) if is_kept else "",
         actor=get_user(request),
     )
+    return _send_moment(request, moment, "&keep=1" * is_kept)
+
+
+def _send_moment(request: HttpRequest, moment: UploadMoment, goes_on: str = "") -> HttpResponse:
     send_later(request, enqueue_moment, moment.pk)
-    goes_on = "&keep=1" if is_kept else ""
-    return redirect(f"{reverse('upload', args=[code])}?moment={moment.code}{goes_on}")
+    page = reverse("upload", args=[moment.upload.code])
+    return redirect(f"{page}?moment={moment.code}{goes_on}")
 
 
 def _list_strip(

@@ -1,6 +1,8 @@
 """The reader of a map alone, with an ego that is put on a lane of it."""
 
+from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -11,7 +13,10 @@ from augment.foreign import fault_at
 from augment.formats.opendrive.maps import map_around
 from augment.formats.opendrive.network import RoadNetwork
 from augment.formats.reading import Log, LogReader, Moment, Reading
+from augment.geometry.frames import Pose
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M
+
+PLACES_EVERY_M = 2.0
 
 
 class OpenDrive(LogReader):
@@ -24,6 +29,9 @@ class OpenDrive(LogReader):
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """The one with the ego at a place; for None at the first that is offered."""
+        yield self._put_ego(path, item)[0]
+
+    def _put_ego(self, path: Path, item: str | None) -> tuple[Log, RoadNetwork, Pose]:
         network = RoadNetwork(path)
         place = item or next(_offer_places(network), None)
         if place is None:
@@ -31,7 +39,7 @@ class OpenDrive(LogReader):
             raise fault_at(path.name, "; ".join(reasons))
         road_id, lane_id, s_m = parse_place(place)
         pose = network.road(road_id).lane_pose(lane_id, s_m)
-        yield Log(
+        log = Log(
             times_s=np.zeros(1),
             ego=np.array([[pose.x_m, pose.y_m, pose.heading_rad, 0.0]]),
             ego_size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
@@ -44,6 +52,7 @@ class OpenDrive(LogReader):
             item=place,
             notes=[f"The ego was put on lane {lane_id} of road {road_id}, at s = {s_m:g} m."],
         )
+        return log, network, pose
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Yield a place for an ego on each lane that is driven on."""
@@ -54,7 +63,9 @@ class OpenDrive(LogReader):
         """Return the scene at one place."""
         if frame:
             raise fault_at("frame", f"{frame} is not there; a map has frame 0 alone")
-        return next(self.logs(path, item)).reading_at(0, name, self.reach_m)
+        log, network, pose = self._put_ego(path, item)
+        reading = log.reading_at(0, name, self.reach_m)
+        return replace(reading, places=_list_places(network, pose, self.reach_m))
 
 
 def parse_place(item: str) -> tuple[str, int, float]:
@@ -71,6 +82,24 @@ def parse_place(item: str) -> tuple[str, int, float]:
 
 
 # Private
+
+
+def _list_places(
+    network: RoadNetwork, ego: Pose, reach_m: float
+) -> dict[str, list[tuple[float, float, float]]]:
+    """Return s, x and y in the ego frame along each lane that is driven on, by "ROAD,LANE"."""
+    places = defaultdict[str, list[tuple[float, float, float]]](list)
+    for road in network.roads_near(ego.x_m, ego.y_m, reach_m):
+        for section in road.sections:
+            s_m = np.arange(section.start_m, section.end_m, PLACES_EVERY_M).round(1)
+            for lane_id, (right_m, left_m) in road.edges_at(section, s_m).items():
+                if section.lanes[lane_id].is_driven:
+                    middle = road.places_at(s_m, (right_m + left_m) / 2.0)[:, :2]
+                    local = ego.to_local(middle)
+                    near = np.hypot(*local.T) <= reach_m
+                    rows = np.column_stack([s_m, local.round(1)])[near]
+                    places[f"{road.id},{lane_id}"] += map(tuple, rows.tolist())
+    return dict(places)
 
 
 def _offer_places(network: RoadNetwork) -> Iterator[str]:

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.core.files.base import File
@@ -20,11 +21,13 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
+from augment.formats.opendrive.reader import OpenDrive, parse_place
 from augment.formats.readers import READERS, find_reader
 from augment.formats.reading import Moment, Reading
+from augment.geometry.polyline import FloatArray
 from augment.models import SceneUpload, SentFile, UploadMoment
 from augment.render.bev import draw
-from augment.render.camera import camera_for
+from augment.render.camera import AROUND_THE_EGO, Camera, camera_for
 from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import draw_scene, store_as
@@ -42,6 +45,9 @@ STRIP = 20
 """Moments of a recording that are drawn unasked, evenly spread over it."""
 MOST_STOPS = 2_000
 """Moments that are offered; later ones of a longer recording are not."""
+MAP_PX = 1200
+LONGEST_ITEM = 200
+"""Characters, as the column of a moment has them."""
 
 
 def most_megabytes() -> int:
@@ -241,6 +247,33 @@ def ask_for_moment(
     return row
 
 
+@transaction.atomic
+def ask_for_place(upload: SceneUpload, place: str, *, actor: User | None = None) -> UploadMoment:
+    """Have a map drawn with the ego at a place that need not be offered.
+
+    Args:
+        upload: Of an OpenDRIVE map.
+        place: ROAD,LANE,S; a worker says whether there is such a lane.
+        actor: Who asks.
+
+    Raises:
+        InvalidDocument: It is no place.
+        Conflict: The upload is no map alone.
+    """
+    # Locked, so that two places that are added at once are both kept.
+    row = SceneUpload.objects.select_for_update().get(pk=upload.pk)
+    if row.format != OpenDrive.name:
+        raise Conflict(f"“{row.name}” is no map alone: its ego is recorded.")
+    road, lane, s_m = parse_place(f"@{place.strip()}")
+    item = f"@{road},{lane},{s_m:g}"
+    if len(item) > LONGEST_ITEM:
+        raise Conflict(f"That road's name is too long: at most {LONGEST_ITEM} characters.")
+    if all(item != stop["item"] for track in row.tracks for stop in track["stops"]):
+        row.tracks += _parts([Moment(item=item)])
+        row.save(update_fields=["tracks"])
+    return ask_for_moment(row, item, 0, actor=actor)
+
+
 class Moments(WorkKind[UploadMoment]):
     """Moments of recordings: drawn, or kept as scenes."""
 
@@ -274,13 +307,30 @@ def _preview(row: UploadMoment, reading: Reading) -> dict[str, Any]:
     """Draw a moment, and return its columns."""
     scene, recording = reading.scene, reading.recording
     picture = f"{PREVIEWS}/{row.code}.png"
-    store_as(picture, draw(scene, Modification(), camera_for(scene, None)))
+    # A map's picture is wide, since the ego's place is chosen on it.
+    camera = AROUND_THE_EGO.at_width(MAP_PX) if reading.places else camera_for(scene, None)
+    store_as(picture, draw(scene, Modification(), camera))
     report = {name: len(getattr(scene, name)) for name in _COUNTED} | {
         "recorded_s": 0.0 if recording is None else round(float(recording.times_s[-1]), 1),
         "provenance": scene.provenance,
         "notes": reading.notes,
     }
+    if reading.places:
+        report["places"] = {
+            lane: _list_shown(np.array(rows), camera)
+            for lane, rows in reading.places.items()
+            if rows
+        }
     return {"picture": picture, "report": report}
+
+
+def _list_shown(places: FloatArray, camera: Camera) -> list[list[float]]:
+    """Return s_m and the pixels x, y of the places (N, 3: s, x, y in metres) in a picture."""
+    pixels = camera.to_pixels(places[:, 1:]).round()
+    inside = (pixels >= 0.0).all(axis=1) & (pixels <= (camera.width_px, camera.height_px)).all(
+        axis=1
+    )
+    return np.column_stack([places[:, 0], pixels])[inside].tolist()
 
 
 _COUNTED = ("agents", "lanes", "connectors", "areas")
