@@ -53,6 +53,12 @@ def mark(row: Augmentation | GenerationJob | Study) -> Mark:
     return _mark(row.state, row.get_state_display())
 
 
+@register.inclusion_tag("parts/badge.html")
+def badge(tone: str, icon: str, label: str) -> dict[str, Mark]:
+    """The mark of a state that no model names."""
+    return {"mark": Mark(tone=tone, icon=f"icons/{icon}.svg", label=label)}
+
+
 @register.filter
 def has_film(picture: str) -> bool:
     """Return whether the picture of that name has a film."""
