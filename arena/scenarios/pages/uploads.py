@@ -79,6 +79,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     waits = row.state in row.UNDER_WAY or any(one.state in one.UNDER_WAY for one in moments)
     context = {
         "upload": row,
+        "what": "place" if row.format == uploads.MAP_FORMAT else "moment",
         "stops": list(enumerate(_stops(row))),
         "moment": moment,
         "notes": note_sentences(((moment and moment.report) or {}).get("notes", ())),

@@ -27,7 +27,7 @@ from augment.formats.reading import Moment, Reading
 from augment.geometry.polyline import FloatArray
 from augment.models import SceneUpload, SentFile, UploadMoment
 from augment.render.bev import draw
-from augment.render.camera import AROUND_THE_EGO, Camera, camera_for
+from augment.render.camera import Camera, camera_for
 from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import draw_scene, store_as
@@ -45,7 +45,9 @@ STRIP = 20
 """Moments of a recording that are drawn unasked, evenly spread over it."""
 MOST_STOPS = 2_000
 """Moments that are offered; later ones of a longer recording are not."""
-MAP_PX = 1200
+MAP_FORMAT = OpenDrive.name
+MAP_WINDOW = Camera(x_min_m=-120.0, x_max_m=120.0, y_min_m=-90.0, y_max_m=90.0, px_per_m=5.0)
+"""Of a map's picture: wide, since the ego's place is chosen on it. Its corners are 150 m away."""
 LONGEST_ITEM = 200
 """Characters, as the column of a moment has them."""
 
@@ -262,7 +264,7 @@ def ask_for_place(upload: SceneUpload, place: str, *, actor: User | None = None)
     """
     # Locked, so that two places that are added at once are both kept.
     row = SceneUpload.objects.select_for_update().get(pk=upload.pk)
-    if row.format != OpenDrive.name:
+    if row.format != MAP_FORMAT:
         raise Conflict(f"“{row.name}” is no map alone: its ego is recorded.")
     road, lane, s_m = parse_place(f"@{place.strip()}")
     item = f"@{road},{lane},{s_m:g}"
@@ -307,8 +309,7 @@ def _preview(row: UploadMoment, reading: Reading) -> dict[str, Any]:
     """Draw a moment, and return its columns."""
     scene, recording = reading.scene, reading.recording
     picture = f"{PREVIEWS}/{row.code}.png"
-    # A map's picture is wide, since the ego's place is chosen on it.
-    camera = AROUND_THE_EGO.at_width(MAP_PX) if reading.places else camera_for(scene, None)
+    camera = MAP_WINDOW if reading.places else camera_for(scene, None)
     store_as(picture, draw(scene, Modification(), camera))
     report = {name: len(getattr(scene, name)) for name in _COUNTED} | {
         "recorded_s": 0.0 if recording is None else round(float(recording.times_s[-1]), 1),
@@ -327,10 +328,9 @@ def _preview(row: UploadMoment, reading: Reading) -> dict[str, Any]:
 def _list_shown(places: FloatArray, camera: Camera) -> list[list[float]]:
     """Return s_m and the pixels x, y of the places (N, 3: s, x, y in metres) in a picture."""
     pixels = camera.to_pixels(places[:, 1:]).round()
-    inside = (pixels >= 0.0).all(axis=1) & (pixels <= (camera.width_px, camera.height_px)).all(
-        axis=1
-    )
-    return np.column_stack([places[:, 0], pixels])[inside].tolist()
+    inside = ((pixels >= 0.0) & (pixels <= (camera.width_px, camera.height_px))).all(axis=1)
+    rows: list[list[float]] = np.column_stack([places[:, 0], pixels])[inside].tolist()
+    return rows
 
 
 _COUNTED = ("agents", "lanes", "connectors", "areas")
