@@ -9,43 +9,26 @@ from django.shortcuts import get_object_or_404
 from rest_framework import serializers
 from rest_framework.response import Response
 
+from arena.api import views
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import RequestBody, StrictSerializer, TextField
-from arena.api.views import (
-    ApiView,
-    PageQuery,
-    Params,
-    RowDocument,
-    WarnedDocument,
-    keep_and_send,
-    operation,
-    page_serializer,
-)
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
-from augment.services.endpoints import (
-    VARIANTS,
-    ContestantRequest,
-    EndpointRequest,
-    add_contestant,
-    add_endpoint,
-    add_model,
-    plan_probe,
-)
+from augment.services import endpoints
 from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 
 
-class ContestantQuery(PageQuery):
+class ContestantQuery(views.PageQuery):
     """Filter of a list of contestants."""
 
     kind = serializers.ChoiceField(choices=KINDS, required=False)
-    variant = serializers.ChoiceField(choices=list(VARIANTS), required=False)
+    variant = serializers.ChoiceField(choices=list(endpoints.VARIANTS), required=False)
     slug = serializers.CharField(max_length=80, required=False)
 
 
-class ContestantDocument(RowDocument[Contestant]):
+class ContestantDocument(views.RowDocument[Contestant]):
     """A contestant; `frozen_options` are all of its options, from its first run on."""
 
     endpoint = serializers.CharField(source="endpoint.label", default=None, allow_null=True)
@@ -63,17 +46,19 @@ class ContestantDocument(RowDocument[Contestant]):
 class ContestantBody(RequestBody):
     """A new contestant that asks a language model."""
 
-    request = ContestantRequest
+    request = endpoints.ContestantRequest
     options = serializers.DictField(required=False, default=dict, help_text="By name.")
 
 
-class ContestantsView(ApiView):
+class ContestantsView(views.ApiView):
     """Contestants; attention checks are not among them."""
 
     readers, writers = STAFF, ADMINS
 
-    @operation(page_serializer(ContestantDocument), query=ContestantQuery, name="listContestants")
-    def get(self, params: Params) -> Response:
+    @views.operation(
+        views.page_serializer(ContestantDocument), query=ContestantQuery, name="listContestants"
+    )
+    def get(self, params: views.Params) -> Response:
         """Contestants by slug.
 
         Retired ones have a date in `retired_at`.
@@ -81,16 +66,16 @@ class ContestantsView(ApiView):
         rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
         return self.answer_page(rows, params, ContestantDocument, order="slug")
 
-    @operation(ContestantDocument, takes=ContestantBody, status=201, name="createContestant")
-    def post(self, params: Params) -> Contestant:
+    @views.operation(ContestantDocument, takes=ContestantBody, status=201, name="createContestant")
+    def post(self, params: views.Params) -> Contestant:
         """Add a contestant that asks a language model.
 
         The same one twice is one.
         """
-        return add_contestant(ContestantRequest(**params), self.user)
+        return endpoints.add_contestant(endpoints.ContestantRequest(**params), self.user)
 
 
-class EndpointDocument(RowDocument[Endpoint]):
+class EndpointDocument(views.RowDocument[Endpoint]):
     """An endpoint; `key_variable` names an environment variable of the workers."""
 
     class Meta:
@@ -104,10 +89,10 @@ class EndpointDocument(RowDocument[Endpoint]):
 class EndpointBody(RequestBody):
     """A new endpoint."""
 
-    request = EndpointRequest
+    request = endpoints.EndpointRequest
 
 
-class EndpointModelDocument(RowDocument[EndpointModel]):
+class EndpointModelDocument(views.RowDocument[EndpointModel]):
     """A model of an endpoint; null or empty is unknown. Prices are for a million tokens."""
 
     endpoint = serializers.CharField(source="endpoint.label")
@@ -128,7 +113,7 @@ class NewModelBody(StrictSerializer):
     model = TextField(max_length=120, help_text="Its id there.")
 
 
-class ProbeDocument(RowDocument[Probe], WarnedDocument):
+class ProbeDocument(views.RowDocument[Probe], views.WarnedDocument):
     """A probe with a line for each ability, those to come included."""
 
     lines = serializers.SerializerMethodField()
@@ -142,42 +127,42 @@ class ProbeDocument(RowDocument[Probe], WarnedDocument):
         return probe_lines(probe.model, probe)
 
 
-class EndpointsView(ApiView):
+class EndpointsView(views.ApiView):
     """Endpoints."""
 
     writers = ADMINS
 
-    @operation(EndpointDocument, takes=EndpointBody, status=201, name="createEndpoint")
-    def post(self, params: Params) -> Endpoint:
+    @views.operation(EndpointDocument, takes=EndpointBody, status=201, name="createEndpoint")
+    def post(self, params: views.Params) -> Endpoint:
         """Add an endpoint.
 
         409 where the label is taken.
         """
-        return add_endpoint(EndpointRequest(**params), self.user)
+        return endpoints.add_endpoint(endpoints.EndpointRequest(**params), self.user)
 
 
-class ModelsView(ApiView):
+class ModelsView(views.ApiView):
     """The models of an endpoint."""
 
     writers = ADMINS
 
-    @operation(EndpointModelDocument, takes=NewModelBody, status=201, name="addModel")
-    def post(self, code: uuid.UUID, params: Params) -> EndpointModel:
+    @views.operation(EndpointModelDocument, takes=NewModelBody, status=201, name="addModel")
+    def post(self, code: uuid.UUID, params: views.Params) -> EndpointModel:
         """Add a model to an endpoint and have it probed.
 
         Comes with its listed price; all else is unknown before the probe's end.
         """
         row = get_object_or_404(Endpoint, code=code)
-        plan = partial(add_model, row, model=params["model"], actor=self.user)
-        return keep_and_send(plan, enqueue_probe)[0].model
+        plan = partial(endpoints.add_model, row, model=params["model"], actor=self.user)
+        return views.keep_and_send(plan, enqueue_probe)[0].model
 
 
-class ProbeView(ApiView):
+class ProbeView(views.ApiView):
     """Probe of a model's abilities, carried out by a worker."""
 
     readers, writers = STAFF, ADMINS
 
-    @operation(ProbeDocument, name="getProbe")
+    @views.operation(ProbeDocument, name="getProbe")
     def get(self, code: uuid.UUID) -> Probe:
         """The last probe of a model.
 
@@ -188,13 +173,15 @@ class ProbeView(ApiView):
             raise Http404
         return probe
 
-    @operation(ProbeDocument, status=202, name="probeModel")
+    @views.operation(ProbeDocument, status=202, name="probeModel")
     def post(self, code: uuid.UUID) -> tuple[Probe, list[str]]:
         """Have a model probed.
 
         Poll it until its state is done or failed.
         """
-        return keep_and_send(partial(plan_probe, _model(code), actor=self.user), enqueue_probe)
+        return views.keep_and_send(
+            partial(endpoints.plan_probe, _model(code), actor=self.user), enqueue_probe
+        )
 
 
 def _model(code: uuid.UUID) -> EndpointModel:

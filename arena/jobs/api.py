@@ -12,39 +12,19 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api import views
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import RequestBody
-from arena.api.views import (
-    ApiView,
-    FileView,
-    PageQuery,
-    Params,
-    RowDocument,
-    WarnedDocument,
-    file_operation,
-    keep_and_send,
-    operation,
-    page_serializer,
-)
 from arena.exports.formats import download
 from arena.jobs.exports.tables import JOB_TABLES
 from augment.models import Augmentation, GenerationJob
-from augment.services.running import (
-    FollowUpRequest,
-    JobCounts,
-    JobRequest,
-    JobScope,
-    ask_follow_up,
-    count_each,
-    count_rows,
-    workforce,
-)
+from augment.services import running
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import launch
 from augment.tasks import enqueue_augmentation, enqueue_job
 
 
-class JobQuery(PageQuery):
+class JobQuery(views.PageQuery):
     """Filter of a list of jobs."""
 
     state = serializers.ChoiceField(choices=GenerationJob.State.values, required=False)
@@ -79,7 +59,7 @@ class JobDocument(CountsDocument):
     finished_at = serializers.DateTimeField(source="job.finished_at", allow_null=True)
 
 
-class ChangedJobDocument(JobDocument, WarnedDocument):
+class ChangedJobDocument(JobDocument, views.WarnedDocument):
     """A job after a change."""
 
 
@@ -89,21 +69,21 @@ class ProgressDocument(CountsDocument):
     calls = serializers.IntegerField(source="job.spent_calls")
     is_worked_on = serializers.SerializerMethodField()
 
-    def get_is_worked_on(self, counts: JobCounts) -> bool:
+    def get_is_worked_on(self, counts: running.JobCounts) -> bool:
         """Return whether it is under way and workers run."""
-        return counts.is_moving and workforce().works
+        return counts.is_moving and running.workforce().works
 
 
 class EstimateBody(RequestBody):
     """A job that is not launched."""
 
-    request = JobScope
+    request = running.JobScope
 
 
 class JobBody(RequestBody):
     """A new job; a missing cap is none."""
 
-    request = JobRequest
+    request = running.JobRequest
 
 
 class UseDocument(serializers.Serializer[Any]):
@@ -136,79 +116,81 @@ class EstimateDocument(UseDocument):
     lines = EstimateLineDocument(many=True)
 
 
-class JobsView(ApiView):
+class JobsView(views.ApiView):
     """Jobs."""
 
     readers, writers = STAFF, ADMINS
 
-    @operation(page_serializer(JobDocument), query=JobQuery, name="listJobs")
-    def get(self, params: Params) -> Response:
+    @views.operation(views.page_serializer(JobDocument), query=JobQuery, name="listJobs")
+    def get(self, params: views.Params) -> Response:
         """Jobs, the youngest first.
 
         With their counts.
         """
-        return self.answer_page(GenerationJob.objects.all(), params, JobDocument, lines=count_each)
+        return self.answer_page(
+            GenerationJob.objects.all(), params, JobDocument, lines=running.count_each
+        )
 
-    @operation(ChangedJobDocument, takes=JobBody, status=201, name="launchJob")
-    def post(self, params: Params) -> tuple[JobCounts, list[str]]:
+    @views.operation(ChangedJobDocument, takes=JobBody, status=201, name="launchJob")
+    def post(self, params: views.Params) -> tuple[running.JobCounts, list[str]]:
         """Launch a job.
 
         Workers begin at once.
         """
-        job, warnings = keep_and_send(
-            partial(launch, JobRequest(**params), self.user), enqueue_job
+        job, warnings = views.keep_and_send(
+            partial(launch, running.JobRequest(**params), self.user), enqueue_job
         )
-        return count_rows(job), warnings
+        return running.count_rows(job), warnings
 
 
-class JobView(ApiView):
+class JobView(views.ApiView):
     """One job."""
 
     readers = STAFF
 
-    @operation(JobDocument, name="getJob")
-    def get(self, code: uuid.UUID) -> JobCounts:
+    @views.operation(JobDocument, name="getJob")
+    def get(self, code: uuid.UUID) -> running.JobCounts:
         """A job.
 
         With its counts.
         """
-        return count_rows(get_object_or_404(GenerationJob, code=code))
+        return running.count_rows(get_object_or_404(GenerationJob, code=code))
 
 
-class JobProgressView(ApiView):
+class JobProgressView(views.ApiView):
     """The progress of a job."""
 
     readers = STAFF
 
-    @operation(ProgressDocument, name="getJobProgress")
-    def get(self, code: uuid.UUID) -> JobCounts:
+    @views.operation(ProgressDocument, name="getJobProgress")
+    def get(self, code: uuid.UUID) -> running.JobCounts:
         """The progress of a job.
 
         Counts by state, and whether workers are busy with it.
         """
-        return count_rows(get_object_or_404(GenerationJob, code=code))
+        return running.count_rows(get_object_or_404(GenerationJob, code=code))
 
 
-class EstimateView(ApiView):
+class EstimateView(views.ApiView):
     """A job before it is launched."""
 
     writers = ADMINS
 
-    @operation(EstimateDocument, takes=EstimateBody, name="estimateJob")
-    def post(self, params: Params) -> Any:
+    @views.operation(EstimateDocument, takes=EstimateBody, name="estimateJob")
+    def post(self, params: views.Params) -> Any:
         """Return the estimate of a job.
 
         From recorded calls; null where there are none, or no price.
         """
-        return estimate(JobScope(**params))
+        return estimate(running.JobScope(**params))
 
 
-class JobExportView(FileView):
+class JobExportView(views.FileView):
     """A table of a job."""
 
     readers = STAFF
 
-    @file_operation(name="exportJob", exports=JOB_TABLES)
+    @views.file_operation(name="exportJob", exports=JOB_TABLES)
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
         """A table of a job as a file.
 
@@ -223,7 +205,7 @@ class JobExportView(FileView):
         return download(table.formats, form, stem, table.make(job))
 
 
-class AugmentationDocument(RowDocument[Augmentation], WarnedDocument):
+class AugmentationDocument(views.RowDocument[Augmentation], views.WarnedDocument):
     """Augmentation of one scenario by one contestant."""
 
     job = serializers.UUIDField(source="job.code")
@@ -248,15 +230,15 @@ class AugmentationDocument(RowDocument[Augmentation], WarnedDocument):
 class FollowUpBody(RequestBody):
     """Change that is asked for in an answer; a missing cap is no cap."""
 
-    request = FollowUpRequest
+    request = running.FollowUpRequest
 
 
-class AugmentationView(ApiView):
+class AugmentationView(views.ApiView):
     """One augmentation."""
 
     readers = STAFF
 
-    @operation(AugmentationDocument, name="getAugmentation")
+    @views.operation(AugmentationDocument, name="getAugmentation")
     def get(self, code: uuid.UUID) -> Augmentation:
         """An augmentation.
 
@@ -265,19 +247,21 @@ class AugmentationView(ApiView):
         return _augmentation(code)
 
 
-class FollowUpsView(ApiView):
+class FollowUpsView(views.ApiView):
     """Follow-ups of an augmentation: the contestant's next instructions."""
 
     writers = ADMINS
 
-    @operation(AugmentationDocument, takes=FollowUpBody, status=201, name="followUp")
-    def post(self, code: uuid.UUID, params: Params) -> tuple[Augmentation, list[str]]:
+    @views.operation(AugmentationDocument, takes=FollowUpBody, status=201, name="followUp")
+    def post(self, code: uuid.UUID, params: views.Params) -> tuple[Augmentation, list[str]]:
         """Have a language model change its own answer further.
 
         A job of its own does it; to go back is to follow up an earlier step.
         """
-        ask = partial(ask_follow_up, _augmentation(code), FollowUpRequest(**params))
-        return keep_and_send(partial(ask, actor=self.user), enqueue_augmentation)
+        ask = partial(
+            running.ask_follow_up, _augmentation(code), running.FollowUpRequest(**params)
+        )
+        return views.keep_and_send(partial(ask, actor=self.user), enqueue_augmentation)
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

@@ -12,33 +12,16 @@ from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api import views
 from arena.api.access import ADMINS, ENTRANTS, STAFF
 from arena.api.fields import FlagField, RequestBody, StrictSerializer, TextField, WholeNumberField
-from arena.api.views import (
-    ApiView,
-    PageQuery,
-    Params,
-    RowDocument,
-    WarnedDocument,
-    keep_and_send,
-    operation,
-    page_serializer,
-)
 from arena.scenarios.exports.sweeps import sweep_sheet
 from arena.scenarios.queries import OWN, submissions_for
 from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, Submission, Sweep, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services import SLUG_LENGTH, read_request
+from augment.services import SLUG_LENGTH, driving, read_request
 from augment.services.benchmarks import find_benchmark, keep_submission
-from augment.services.driving import (
-    LARGEST_FAMILY,
-    SweepRequest,
-    SweepResult,
-    add_family,
-    plan_sweep,
-    sweep_result,
-)
 from augment.services.scenarios import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
@@ -56,7 +39,7 @@ from augment.tasks import (
 )
 
 
-class ScenarioQuery(PageQuery):
+class ScenarioQuery(views.PageQuery):
     """Filter of a list of scenarios."""
 
     set = serializers.ChoiceField(
@@ -68,7 +51,7 @@ class ScenarioQuery(PageQuery):
     slug = serializers.CharField(max_length=80, required=False)
 
 
-class ScenarioDocument(RowDocument[Scenario]):
+class ScenarioDocument(views.RowDocument[Scenario]):
     """A scenario of a list."""
 
     set = serializers.CharField(source="catalogue_set")
@@ -82,7 +65,7 @@ class ScenarioDocument(RowDocument[Scenario]):
         )
 
 
-class NewScenarioDocument(ScenarioDocument, WarnedDocument):
+class NewScenarioDocument(ScenarioDocument, views.WarnedDocument):
     """A new scenario."""
 
     class Meta(ScenarioDocument.Meta):
@@ -123,13 +106,15 @@ class ScenarioBody(StrictSerializer):
     )
 
 
-class ScenariosView(ApiView):
+class ScenariosView(views.ApiView):
     """Scenarios."""
 
     readers = writers = STAFF
 
-    @operation(page_serializer(ScenarioDocument), query=ScenarioQuery, name="listScenarios")
-    def get(self, params: Params) -> Response:
+    @views.operation(
+        views.page_serializer(ScenarioDocument), query=ScenarioQuery, name="listScenarios"
+    )
+    def get(self, params: views.Params) -> Response:
         """Scenarios by slug.
 
         Without their scenes, references and intents.
@@ -140,14 +125,14 @@ class ScenariosView(ApiView):
         rows = _scenarios().defer("reference", "intent")
         return self.answer_page(rows, params, ScenarioDocument, order="slug")
 
-    @operation(NewScenarioDocument, takes=ScenarioBody, status=201, name="addScenario")
-    def post(self, params: Params) -> tuple[Scenario, list[str]]:
+    @views.operation(NewScenarioDocument, takes=ScenarioBody, status=201, name="addScenario")
+    def post(self, params: views.Params) -> tuple[Scenario, list[str]]:
         """Add a scenario.
 
         A worker draws it.
         """
         add = partial(add_scenario, NewScenario(**params), actor=self.user)
-        row, warnings = keep_and_send(add, enqueue_scenario)
+        row, warnings = views.keep_and_send(add, enqueue_scenario)
         return _scenarios().get(pk=row.pk), warnings
 
 
@@ -182,7 +167,7 @@ class MomentBody(StrictSerializer):
     )
 
 
-class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
+class UploadDocument(views.RowDocument[SceneUpload], views.WarnedDocument):
     """A recording, and once it is read the moments that it offers."""
 
     tracks = serializers.ListField(
@@ -199,7 +184,7 @@ class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
         )
 
 
-class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
+class MomentDocument(views.RowDocument[UploadMoment], views.WarnedDocument):
     """A moment of a recording, with a report of what is in it."""
 
     upload = serializers.UUIDField(source="upload.code")
@@ -219,7 +204,7 @@ class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
         return note_sentences((row.report or {}).get("notes", ()))
 
 
-class FilesView(ApiView):
+class FilesView(views.ApiView):
     """Files that come by a form."""
 
     parser_classes = (MultiPartParser,)
@@ -237,23 +222,23 @@ class UploadsView(FilesView):
 
     writers = STAFF
 
-    @operation(UploadDocument, takes=UploadBody, status=202, name="sendRecording")
-    def post(self, params: Params) -> tuple[SceneUpload, list[str]]:
+    @views.operation(UploadDocument, takes=UploadBody, status=202, name="sendRecording")
+    def post(self, params: views.Params) -> tuple[SceneUpload, list[str]]:
         """Send a recording; a worker reads it.
 
         Poll it until its state is read or failed.
         """
         file, source = params["file"], params["format"]
         keep = partial(uploads.keep_upload, name=file.name or "", content=file, source=source)
-        return keep_and_send(partial(keep, actor=self.user), enqueue_upload)
+        return views.keep_and_send(partial(keep, actor=self.user), enqueue_upload)
 
 
-class UploadView(ApiView):
+class UploadView(views.ApiView):
     """One recording."""
 
     readers = STAFF
 
-    @operation(UploadDocument, name="getUpload")
+    @views.operation(UploadDocument, name="getUpload")
     def get(self, code: uuid.UUID) -> SceneUpload:
         """A recording that was sent.
 
@@ -262,28 +247,28 @@ class UploadView(ApiView):
         return get_object_or_404(SceneUpload, code=code)
 
 
-class MomentsView(ApiView):
+class MomentsView(views.ApiView):
     """Moments of a recording that were asked for."""
 
     writers = STAFF
 
-    @operation(MomentDocument, takes=MomentBody, status=202, name="showMoment")
-    def post(self, code: uuid.UUID, params: Params) -> tuple[UploadMoment, list[str]]:
+    @views.operation(MomentDocument, takes=MomentBody, status=202, name="showMoment")
+    def post(self, code: uuid.UUID, params: views.Params) -> tuple[UploadMoment, list[str]]:
         """Have a moment of a recording drawn, or kept as a scene.
 
         The same one twice is one; poll it until it is drawn or kept.
         """
         upload = get_object_or_404(SceneUpload, code=code)
         ask = partial(uploads.ask_for_moment, upload, **params, actor=self.user)
-        return keep_and_send(ask, enqueue_moment)
+        return views.keep_and_send(ask, enqueue_moment)
 
 
-class MomentView(ApiView):
+class MomentView(views.ApiView):
     """One moment."""
 
     readers = STAFF
 
-    @operation(MomentDocument, name="getMoment")
+    @views.operation(MomentDocument, name="getMoment")
     def get(self, code: uuid.UUID) -> UploadMoment:
         """A moment of a recording.
 
@@ -296,10 +281,10 @@ class MomentView(ApiView):
 class SweepBody(RequestBody):
     """A new sweep."""
 
-    request = SweepRequest
+    request = driving.SweepRequest
 
 
-class SweepDocument(WarnedDocument):
+class SweepDocument(views.WarnedDocument):
     """A sweep as far as it has been driven."""
 
     code = serializers.UUIDField(source="sweep.code")
@@ -320,52 +305,52 @@ class SweepDocument(WarnedDocument):
     )
     drives = serializers.SerializerMethodField(help_text="Rows as in the sweep's files.")
 
-    def get_drives(self, result: SweepResult) -> list[dict[str, Any]]:
+    def get_drives(self, result: driving.SweepResult) -> list[dict[str, Any]]:
         """Return a row for each drive, and for each value that fits nowhere."""
         sheet = sweep_sheet(result)
         return [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows]
 
 
-class SweepsView(ApiView):
+class SweepsView(views.ApiView):
     """Sweeps of a scenario."""
 
     writers = ADMINS
 
-    @operation(SweepDocument, takes=SweepBody, status=202, name="startSweep")
-    def post(self, code: uuid.UUID, params: Params) -> tuple[SweepResult, list[str]]:
+    @views.operation(SweepDocument, takes=SweepBody, status=202, name="startSweep")
+    def post(self, code: uuid.UUID, params: views.Params) -> tuple[driving.SweepResult, list[str]]:
         """Drive one number of a scenario at several values.
 
         Poll it until nothing is under way.
         """
-        wanted = read_request(SweepRequest, params)
-        planned = plan_sweep(scenario=_scenario(code), request=wanted, actor=self.user)
-        sweep, warnings = keep_and_send(lambda: planned, enqueue_sweep)
-        return sweep_result(sweep), warnings
+        wanted = read_request(driving.SweepRequest, params)
+        planned = driving.plan_sweep(scenario=_scenario(code), request=wanted, actor=self.user)
+        sweep, warnings = views.keep_and_send(lambda: planned, enqueue_sweep)
+        return driving.sweep_result(sweep), warnings
 
 
-class SweepView(ApiView):
+class SweepView(views.ApiView):
     """One sweep."""
 
     readers = STAFF
 
-    @operation(SweepDocument, name="getSweep")
-    def get(self, code: uuid.UUID) -> SweepResult:
+    @views.operation(SweepDocument, name="getSweep")
+    def get(self, code: uuid.UUID) -> driving.SweepResult:
         """A sweep.
 
         Scores by value and planner, where the planner fails, and what was kept.
         """
         rows = Sweep.objects.select_related("scenario", "hardest")
-        return sweep_result(get_object_or_404(rows, code=code))
+        return driving.sweep_result(get_object_or_404(rows, code=code))
 
 
 class FamilyBody(StrictSerializer):
     """Number of scenarios to draw."""
 
-    count = WholeNumberField(min_value=1, max_value=LARGEST_FAMILY)
+    count = WholeNumberField(min_value=1, max_value=driving.LARGEST_FAMILY)
     seed = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME, required=False, default=0)
 
 
-class FamilyDocument(WarnedDocument):
+class FamilyDocument(views.WarnedDocument):
     """The scenarios that were drawn."""
 
     scenarios = serializers.ListField(child=serializers.CharField(), help_text="Slugs.")
@@ -374,19 +359,23 @@ class FamilyDocument(WarnedDocument):
     )
 
 
-class FamilyView(ApiView):
+class FamilyView(views.ApiView):
     """Families of a scenario."""
 
     writers = STAFF
 
-    @operation(FamilyDocument, takes=FamilyBody, status=201, name="drawFamily")
-    def post(self, code: uuid.UUID, params: Params) -> tuple[dict[str, list[str]], list[str]]:
+    @views.operation(FamilyDocument, takes=FamilyBody, status=201, name="drawFamily")
+    def post(
+        self, code: uuid.UUID, params: views.Params
+    ) -> tuple[dict[str, list[str]], list[str]]:
         """Add scenarios with numbers drawn from the ranges of one's intent.
 
         A worker draws them.
         """
-        rows, refused = add_family(scenario=_scenario(code), **params, actor=self.user)
-        sent = [keep_and_send(partial(_scenario, row.code), enqueue_scenario) for row in rows]
+        rows, refused = driving.add_family(scenario=_scenario(code), **params, actor=self.user)
+        sent = [
+            views.keep_and_send(partial(_scenario, row.code), enqueue_scenario) for row in rows
+        ]
         family = {
             "scenarios": [row.slug for row in rows],
             "refused": [member.refusal for member in refused],
@@ -405,7 +394,7 @@ class SubmissionBody(StrictSerializer):
     benchmark = TextField(max_length=100, help_text="Its name, name@version, or code.")
 
 
-class SubmissionDocument(RowDocument[Submission], WarnedDocument):
+class SubmissionDocument(views.RowDocument[Submission], views.WarnedDocument):
     """A submission, and once it is read the report on it."""
 
     benchmark = serializers.CharField(help_text="Its name@version.", read_only=True)
@@ -430,23 +419,23 @@ class SubmissionsView(FilesView):
 
     writers = (*ENTRANTS, *STAFF)
 
-    @operation(SubmissionDocument, takes=SubmissionBody, status=202, name="sendSubmission")
-    def post(self, params: Params) -> tuple[Submission, list[str]]:
+    @views.operation(SubmissionDocument, takes=SubmissionBody, status=202, name="sendSubmission")
+    def post(self, params: views.Params) -> tuple[Submission, list[str]]:
         """Send a submission; a worker reads it.
 
         Poll it until its state is checked or failed.
         """
         file, benchmark = params["file"], find_benchmark(params["benchmark"])
         keep = partial(keep_submission, benchmark, name=file.name or "", content=file)
-        return keep_and_send(partial(keep, actor=self.user), enqueue_submission)
+        return views.keep_and_send(partial(keep, actor=self.user), enqueue_submission)
 
 
-class SubmissionView(ApiView):
+class SubmissionView(views.ApiView):
     """One submission."""
 
     readers = (*ENTRANTS, *STAFF)
 
-    @operation(SubmissionDocument, name="getSubmission")
+    @views.operation(SubmissionDocument, name="getSubmission")
     def get(self, code: uuid.UUID) -> Submission:
         """A submission with its report.
 

@@ -1,4 +1,4 @@
-"""Responses with pictures: private, without their file's name."""
+"""Responses with pictures, private and without their file's name, and with files of workers."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -9,6 +9,8 @@ from django.http import FileResponse, Http404, HttpRequest, JsonResponse
 from django.http.response import HttpResponseBase
 
 from arena.exports.drawing import recolour
+from arena.exports.files import CONTENT_TYPE
+from arena.models.files import WrittenFile
 from augment.models import Augmentation
 from augment.services.scenarios import WIDTHS_PX, film_document, shrink
 
@@ -26,6 +28,18 @@ def charts_for_pages(view: Callable[..., Any]) -> Callable[..., Any]:
         return response
 
     return answer
+
+
+def file_response(row: WrittenFile | None) -> FileResponse:
+    """The zip that a worker has written.
+
+    Raises:
+        Http404: There is no row or no such file.
+    """
+    if row is None or not default_storage.exists(row.stored):
+        raise Http404
+    content = default_storage.open(row.stored)
+    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
 
 
 def picture_response(name: str) -> FileResponse:

@@ -7,17 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from arena.exports import formats
 from arena.exports.cells import show_name
 from arena.exports.drawing import MARK, chart_style, draw_once, name_lines, write_figure
-from arena.exports.formats import (
-    Columns,
-    Dtype,
-    Sheet,
-    drawings,
-    join_numbers,
-    make_sheet,
-    table_formats,
-)
 from augment.models import GenerationJob
 from augment.services.judging import PLACED_EXACTLY, list_objects
 from augment.services.judging.displacement import (
@@ -141,41 +133,44 @@ def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
     )
 
 
-KEPT: Columns = {
-    **Dtype.WHOLE.columns("to_keep", "kept", of="kept"),
-    **Dtype.NUMBER.columns("moved_mean_m", of="kept"),
+KEPT: formats.Columns = {
+    **formats.Dtype.WHOLE.columns("to_keep", "kept", of="kept"),
+    **formats.Dtype.NUMBER.columns("moved_mean_m", of="kept"),
 }
 """Of follow-ups: what was to stay of the answer before, what did, and how far it was moved."""
 
-_GROUPED: Columns = {
-    "group": ("heading", Dtype.TEXT),
-    "contestant": (lambda group: show_name(group.contestant), Dtype.TEXT),
-    **Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
-    "simulated": ("contestant.is_simulated", Dtype.YES_NO),
+_GROUPED: formats.Columns = {
+    "group": ("heading", formats.Dtype.TEXT),
+    "contestant": (lambda group: show_name(group.contestant), formats.Dtype.TEXT),
+    **formats.Dtype.TEXT.columns("slug", "model", "variant", of="contestant"),
+    "simulated": ("contestant.is_simulated", formats.Dtype.YES_NO),
 }
-GROUPS: Columns = {
+GROUPS: formats.Columns = {
     **_GROUPED,
-    **Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
-    **Dtype.NUMBER.columns(
+    **formats.Dtype.WHOLE.columns("augmentations", "n", "missing", "surplus", of="summary"),
+    **formats.Dtype.NUMBER.columns(
         "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", of="summary.box"
     ),
     **KEPT,
     "outliers_m": (
-        lambda group: join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
-        Dtype.TEXT,
+        lambda group: formats.join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
+        formats.Dtype.TEXT,
     ),
 }
-WISHED: Columns = {
-    "wish_median_m": ("wish.box.median_m", Dtype.NUMBER),
-    "wish_mean_m": ("wish.box.mean_m", Dtype.NUMBER),
-    **{f"wish_{name}": (f"wish.{name}", Dtype.WHOLE) for name in ("n", "missing", "surplus")},
+WISHED: formats.Columns = {
+    "wish_median_m": ("wish.box.median_m", formats.Dtype.NUMBER),
+    "wish_mean_m": ("wish.box.mean_m", formats.Dtype.NUMBER),
+    **{
+        f"wish_{name}": (f"wish.{name}", formats.Dtype.WHOLE)
+        for name in ("n", "missing", "surplus")
+    },
 }
 """Of groups, where one of them has an intent."""
-OVER_TIME = Dtype.NUMBER.columns("at_t0_m", "final_m", "start_s", of="summary.over_time")
+OVER_TIME = formats.Dtype.NUMBER.columns("at_t0_m", "final_m", "start_s", of="summary.over_time")
 """Of groups, where one of them has something that moves."""
 
 
-def group_sheet(table: DisplacementTable) -> Sheet:
+def group_sheet(table: DisplacementTable) -> formats.Sheet:
     """Return one row a group."""
     types = " ".join(table.types)
     facts = {
@@ -185,15 +180,15 @@ def group_sheet(table: DisplacementTable) -> Sheet:
         "notes": [f"{table.types_text}.", *table.remarks],
         "not_measured": table.left_out,
     }
-    columns: Columns = {
+    columns: formats.Columns = {
         **_GROUPED,
         **(WISHED if table.wishes else {}),
         **GROUPS,
-        "types": (lambda group: types, Dtype.TEXT),
+        "types": (lambda group: types, formats.Dtype.TEXT),
     }
     if table.moves:
         columns = {**columns, **OVER_TIME}
-    return make_sheet(
+    return formats.make_sheet(
         table.groups, columns, name="displacement", key="groups", number=".3f", facts=facts
     )
 
@@ -201,40 +196,40 @@ def group_sheet(table: DisplacementTable) -> Sheet:
 # --- One row an object -------------------------------------------------------------------------
 
 
-WHOSE: Columns = {
-    "scenario": ("row.scenario.slug", Dtype.TEXT),
-    "type": ("row.scenario.type", Dtype.TEXT),
-    "contestant": ("row.contestant.slug", Dtype.TEXT),
-    **Dtype.TEXT.columns("name", "model", "variant", of="row.contestant"),
-    "simulated": ("row.contestant.is_simulated", Dtype.YES_NO),
+WHOSE: formats.Columns = {
+    "scenario": ("row.scenario.slug", formats.Dtype.TEXT),
+    "type": ("row.scenario.type", formats.Dtype.TEXT),
+    "contestant": ("row.contestant.slug", formats.Dtype.TEXT),
+    **formats.Dtype.TEXT.columns("name", "model", "variant", of="row.contestant"),
+    "simulated": ("row.contestant.is_simulated", formats.Dtype.YES_NO),
 }
-OBJECTS: Columns = {
+OBJECTS: formats.Columns = {
     **WHOSE,
-    "augmentation": ("row.code", Dtype.TEXT),
-    "state": ("row.state", Dtype.TEXT),
-    **Dtype.TEXT.columns("object", "class"),
-    "reference": ("reference.id", Dtype.TEXT),
-    "reference_x_m": ("reference.x_m", Dtype.NUMBER),
-    "reference_y_m": ("reference.y_m", Dtype.NUMBER),
-    "generated": ("generated.id", Dtype.TEXT),
-    "x_m": ("generated.x_m", Dtype.NUMBER),
-    "y_m": ("generated.y_m", Dtype.NUMBER),
-    **Dtype.NUMBER.columns("distance_m", of="match"),
-    "sample": ("row.sample", Dtype.WHOLE),
+    "augmentation": ("row.code", formats.Dtype.TEXT),
+    "state": ("row.state", formats.Dtype.TEXT),
+    **formats.Dtype.TEXT.columns("object", "class"),
+    "reference": ("reference.id", formats.Dtype.TEXT),
+    "reference_x_m": ("reference.x_m", formats.Dtype.NUMBER),
+    "reference_y_m": ("reference.y_m", formats.Dtype.NUMBER),
+    "generated": ("generated.id", formats.Dtype.TEXT),
+    "x_m": ("generated.x_m", formats.Dtype.NUMBER),
+    "y_m": ("generated.y_m", formats.Dtype.NUMBER),
+    **formats.Dtype.NUMBER.columns("distance_m", of="match"),
+    "sample": ("row.sample", formats.Dtype.WHOLE),
 }
 """`object` is matched, missing or surplus; places are in the ego frame."""
-MATCHES_OVER_TIME = Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="match")
+MATCHES_OVER_TIME = formats.Dtype.NUMBER.columns("average_m", "final_m", "start_s", of="match")
 """Of objects, where one moves."""
 
 
-def object_sheet(job: GenerationJob) -> Sheet:
+def object_sheet(job: GenerationJob) -> formats.Sheet:
     """Return the displacement of a job with one row an object."""
     name, objects = "displacement-objects", list(list_objects(job))
     moves = any(entry["match"] and entry["match"].average_m is not None for entry in objects)
     columns = {**OBJECTS, **MATCHES_OVER_TIME} if moves else OBJECTS
     if any(thing["wish_m"] is not None for thing in objects):
-        columns = {**WHOSE, "wish_distance_m": ("wish_m", Dtype.NUMBER), **columns}
-    return make_sheet(objects, columns, name=name, key="objects", number=".4f")
+        columns = {**WHOSE, "wish_distance_m": ("wish_m", formats.Dtype.NUMBER), **columns}
+    return formats.make_sheet(objects, columns, name=name, key="objects", number=".4f")
 
 
 # --- Box plots ---------------------------------------------------------------------------------
@@ -322,8 +317,8 @@ def _scale(axes: Axes, boxes: Sequence[dict[str, Any]]) -> None:
     axes.set_xlim(left=0.0)
 
 
-_BOX_PLOTS = drawings(draw_once(box_plot, group_sheet))
-FORMATS = table_formats(group_sheet) | _BOX_PLOTS
+_BOX_PLOTS = formats.drawings(draw_once(box_plot, group_sheet))
+FORMATS = formats.table_formats(group_sheet) | _BOX_PLOTS
 
 
 def draw_box_plots(pk: int) -> None:

@@ -9,14 +9,9 @@ from arena.exports.formats import TABLE_FORMATS, Columns, Dtype, Export, Sheet, 
 from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
+from augment.services import judging
 from augment.services.driving import compare_job, scores_of_job
 from augment.services.driving.simulations import SCORES
-from augment.services.judging import (
-    augmentation_lines,
-    read_answers,
-    realism_of_job,
-    repeatability,
-)
 from augment.services.judging.analyses import ANALYSES, SEED
 from augment.services.judging.displacement import By
 from augment.services.running import tool_calls
@@ -130,7 +125,7 @@ ANALYSIS_COLUMNS: dict[str, Columns] = {
 def augmentation_sheet(job: GenerationJob) -> Sheet:
     """Return a job's augmentations with one row each."""
     columns: Columns = {"job": (lambda line: job.name, Dtype.TEXT), **AUGMENTATIONS}
-    name, lines = "augmentations", list(augmentation_lines(job))
+    name, lines = "augmentations", list(judging.augmentation_lines(job))
     if any(line.displacement and line.displacement.over_time for line in lines):
         columns = {**columns, **OVER_TIME}
     columns = {**columns, "sends": (lambda line: _json(line.row.contestant.sends), Dtype.TEXT)}
@@ -141,7 +136,7 @@ def augmentation_sheet(job: GenerationJob) -> Sheet:
 
 def repeat_sheet(job: GenerationJob) -> Sheet:
     """Return the variation between the samples of a job, one row a contestant."""
-    return make_sheet(repeatability(job), REPEATS, digits=6, name="repeats", key="repeats")
+    return make_sheet(judging.repeatability(job), REPEATS, digits=6, name="repeats", key="repeats")
 
 
 def tool_call_sheet(job: GenerationJob) -> Sheet:
@@ -152,7 +147,7 @@ def tool_call_sheet(job: GenerationJob) -> Sheet:
 
 def analysis_sheet(job: GenerationJob, *, part: str) -> Sheet:
     """Return one part of a job's analysis; its bootstrap has a seed, which JSON names."""
-    lines, facts = ANALYSES[part](read_answers(job)), {"part": part, "seed": SEED}
+    lines, facts = ANALYSES[part](judging.read_answers(job)), {"part": part, "seed": SEED}
     columns = ANALYSIS_COLUMNS[part]
     return make_sheet(lines, columns, digits=6, name="analysis", number="g", facts=facts)
 
@@ -168,7 +163,7 @@ JOB_TABLES = {
     "repeats": Export(TABLE_FORMATS, repeat_sheet, "what varies between the samples of a job"),
     "realism": Export(
         realism.FORMATS,
-        realism_of_job,
+        judging.realism_of_job,
         "how realistic, between recorded traffic and random places",
     ),
     "displacement-objects": Export(TABLE_FORMATS, displacement.object_sheet),

@@ -18,19 +18,8 @@ from arena.shell.access import ADMIN, form_for, get_user
 from arena.shell.acts import refusals_in, send_later
 from arena.shell.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
-from augment.services import read_request, read_values, to_inputs
+from augment.services import read_request, read_values, running, to_inputs
 from augment.services.endpoints import OPTION_INPUTS
-from augment.services.running import (
-    JobEstimate,
-    JobRequest,
-    JobScope,
-    add_cells,
-    can_run,
-    find_cells,
-    find_obstacle,
-    make_matrix,
-    workforce,
-)
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import launch
 from augment.tasks import enqueue_job
@@ -42,14 +31,14 @@ USUAL_CALLS = 5_000
 class LaunchForm(ChoiceForm, OptionsForm):
     """A new job: cells of the matrix, contestants, scenarios and caps."""
 
-    inputs = to_inputs(JobRequest) + OPTION_INPUTS
+    inputs = to_inputs(running.JobRequest) + OPTION_INPUTS
     contestants = forms.MultipleChoiceField(required=False)
     cells = forms.MultipleChoiceField(required=False)
 
     def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.models = models
-        self.matrix = make_matrix(models)
+        self.matrix = running.make_matrix(models)
         keys = [cell.key for row in self.matrix for cell in row.cells if not cell.obstacle]
         offer(self, "cells", [(key, key) for key in keys])
         self.fields["samples"].required = False
@@ -65,7 +54,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         if not (cleaned.get("contestants") or cleaned.get("cells")):
             self.add_error("contestants", "Choose at least one contestant.")
         with refusals_in(self):
-            self.cells_chosen = find_cells(
+            self.cells_chosen = running.find_cells(
                 cleaned.get("cells", []), read_values(OPTION_INPUTS, cleaned)
             )
         return cleaned
@@ -73,7 +62,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
     @cached_property
     def offers(self) -> list[Offer]:
         """For the template: contestants, with the reason where no job can run them."""
-        return [Offer(row=row, obstacle=find_obstacle(row)) for row in self.offered]
+        return [Offer(row=row, obstacle=running.find_obstacle(row)) for row in self.offered]
 
     def usual(self) -> dict[str, Any]:
         """Return the initial choice: all that can run on every scenario, within a cap."""
@@ -82,7 +71,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         ready = [
             row.slug
             for row in self.offered
-            if can_run(row, where)
+            if running.can_run(row, where)
             and getattr(row.endpoint, "key_variable", "") not in self.missing_keys
         ]
         return {
@@ -96,7 +85,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
     def missing_keys(self) -> set[str]:
         """For the template: variables of the models' keys that the workers do not have."""
         names = {model.endpoint.key_variable for model in self.models} - {""}
-        return names - workforce().keys
+        return names - running.workforce().keys
 
     @property
     def chosen_cells(self) -> list[str]:
@@ -109,7 +98,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         rows = [*named.select_related("endpoint"), *self.cells_chosen]
         return list({row.slug: row for row in rows}.values())
 
-    def find_estimate(self) -> JobEstimate | None:
+    def find_estimate(self) -> running.JobEstimate | None:
         """Return the job's estimate from the fields chosen so far, without a name or caps."""
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
@@ -117,7 +106,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         contestants = self.list_chosen_rows()
         if not (contestants and self.cleaned_data.get("scenarios")):
             return None
-        return estimate(read_request(JobScope, self.cleaned_data), contestants)
+        return estimate(read_request(running.JobScope, self.cleaned_data), contestants)
 
 
 @form_for(ADMIN)
@@ -188,13 +177,15 @@ def _show_estimate(request: HttpRequest, form: LaunchForm) -> HttpResponse:
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     """Launch the job; of one that tries first, one scenario with a memory of the rest."""
     values = dict(form.cleaned_data)
-    made = add_cells(form.cells_chosen, actor=get_user(request))
+    made = running.add_cells(form.cells_chosen, actor=get_user(request))
     values["contestants"] = [*values["contestants"], *made]
-    asked_for = read_request(JobRequest, values)
+    asked_for = read_request(running.JobRequest, values)
     if "try" in request.POST:
         plan = {
             name: str(value) if isinstance(value, Decimal) else value
-            for name, value in read_values(to_inputs(JobRequest), form.cleaned_data).items()
+            for name, value in read_values(
+                to_inputs(running.JobRequest), form.cleaned_data
+            ).items()
             if name != "contestants"
         }
         asked_for = replace(

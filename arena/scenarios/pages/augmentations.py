@@ -14,25 +14,10 @@ from arena.shell.forms import RequestForm
 from arena.shell.pictures import picture_response, resize_picture
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
-from augment.services import read_request, to_inputs
+from augment.services import read_request, running, scenarios, to_inputs
 from augment.services.judging import check_augmentation
 from augment.services.judging.displacement import of_augmentation
-from augment.services.running import (
-    FollowUpRequest,
-    ask_follow_up,
-    full_transcript,
-    list_tries,
-    steps_to,
-    sum_totals,
-)
 from augment.services.running.calls import IMAGES
-from augment.services.scenarios import (
-    ShownPrompt,
-    list_recipes,
-    pictures,
-    preview_prompt,
-    prompt_version,
-)
 from augment.tasks import enqueue_augmentation
 
 State = Augmentation.State
@@ -41,7 +26,7 @@ State = Augmentation.State
 class FollowUpForm(RequestForm):
     """Next instruction of a conversation, and its caps."""
 
-    inputs = to_inputs(FollowUpRequest)
+    inputs = to_inputs(running.FollowUpRequest)
 
 
 @page_for(*STAFF)
@@ -49,7 +34,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
     can_go_on = augmentation.is_answer and augmentation.contestant.endpoint is not None
-    tries, checked = list_tries(augmentation), check_augmentation(augmentation)
+    tries, checked = running.list_tries(augmentation), check_augmentation(augmentation)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
@@ -64,7 +49,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "checked": checked,
         "tries": tries,
         "asking": show_options(augmentation.contestant, augmentation.options),
-        "totals": sum_totals(tries),
+        "totals": running.sum_totals(tries),
     }
     return render(request, "jobs/augmentation.html", context)
 
@@ -76,15 +61,15 @@ def follow_up(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     if not form.is_valid():
         tell_errors(request, form)
         return None
-    wish = read_request(FollowUpRequest, form.cleaned_data)
-    made = ask_follow_up(_augmentation(code), wish, actor=get_user(request))
+    wish = read_request(running.FollowUpRequest, form.cleaned_data)
+    made = running.ask_follow_up(_augmentation(code), wish, actor=get_user(request))
     send_later(request, enqueue_augmentation, made.pk)
     return redirect("augmentation", code=made.code)
 
 
 def _steps(row: Augmentation) -> list[tuple[Augmentation, list[str]]]:
     """Return the steps up to this one, each with what it changed of the step before."""
-    steps = steps_to(row)
+    steps = running.steps_to(row)
     before = [None, *(step.modification for step in steps)]
     return [
         (step, step_changes(was, step.modification) if step.modification else [])
@@ -104,7 +89,7 @@ def _augmentation(code: uuid.UUID) -> Augmentation:
 def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with the whole record of an augmentation as one JSON file."""
     answer = JsonResponse(
-        full_transcript(_augmentation(code)),
+        running.full_transcript(_augmentation(code)),
         json_dumps_params={"indent": 2, "ensure_ascii": False},
     )
     answer["Content-Disposition"] = f'attachment; filename="transcript-{code}.json"'
@@ -138,10 +123,10 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
-            name = pictures.reference_picture(find_scenario(code))
-        case _ if kind in set(pictures.SceneView):
+            name = scenarios.pictures.reference_picture(find_scenario(code))
+        case _ if kind in set(scenarios.pictures.SceneView):
             scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
-            name = pictures.scene_picture(scene, pictures.SceneView(kind))
+            name = scenarios.pictures.scene_picture(scene, scenarios.pictures.SceneView(kind))
         case _:
             raise Http404
     return resize_picture(request, name)
@@ -149,7 +134,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 
 def _draw_labels(code: uuid.UUID) -> HttpResponse:
     try:
-        png = pictures.draw_with_ids(_augmentation(code))
+        png = scenarios.pictures.draw_with_ids(_augmentation(code))
     except AugmentError as error:
         raise Http404 from error
     return HttpResponse(png, content_type="image/png")
@@ -168,7 +153,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except AugmentError as error:
         problem = str(error)
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
-    choices = list_recipes()
+    choices = scenarios.list_recipes()
     context = {
         "scenario": scenario,
         "choices": choices,
@@ -176,7 +161,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "role": role,
         "is_native": "native" in request.GET,
         "shown": shown,
-        "version": prompt_version(),
+        "version": scenarios.prompt_version(),
         "problem": problem,
         "query": request.GET.urlencode(),
     }
@@ -202,8 +187,8 @@ def find_scenario(code: uuid.UUID) -> Scenario:
     return get_object_or_404(rows, code=code)
 
 
-def _preview(request: HttpRequest, scenario: Scenario) -> ShownPrompt:
-    return preview_prompt(
+def _preview(request: HttpRequest, scenario: Scenario) -> scenarios.ShownPrompt:
+    return scenarios.preview_prompt(
         scenario,
         variant=request.GET.get("variant", "otm"),
         role=request.GET.get("role", "modifier"),

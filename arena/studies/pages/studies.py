@@ -7,7 +7,6 @@ from typing import Any
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.core.files.storage import default_storage
 from django.db import transaction
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -33,6 +32,7 @@ from arena.shell.acts import (
     wants_to_change,
 )
 from arena.shell.listing import read_listing, read_page
+from arena.shell.pictures import file_response
 from arena.studies import queries
 from arena.studies.forms import AuthorForm, HandOverForm
 from arena.studies.services.files import (
@@ -228,10 +228,7 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
 def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
     """The newest one, once it is ready."""
     row = newest_study_files(_study_for(request, code, kind)).get(kind)
-    is_ready = row is not None and row.state == StudyFile.State.READY
-    if row is None or not is_ready or not default_storage.exists(row.stored):
-        raise Http404
-    return FileResponse(default_storage.open(row.stored), as_attachment=True, filename=row.name)
+    return file_response(row if row and row.state == StudyFile.State.READY else None)
 
 
 def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
