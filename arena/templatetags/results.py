@@ -113,6 +113,14 @@ def p_value(value: float) -> str:
 
 
 @register.filter
+def p_digits(value: float | None) -> str:
+    """Four digits, or that it is less than they can show; a dash where it is unknown."""
+    if value is None:
+        return "–"
+    return "< 0.0001" if value < 0.0001 else f"{value:.4f}"
+
+
+@register.filter
 def seconds(milliseconds: float) -> str:
     """One digit after the point; Django's own filter cuts off."""
     return f"{milliseconds / 1000:.1f}"
