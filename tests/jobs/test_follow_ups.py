@@ -351,3 +351,11 @@ def test_a_step_tells_what_it_changed(changes: dict[str, object], told: list[str
     after = {"add": [{**car_of_step["add"][0], **changes}], "remove": ["Agent7"]}
     assert step_changes(before, after) == told
     assert step_changes(before, {"add": before["add"]}) == ["Agent7 no longer removed"]
+
+
+def test_a_task_is_found_by_the_text_of_its_instruction_however_it_is_spaced() -> None:
+    assert find_stored_tasks(rows.INSTRUCTION) == []
+    row = rows.add_scenario("street")
+    spaced = f"  {rows.INSTRUCTION.replace(' ', '  ')}\n"
+    assert find_stored_tasks(spaced) == [(LoadedScenario(row).scene, cones(20.0, 1, Shape.LINE))]
+    assert find_stored_tasks("Paint the sky green.") == []

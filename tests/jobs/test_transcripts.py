@@ -13,10 +13,11 @@ from augment.llm.messages import request_hash
 from augment.models import Attempt, Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
+from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import tool_calls
 from augment.services.running.transcript_records import full_transcript, list_tries, sum_totals
 from augment.variants.respondents import NoteKind
-from tests.jobs.models import Model, after_a_second_look, llama_job, ran
+from tests.jobs.models import Model, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import INSTRUCTION, NOON, launch, only_row
 from tests.llm.json_server import GOOD as HEARD
 from tests.llm.raw_server import speaking, whole
@@ -153,3 +154,43 @@ def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
         ("street-1", "3", "1"),
         ("street-2", "1", "0"),
     ]
+
+
+EVIL = "<script>alert(1)</script>"
+
+
+def page_of(row: Augmentation) -> str:
+    answer = signed_in(people()["researcher"]).get(reverse("augmentation", args=[row.code]))
+    assert answer.status_code == 200
+    return " ".join(answer.content.decode().split())
+
+
+def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
+    shown = page_of(ran(only_row(llama_job(price="2")), Model()))
+    assert "Call 1, modifier" in shown
+    assert "2,900 tokens in, 120 out" in shown
+    assert "$0.0060" in shown
+    assert "A parked car ahead." in shown
+    assert "llama3.1-2407" in shown
+    assert "Prompt version" in shown
+
+
+def test_a_call_from_the_store_is_marked_and_leads_to_its_source() -> None:
+    first = ran(only_row(llama_job(price="1")), Model())
+    job = jobs.launch(JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"]))
+    shown = page_of(ran(only_row(job), Model()))
+    assert "answered from the store" in shown
+    source = f"{reverse('augmentation', args=[first.code])}#call-1-1"
+    assert source in shown
+
+
+def test_what_a_model_says_is_never_markup() -> None:
+    shown = page_of(ran(only_row(llama_job()), Model(lambda request: reply(EVIL))))
+    assert EVIL not in shown
+    assert "&lt;script&gt;alert(1)" in shown
+
+
+@pytest.mark.parametrize("digest", ["0" * 64, "0" * 63, "A" * 64, "secret_key"])
+def test_no_other_file_is_given_out(digest: str) -> None:
+    url = reverse("asked-image", args=[digest])
+    assert signed_in(people()["admin"]).get(url).status_code == 404

@@ -1,5 +1,6 @@
 """What the voting page gives its script."""
 
+import gzip
 import json
 import re
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import pytest
 from django.conf import settings
+from django.urls import reverse
 
 from tests import study_rows
 from tests.web.ballots import page
@@ -61,3 +63,25 @@ def test_every_text_that_the_script_says_is_on_the_page() -> None:
     said |= {f"{name}-{n}" for name in re.findall(r'counted\("(\w+)"', scripts) for n in NUMBERS}
     said |= {f"{name}-{n}" for name in re.findall(r'data-kept="(\w+)"', shown) for n in NUMBERS}
     assert said <= offered
+
+
+STATIC = Path(settings.BASE_DIR) / "static"
+
+
+MOST_BYTES = 40 * 1024
+
+
+@pytest.mark.django_db
+def test_the_voting_page_loads_at_most_40_kb_and_names_every_module_of_its_script() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
+    loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
+    assert {"js/vote.js", "css/vote.css"} <= loaded
+    sizes = {name: len(gzip.compress((STATIC / name).read_bytes())) for name in sorted(loaded)}
+    assert sum(sizes.values()) <= MOST_BYTES, sizes
+    named = set(re.findall(r'modulepreload" href="/static/js/([\w-]+\.js)"', shown))
+    imported: set[str] = set()
+    for script in ("vote.js", *named):
+        text = (STATIC / "js" / script).read_text()
+        imported |= set(re.findall(r'from "\./([\w-]+\.js)"', text))
+    assert named == imported
