@@ -59,20 +59,19 @@ class OptionsForm(RequestForm):
         return any(field.value() not in (None, "") for field in self.option_fields)
 
 
-REQUEST = to_inputs(ContestantRequest)
+REQUEST = {field.name: field for field in to_inputs(ContestantRequest)}
 
 
 class ContestantForm(OptionsForm):
     """A model, its variants, and how it asks."""
 
-    inputs = (*(field for field in REQUEST if field.name == "name"), *OPTION_INPUTS)
+    inputs = (REQUEST["name"], *OPTION_INPUTS)
     model = forms.ChoiceField(label="Model")
     variant = forms.MultipleChoiceField(
         label="Variants",
-        choices=[*next(field.choices for field in REQUEST if field.name == "variant").items()],
+        choices=[*REQUEST["variant"].choices.items()],
         widget=forms.CheckboxSelectMultiple,
-        help_text="Each is a contestant. "
-        + next(field.help for field in REQUEST if field.name == "variant"),
+        help_text=f"Each is a contestant. {REQUEST['variant'].help}",
     )
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -107,12 +106,9 @@ class EndpointForm(RequestForm):
     def clean_label(self) -> str:
         """Return the name as a slug."""
         name: str = self.cleaned_data["label"]
-        is_slug = name == make_slug(name)
-        return (
-            name
-            if is_slug
-            else free_slug(Endpoint.objects, name, otherwise="endpoint", column="label")
-        )
+        if name == make_slug(name):
+            return name
+        return free_slug(Endpoint.objects, name, otherwise="endpoint", column="label")
 
 
 class EndpointFactsForm(RequestForm):
@@ -175,11 +171,10 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @form_for(ADMIN)
 def new_contestant_page(request: HttpRequest) -> HttpResponse:
     """Add contestants that ask a model, by default in the paper's variants."""
-    model = EndpointModel.objects.order_by("-pk").first()
-    where = request.GET.get("model", "").partition(SEPARATOR)
-    asked = EndpointModel.objects.filter(endpoint__label=where[0], model=where[2]).first()
+    models = EndpointModel.objects.order_by("-pk")
+    label, _, name = request.GET.get("model", "").partition(SEPARATOR)
     initial: dict[str, Any] = {}
-    if model := asked or model:
+    if model := models.filter(endpoint__label=label, model=name).first() or models.first():
         initial = {"model": f"{model.endpoint.label}{SEPARATOR}{model.model}"}
         initial["variant"] = paper_variants(model)
     form = ContestantForm(request.POST or None, initial=initial)

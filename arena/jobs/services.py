@@ -107,18 +107,22 @@ def save_label(
         return label
     if task.labelling.closed_at is not None:
         raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
-    guessed = guess_faults(task.augmentation)
     return FaultLabel.objects.create(
         augmentation=task.augmentation,
         expert=expert,
         task=task,
         note=make_storable(note.strip())[:NOTE_LENGTH],
         **seen,
-        **{
-            f"guessed_{fault.value}": None if guessed is None else fault in guessed
-            for fault in FaultClass
-        },
+        **guessed_columns(task.augmentation),
     )
+
+
+def guessed_columns(row: Augmentation) -> dict[str, bool | None]:
+    """Return what the checks guess of an augmentation, as a label keeps it."""
+    guess = guess_faults(row)
+    return {
+        f"guessed_{fault.value}": None if guess is None else fault in guess for fault in FaultClass
+    }
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:

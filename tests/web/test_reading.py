@@ -17,14 +17,10 @@ ALLOWED = {"django_session"}
 """What a look may write: that its session goes on."""
 
 
-@pytest.mark.parametrize("role", ["admin", "researcher"])
-def test_no_page_of_staff_writes_a_row_when_it_is_read(role: str) -> None:
-    here, client = world(), signed_in(people()[role])
-    column = ("admin", "researcher").index(role)
-    wrote = {}
-    for name in PAGES:
-        if PAGES[name][column] != 200:
-            continue
+def test_no_page_of_staff_writes_a_row_when_it_is_read() -> None:
+    """An admin opens whatever a researcher opens."""
+    here, client, wrote = world(), signed_in(people()["admin"]), {}
+    for name in (name for name, answers in PAGES.items() if answers[0] == 200):
         url = address(name, here)
         with CaptureQueriesContext(connection) as seen:
             answer = client.get(url)

@@ -12,10 +12,11 @@ from django.db.models import Count, Q
 from arena.exports.cells import show_name
 from arena.exports.formats import Columns, Dtype, Sheet, formats, make_sheet, table_formats
 from arena.exports.latex import ValueColumns, latex_values
+from arena.jobs.services import guessed_columns
 from arena.models import FaultLabel, Matchup, Study, Vote
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.judging import FaultClass, guess_faults
+from augment.services.judging import FaultClass
 
 _MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 _LABEL = (
@@ -81,20 +82,15 @@ def tabulate_votes(job: GenerationJob) -> FaultTable:
             judged[row.pk] = row
             if classes := {fault for marked, _, fault in vote.faults if marked == side}:
                 marks[row.pk, vote.expert_id] |= classes
-    guesses = {pk: guess_faults(judged[pk]) for pk, _ in marks}
+    guesses = {pk: guessed_columns(judged[pk]) for pk, _ in marks}
     labels = [
         FaultLabel(
             augmentation=judged[pk],
             expert_id=expert,
             **{fault.value: fault in classes for fault in FaultClass},
-            **{
-                f"guessed_{fault.value}": fault in guess
-                for fault in FaultClass
-                if guess is not None
-            },
+            **guesses[pk],
         )
         for (pk, expert), classes in sorted(marks.items())
-        for guess in [guesses[pk]]
     ]
     return _tabulate(job, labels, Counter(row.contestant_id for row in judged.values()))
 

@@ -122,11 +122,10 @@ def _list_strip(
 ) -> list[tuple[int, dict[str, Any], UploadMoment]]:
     """Return the moments that are drawn or will be, in their order, with the numbers of stops."""
     by_stop = {(moment.item, moment.frame): moment for moment in moments}
-    places = [(stop["item"], stop["frame"]) for stop in _stops(row)]
     return [
-        (number, _stops(row)[number], by_stop[place])
-        for number, place in enumerate(places)
-        if place in by_stop
+        (number, stop, by_stop[place])
+        for number, stop in enumerate(_stops(row))
+        if (place := (stop["item"], stop["frame"])) in by_stop
     ]
 
 
