@@ -45,9 +45,13 @@ class LabelForm(forms.Form):
 class LabellingForm(forms.Form):
     """A new labelling of a job."""
 
-    name = forms.CharField(max_length=120, strip=True)
+    name = forms.CharField(
+        max_length=120, strip=True, help_text="Experts see it: it should name no contestant."
+    )
     experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
-    seed = forms.IntegerField(initial=1, min_value=0, max_value=2**63 - 1)
+    seed = forms.IntegerField(
+        label="Seed of the order", initial=1, min_value=0, max_value=2**63 - 1
+    )
 
     def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
