@@ -74,8 +74,7 @@ class Reading:
         notes: A sentence on every loss and assumption.
         moment: What was taken.
         names: What the source calls the agents, by their ids; empty where these are the same.
-        places: Of a map alone, where else the ego can be put: s_m of the source, x_m and y_m of
-            the ego frame along each lane, by what comes before S in "@LANE,S".
+        places: Of a map alone: s_m, and x_m and y_m in the ego frame, along each lane by its name.
     """
 
     scene: Scene
@@ -187,8 +186,7 @@ class Log:
             areas=road.areas,
         )
         notes = [*map_notes, *self.notes, *city.doubts.notes, *doubts.notes]
-        sizeless = sum(not track.has_size for track in self.tracks)
-        if sizeless:
+        if sizeless := sum(not track.has_size for track in self.tracks):
             sizes = f"{sizeless} of {len(self.tracks)} objects"
             notes.append(f"{sizes} got the usual size of their class.")
         if not _is_size(*self.ego_size_m):
@@ -198,8 +196,9 @@ class Log:
         if far:
             notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
         if road.side_is_assumed:
-            side = f"{road.traffic_side} is assumed{city.side_reason}"
-            notes.append(f"That people drive on the {side}.")
+            notes.append(
+                f"That people drive on the {road.traffic_side} is assumed{city.side_reason}."
+            )
         if not self.is_free:
             notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(
