@@ -192,13 +192,11 @@ class Log:
         if not _is_size(*self.ego_size_m):
             notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
         places = np.array([track.states[frame, :2] for track in log.tracks]).reshape(-1, 2)
-        far = road.far + int((np.hypot(*(places - log.ego[frame, :2]).T) > reach_m).sum())
-        if far:
+        if far := road.far + int((np.hypot(*(places - log.ego[frame, :2]).T) > reach_m).sum()):
             notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
         if road.side_is_assumed:
-            notes.append(
-                f"That people drive on the {road.traffic_side} is assumed{city.side_reason}."
-            )
+            side = f"{road.traffic_side} is assumed{city.side_reason}"
+            notes.append(f"That people drive on the {side}.")
         if not self.is_free:
             notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(
