@@ -129,6 +129,6 @@ def file_columns(leaderboard: str, table: Any, *, is_old: bool = False) -> Colum
 
 
 def _once(field: Value, table: Any) -> Value:
-    """Return what reads a field of the table, whatever the line."""
+    """Return a reader of a field of the table, the same for every line."""
     read = field if callable(field) else attrgetter(field)
     return lambda line: read(table)

@@ -216,7 +216,7 @@ def _as_json(vote: Vote) -> dict[str, Any]:
 
 
 def _list_faults(vote: Vote) -> list[dict[str, Any]]:
-    """Return what was marked as the wire has it: by side and place."""
+    """Return marked faults in the form of the wire: by side and place."""
     left, right = vote.matchup.objects_shown or ([], [])
     places = {
         (side, mark[0]): {"side": letter, "object": place}

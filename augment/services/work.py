@@ -207,7 +207,7 @@ class WorkKind(ABC, Generic[Row]):
         return self.waiting()
 
     def columns(self, row: Row) -> Mapping[str, Any]:
-        """Return what is written with every outcome."""
+        """Return the columns that are written with every outcome."""
         return {}
 
     def on_start(self, pk: int, worker: str, now: Moment) -> object:

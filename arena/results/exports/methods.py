@@ -39,7 +39,7 @@ authors to say."""
 
 
 def read_methods(snapshot: Snapshot) -> dict[str, Any]:
-    """Return what templates say of a rating's methods.
+    """Return the values for the templates of a rating's methods.
 
     Raises:
         Conflict: Its study has no preregistration, as those of votes from elsewhere.

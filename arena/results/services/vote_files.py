@@ -53,7 +53,7 @@ def vote_rows(votes: Iterable[RatedVote], names: Mapping[str, str]) -> Iterator[
 
 
 def faults_text(faults: Sequence[Sequence[str]]) -> str:
-    """Return what was marked as JSON, empty for nothing."""
+    """Return marked faults as JSON, empty for none."""
     return json.dumps(faults) if faults else ""
 
 

@@ -143,7 +143,7 @@ class ScenarioFrame:
     legend: list[str]
 
     def showing(self, left: Augmentation, right: Augmentation) -> Showing:
-        """Return what is shown of two pictures of its window."""
+        """Return the shown images and legend of two pictures of its window."""
         keys = legends_of_changes({row.pk: self.view for row in (left, right)})
         pair = sorted(set().union(*keys.values()))  # whichever side adds what
         return {
