@@ -40,6 +40,10 @@ function replace(old, fresh) {
     const same = fresh.querySelector(`#${CSS.escape(details.id)}`);
     if (same) same.open = details.open;
   }
+  for (const input of old.querySelectorAll("input[id]")) {
+    const same = fresh.querySelector(`#${CSS.escape(input.id)}`);
+    if (same && input.value !== input.defaultValue) same.value = input.value;
+  }
   const focused = old.contains(document.activeElement) ? document.activeElement.id : "";
   // What is as it was stays: pictures would load anew.
   if (!fresh.isEqualNode(old)) old.replaceWith(document.adoptNode(fresh));
