@@ -7,19 +7,22 @@ addEventListener("change", async ({ target }) => {
   const shown = document.getElementById("chosen");
   if (!picture || !shown) return;
   shown.src = picture;
+  // Facts and places of the moment that was shown before are wrong now, whatever comes instead.
+  show(document.implementation.createHTMLDocument());
   const answer = await fetch(`?moment=${moment}`);
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-  if (!target.checked) return;
-  // Facts and places of the moment that the page was loaded with would be wrong now.
-  for (const id of ["facts", "places"]) {
-    const fresh = page.getElementById(id);
-    if (fresh) document.getElementById(id)?.replaceWith(fresh);
-  }
+  if (target.checked) show(page);
 });
+
+function show(page) {
+  for (const id of ["facts", "places"]) {
+    document.getElementById(id)?.replaceChildren(...(page.getElementById(id)?.childNodes ?? []));
+  }
+}
 
 /** Returns the place on a lane that is nearest to a point of the picture, "" if none is near. */
 function nearestPlace(x, y) {
-  const lanes = JSON.parse(document.getElementById("places").textContent);
+  const lanes = JSON.parse(document.getElementById("places").textContent || "{}");
   let place = "";
   let least = REACH_PX;
   for (const [lane, rows] of Object.entries(lanes)) {

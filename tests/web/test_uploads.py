@@ -74,6 +74,8 @@ def test_the_ego_of_a_map_is_put_where_somebody_clicks(researcher: Client) -> No
     assert moment.report is not None
     # 240 by 180 m of the road in 1200 by 900 pixels; the ego stands at s = 200, in lane 1.
     assert ('id="places"' in shown, moment.item) == (True, "@1,1,200")
+    form = shown.partition('name="place"')[0].rpartition("<form")[2]
+    assert "keep" not in form, "what Enter in that field would press first"
     rows = moment.report["places"]["1,-1"]
     assert [rows[0], rows[-1]] == [[80.0, 1200.0, 432.0], [320.0, 0.0, 432.0]]
 
