@@ -1,12 +1,16 @@
 """Files of what is computed once: used again, in no backup, and deleted when they are old."""
 
+import io
 import os
 from datetime import timedelta
 
+import pytest
 from django.core.files.storage import default_storage
+from django.core.management import call_command
 from django.utils import timezone
 
 from arena.management.backups import find_media
+from augment.errors import MediaFault
 from augment.services.judging import COMPUTED, compute_once, delete_computed
 
 
@@ -32,3 +36,18 @@ def test_what_was_computed_is_kept_until_it_is_old() -> None:
     delete_computed(before=timezone.now() - timedelta(days=1))
     ask("a", "c")
     assert asked == ["a", "b", "c", "a"]
+
+
+@pytest.mark.django_db
+def test_what_is_served_can_be_prepared_while_no_old_chart_can_be_deleted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(**_: object) -> None:
+        raise MediaFault("list", "s3://pictures", "gone")
+
+    prepare, err = "arena.management.commands.prepare", io.StringIO()
+    monkeypatch.setattr(f"{prepare}.delete_computed", refuse)
+    for name in ("call_command", "compile_catalogue"):
+        monkeypatch.setattr(f"{prepare}.{name}", lambda *_, **__: None)
+    call_command("prepare", stderr=err)
+    assert "Old charts stay: The storage of pictures failed" in err.getvalue()
