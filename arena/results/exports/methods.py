@@ -157,10 +157,15 @@ def _tell_tests(board: BoardRemarks) -> str:
         if board.seems_above is not None:
             why = "too few experts or scenarios judged"
         return f"Differences of pairs are not tested: {why}"
-    pairs = "All pairs" if board.p_values is None else f"All {len(board.p_values)} pairs"
     number = len(board.above)
     verb = "differs" if number == 1 else "differ"
-    return f"{pairs} are tested at once, at an error of 5 % for the table; {number} {verb}"
+    if board.p_values is None:
+        tested = "All pairs are tested at once"
+    elif len(board.p_values) == 1:
+        tested = "The one pair is tested"
+    else:
+        tested = f"All {len(board.p_values)} pairs are tested at once"
+    return f"{tested}, at an error of 5 % for the table; {number} {verb}"
 
 
 def _tell_agreement(trust: Trust) -> str:
