@@ -4,7 +4,6 @@ import uuid
 from typing import Any
 
 from django.contrib import messages
-from django.core.files.storage import default_storage
 from django.db import transaction
 from django.http import (
     FileResponse,
@@ -18,7 +17,6 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
 from django.views.decorators.http import require_POST
 
-from arena.exports.files import CONTENT_TYPE
 from arena.exports.formats import TABLE_FORMATS, download
 from arena.jobs.exports import displacement, driving
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
@@ -30,7 +28,7 @@ from arena.shell import sending
 from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.shell.acts import looks_again, refusals_told, send_later
 from arena.shell.listing import choice_asked, read_page
-from arena.shell.pictures import charts_for_pages
+from arena.shell.pictures import charts_for_pages, file_response
 from augment.errors import Conflict
 from augment.models import GenerationJob, Simulation
 from augment.services.driving import NUPLAN, compare_job, drive_file, driving_scores, simulations
@@ -231,11 +229,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
 def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     """Answer with a zip that is ready."""
     row = get_object_or_404(ScenarioFile, code=code, state=ScenarioFile.State.READY)
-    try:
-        content = default_storage.open(row.stored)
-    except FileNotFoundError:
-        raise Http404 from None
-    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+    return file_response(row)
 
 
 def ask_to_measure(request: HttpRequest, job: GenerationJob) -> int:

@@ -5,12 +5,10 @@ from typing import Any
 
 from django import forms
 from django.contrib import messages
-from django.core.files.storage import default_storage
 from django.db import transaction
-from django.http import FileResponse, Http404, HttpRequest, HttpResponse
+from django.http import FileResponse, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.exports.files import CONTENT_TYPE
 from arena.exports.written_files import ask_for
 from arena.models import BenchmarkFile
 from arena.scenarios.queries import count_tasks, list_benchmarks
@@ -27,6 +25,7 @@ from arena.shell.access import (
 from arena.shell.accounts import top_role
 from arena.shell.acts import refusals_in, send_later, wait_for_workers
 from arena.shell.forms import RequestForm
+from arena.shell.pictures import file_response
 from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services import read_request, retire, to_inputs
@@ -129,11 +128,7 @@ def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:
 def download_benchmark(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     """Answer with the newest zip that is ready."""
     ready = BenchmarkFile.objects.filter(benchmark__code=code, state=BenchmarkFile.State.READY)
-    row = ready.order_by("pk").last()
-    if row is None or not default_storage.exists(row.stored):
-        raise Http404
-    content = default_storage.open(row.stored)
-    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+    return file_response(ready.order_by("pk").last())
 
 
 @act_for(ADMIN, back="benchmark")
