@@ -158,7 +158,7 @@ export class Player {
     this.films = films.map((film) => ({ ...film, changes: areNew && film.changed ? film.movers.slice(-film.changed) : [] }));
     this.canvases = films.map(() => surface(0, 0, { className: "reel", hidden: true }));
     this.canvases.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
-    this.hints = isCalm() ? this.films.map(hint) : [];
+    this.hints = isCalm() && areNew ? this.films.map(hint) : [];
     this.hints.forEach((canvas, place) => frames[place].firstElementChild.after(canvas));
     this.range.max = this.last = films[0].steps - 1;
     this.bar.hidden = false;

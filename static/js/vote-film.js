@@ -25,6 +25,6 @@ export function roll(pair, frames, isShown) {
   else if (pair.films instanceof Promise) pair.films.then(() => isShown() && roll(pair, frames, isShown));
   else {
     player.show(pair.films, frames);
-    for (const canvas of player.canvases) canvas.style.clipPath = cut(pair.shown);
+    for (const canvas of [...player.canvases, ...player.hints]) canvas.style.clipPath = cut(pair.shown);
   }
 }

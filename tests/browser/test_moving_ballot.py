@@ -145,6 +145,8 @@ def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     assert page.locator(FILMS).count() == 0
     hints = page.locator("canvas.reel-hint:not([hidden])")
     expect(hints).to_have_count(2)
+    for number in range(2):
+        assert "clip-path" in str(hints.nth(number).get_attribute("style")), "not over the scale"
     dots = page.evaluate(RINGED)
     assert min(dots) > 300, "round what is changed"
     pair = moving.study.matchups.get(position=2)
