@@ -133,11 +133,11 @@ def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
     )
 
 
-KEPT: formats.Columns = {
-    **formats.Dtype.WHOLE.columns("to_keep", "kept", of="kept"),
-    **formats.Dtype.NUMBER.columns("moved_mean_m", of="kept"),
-}
-"""Of follow-ups: what was to stay of the answer before, what did, and how far it was moved."""
+def kept_columns(of: str) -> formats.Columns:
+    """Of follow-ups: what was to stay of the answer before, what did, and how far it was moved."""
+    counts = formats.Dtype.WHOLE.columns("to_keep", "kept", of=of)
+    return {**counts, **formats.Dtype.NUMBER.columns("moved_mean_m", of=of)}
+
 
 _GROUPED: formats.Columns = {
     "group": ("heading", formats.Dtype.TEXT),
@@ -151,7 +151,7 @@ GROUPS: formats.Columns = {
     **formats.Dtype.NUMBER.columns(
         "median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m", of="summary.box"
     ),
-    **KEPT,
+    **kept_columns("kept"),
     "outliers_m": (
         lambda group: formats.join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
         formats.Dtype.TEXT,

@@ -47,7 +47,7 @@ AUGMENTATIONS: Columns = {
     "missing": (_count("missing"), Dtype.WHOLE),
     "surplus": (_count("surplus"), Dtype.WHOLE),
     "displacement_mean_m": ("displacement.mean_m", Dtype.NUMBER),
-    **displacement.KEPT,
+    **displacement.kept_columns("kept_summary"),
     **Dtype.WHOLE.columns("wrong", "doubtful"),
     "calls": ("spending.calls", Dtype.WHOLE),
     "tokens": ("spending.tokens", Dtype.WHOLE),
