@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Final
 from xml.etree.ElementTree import Element
 
@@ -267,26 +267,32 @@ def _connect(network: RoadNetwork, first: Place, last: Place, place: str) -> Ite
     if road.id == goal.id and (to_m >= from_m) == (end == END):
         yield Leg(road=road, from_m=from_m, to_m=to_m)
         return
-    # By length, and in the order of finding: roads entered at an end, with the legs before.
+    # By length, and in the order of finding: roads entered at an end, with the legs before; the
+    # last leg has no end.
     queue: list[tuple[float, int, MapRoad, float, str, list[Leg]]]
     queue = [(0.0, 0, road, from_m, end, [])]
-    seen, number = set[tuple[str, str]](), 0
+    seen, numbers = set[tuple[str, str]](), count(1)
     while queue:
-        gone_m, _, road, from_m, end, before = heappop(queue)
+        gone_m, _, road, from_m, end, legs = heappop(queue)
+        if not end:
+            yield from legs
+            return
+        if (road.id, end) in seen:
+            continue
+        seen.add((road.id, end))
         leg = Leg(road=road, from_m=from_m, to_m=0.0 if end == START else road.line.length_m)
-        legs, gone_m = [*before, leg], gone_m + abs(leg.to_m - from_m)
+        legs, gone_m = [*legs, leg], gone_m + abs(leg.to_m - from_m)
         for name, met in network.list_exits(road, end) if gone_m < _LONGEST_M else ():
-            if (name, met) in seen:
-                continue
-            seen.add((name, met))
+            if name not in network.elements:
+                continue  # a map may be a part of a larger one
             following = network.road(name, place)
             enters_m = 0.0 if met == START else following.line.length_m
-            if name == goal.id:
-                yield from [*legs, Leg(road=following, from_m=enters_m, to_m=to_m)]
-                return
-            number += 1
             leaves = END if met == START else START
-            heappush(queue, (gone_m, number, following, enters_m, leaves, legs))
+            heappush(queue, (gone_m, next(numbers), following, enters_m, leaves, legs))
+            if name == goal.id:
+                there = [*legs, Leg(road=following, from_m=enters_m, to_m=to_m)]
+                there_m = gone_m + abs(to_m - enters_m)
+                heappush(queue, (there_m, next(numbers), following, enters_m, "", there))
     raise fault_at(place, f"no road leads from road {first[0].id} to road {goal.id}")
 
 
