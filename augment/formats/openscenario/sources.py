@@ -88,12 +88,13 @@ class ScenarioSource:
         if root.find("Storyboard") is None:
             raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
         self.root = resolve(root, {}, self.doubts)
-        if header is not None and header.get("description", "").startswith("CARLA:"):
-            self._mirror_places()
         for holder in [part for part in self.root.iter() if part.tag in _REFERRING]:
             for reference in holder.findall("CatalogReference"):
                 with self.doubts.about("references to catalogs"):
                     holder.append(self.resolve_reference(reference))
+        # Also those of catalogs.
+        if header is not None and header.get("description", "").startswith("CARLA:"):
+            self._mirror_places()
         for tag in _IGNORED:
             self.doubts.assume(f"{tag} was left out", len([*self.root.iter(tag)]))
         stops = len(self.root.findall(".//Act/StopTrigger//Condition"))
@@ -106,9 +107,10 @@ class ScenarioSource:
         """Turn world positions of CARLA's own frame, which counts y to the right, into ours."""
         worlds = [*self.root.iter("WorldPosition")]
         for world in worlds:
-            for name in ("y", "h"):
+            # Without a heading a vertex has that of the way on.
+            for name in sorted(world.attrib.keys() & {"y", "h"}):
                 with self.doubts.about("world positions"):
-                    value = foreign.read_number(world.get(name, 0.0), f"WorldPosition.{name}")
+                    value = foreign.read_number(world.get(name), f"WorldPosition.{name}")
                     world.set(name, repr(-value))
         self.doubts.assume("World positions are CARLA's, with y to the right", len(worlds) > 0)
 
