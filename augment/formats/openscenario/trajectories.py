@@ -44,6 +44,8 @@ def trace(
         foreign.look_up(dict.fromkeys(("absolute", "relative")), domain, f"{place}.Timing")
         scale, offset_s = (read_float(timing, n, place, default=d) for n, d in _TIMING.items())
         times_s = times_s * scale + offset_s
+        if (np.diff(times_s) < 0.0).any() or times_s[0] == times_s[-1]:
+            raise fault_at(place, "needs times that ascend")
     return np.array([find_middle(pose, centre_m) for pose in poses]), times_s
 
 
@@ -61,7 +63,11 @@ def _follow_vertices(
 ) -> tuple[list[Pose], FloatArray | None]:
     """Poses at vertices; without a heading, that of the way on."""
     vertices = list(action.iter("Vertex"))
-    if any(t.get("closed", "").lower() == "true" for t in action.iter("Trajectory")):
+    has_times = action.find("TimeReference/Timing") is not None and all(
+        "time" in vertex.attrib for vertex in vertices
+    )
+    is_closed = any(t.get("closed", "").lower() == "true" for t in action.iter("Trajectory"))
+    if is_closed and not has_times:  # nobody says when it would be back at its first
         vertices += vertices[:1]
     positions = [position for vertex in vertices for position in vertex.findall("Position")]
     if len(vertices) < 2 or len(positions) != len(vertices):
@@ -75,12 +81,11 @@ def _follow_vertices(
             poses[row] = replace(here, heading_rad=math.atan2(way[1], way[0]))
     if bare[-1]:
         poses[-1] = replace(poses[-1], heading_rad=poses[-2].heading_rad)
-    if any("time" not in vertex.attrib for vertex in vertices):
+    if not has_times:
         return poses, None
-    times_s = foreign.read_finite([v.get("time") for v in vertices], f"{place}.Vertex", 1)[:, 0]
-    if (times_s[1:] < times_s[:-1]).any():
-        raise fault_at(f"{place}.Vertex", "needs times that ascend")
-    return poses, times_s
+    return poses, foreign.read_finite([v.get("time") for v in vertices], f"{place}.Vertex", 1)[
+        :, 0
+    ]
 
 
 def _follow_clothoid(
@@ -92,7 +97,12 @@ def _follow_clothoid(
     length_m = read_float(spiral, "length", place, 0.01, LONGEST_M)
     first_pm = read_float(spiral, "curvature", place, -SHARPEST_PM, SHARPEST_PM)
     rate = "curvatureDot" if "curvatureDot" in spiral.attrib else "curvaturePrime"
-    last_pm = first_pm + length_m * read_float(spiral, rate, place, default=0.0)
+    last_pm = foreign.read_number(
+        first_pm + length_m * read_float(spiral, rate, place, default=0.0),
+        f"{place}: curvature at its end",
+        -SHARPEST_PM,
+        SHARPEST_PM,
+    )
     start = placer.find_pose(position, place)
     piece = LinePiece(start=start, length_m=length_m, curvatures_pm=(first_pm, last_pm))
     rows = piece.poses_at(np.linspace(0.0, length_m, math.ceil(length_m) + 1)).tolist()
