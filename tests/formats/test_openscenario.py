@@ -4,13 +4,17 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
 from augment.formats.apart import UntrustedInput
+from augment.formats.opendrive.network import START
 from augment.formats.openscenario.parameters import resolve_text
+from augment.formats.openscenario.positions import find_legs
 from augment.formats.openscenario.scenario import OpenScenario
 from augment.formats.openscenario.writer import write as write_scenarios
 from augment.formats.reading import Reading
@@ -28,6 +32,7 @@ from tests.formats.openscenario_files import (
     GAP,
     RIGHT,
     STEP,
+    TIMING,
     by_entity,
     by_time,
     catalog,
@@ -96,6 +101,36 @@ def test_world_positions_of_carlas_own_frame_are_mirrored(tmp_path: Path) -> Non
     reading = read(write(tmp_path, text.replace('y="-1.75"', 'y="1.75"')))
     assert pose_of_other(reading) == pytest.approx([50.0, -1.75, -0.5], abs=2e-3)
     assert any("World positions are CARLA's" in note for note in reading.notes)
+
+
+def test_a_vertex_of_carlas_own_frame_heads_along_the_way(tmp_path: Path) -> None:
+    place = '<Position><WorldPosition x="{}" y="{}"/></Position>'
+    ends = [place.format(60, 1.75), place.format(60, -38.25)]
+    vertices = "".join(f'<Vertex time="{5 * n}">{end}</Vertex>' for n, end in enumerate(ends))
+    text = scenario(event(FOLLOW.format(vertices, TIMING.format("relative"))))
+    text = text.replace("<FileHeader", '<FileHeader description="CARLA:Crossing"')
+    recording = read(write(tmp_path, text)).recording
+    assert recording is not None
+    assert recording.tracks[0].states[-1, 2] == pytest.approx(math.pi / 2.0, abs=2e-3)
+
+
+def test_the_shortest_way_is_taken_not_the_one_of_fewest_roads() -> None:
+    lengths_m = {"a": 100.0, "long": 900.0, "b": 10.0, "c": 10.0, "d": 50.0, "goal": 50.0}
+    exits = {"a": ["long", "b", "missing"], "long": ["d"], "b": ["c"], "c": ["d"], "d": ["goal"]}
+    roads: dict[str, Any] = {
+        name: SimpleNamespace(
+            id=name, line=SimpleNamespace(length_m=length_m), is_forward=lambda _: True
+        )
+        for name, length_m in lengths_m.items()
+    }
+    network: Any = SimpleNamespace(
+        elements=roads,
+        road=lambda name, _: roads[name],
+        list_exits=lambda road, _: [(name, START) for name in exits.get(road.id, ())],
+    )
+    legs = find_legs(network, [(roads["a"], 20.0, 0.0, -1), (roads["goal"], 5.0, 0.0, -1)], "way")
+    assert [leg.road.id for leg in legs] == ["a", "b", "c", "d", "goal"]
+    assert sum(leg.to_m - leg.from_m for leg in legs) == 155.0
 
 
 def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
@@ -223,6 +258,11 @@ def test_a_speed_may_be_relative(value: float, kind: str, mps: float, tmp_path: 
     assert agent.speed_mps == mps
 
 
+PLACE = '<Position><WorldPosition x="{}" y="1.75"/></Position>'
+SHARP = f'<Clothoid curvature="0" curvaturePrime="1e7" length="40">{PLACE.format(60)}</Clothoid>'
+TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in range(2))
+
+
 @pytest.mark.parametrize(
     ("made", "note"),
     [
@@ -240,6 +280,10 @@ def test_a_speed_may_be_relative(value: float, kind: str, mps: float, tmp_path: 
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "-3")))),
          "road 1.lane: unknown '-4'; known: 1, -1, -2"),
         (scenario(event(FOLLOW.format("", "<None/>"))), "or a Polyline of two vertices"),
+        (scenario(event(FOLLOW.format(TWO, TIMING.format("relative").replace('"1"', '"-1"')))),
+         "needs times that ascend"),
+        (scenario(event(FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", SHARP))),
+         "curvature at its end: expected a finite number from -10 to 10"),
         (scenario(event(speed("${bad + _ + $v}"))), "SpeedAction.value: expected a finite"),
         (scenario(event(speed("${bad + _ + $v}"))),
          "AbsoluteTargetSpeed.value: unknown parameter 'v'"),

@@ -187,6 +187,15 @@ def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path)
     assert other.started_s == pytest.approx(5.0, abs=0.01)
 
 
+@pytest.mark.parametrize("times_s", [(0, 5), (5, 0), ("", "")])
+def test_times_that_do_not_count_are_not_read(times_s: tuple[object, ...], tmp_path: Path) -> None:
+    at = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75" h="0"/></Position></Vertex>'
+    vertices = "".join(at.format(s, 80 + 40 * n) for n, s in enumerate(times_s))
+    action = event(FOLLOW.format(vertices, "<None/>"))
+    (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
+    assert other.states[50, 0] - other.states[0, 0] == pytest.approx(20.0, abs=0.02)
+
+
 def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
     place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
     shape = '<Clothoid curvature="{}" curvaturePrime="0" length="40">' + f"{place}</Clothoid>"

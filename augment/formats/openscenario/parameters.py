@@ -46,7 +46,8 @@ def resolve(
     """
 
     def read(text: str, place: str) -> str:
-        return doubts.read("parameters", resolve_text, text, values, place) or text
+        value = doubts.read("parameters", resolve_text, text, values, place)
+        return text if value is None else value
 
     for declared in element.findall("ParameterDeclarations/ParameterDeclaration"):
         name = declared.get("name", "").removeprefix("$")
