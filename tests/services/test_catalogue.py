@@ -180,9 +180,21 @@ def _move_to(at_m: float, entry: dict[str, Any]) -> None:
     entry["reference"]["add"][0]["x_m"] = at_m
 
 
-def hand_out(scenario: Scenario) -> None:
+def hand_out(scenario: Scenario, split: str = "test") -> None:
     benchmark = Benchmark.objects.create(slug="b", version=1, made_on=date(2026, 1, 1))
-    benchmark.items.create(scenario=scenario, position=1, split="test", stratum="easy")
+    benchmark.items.create(scenario=scenario, position=1, split=split, stratum="easy")
+
+
+@pytest.mark.parametrize(
+    ("split", "step"), [("test", CatalogueStep.CHANGED), ("practice", CatalogueStep.RENEWED)]
+)
+def test_an_intent_where_there_was_none_is_new_to_who_practises(
+    split: str, step: CatalogueStep, folder: Path
+) -> None:
+    load_catalogue(folder=folder)
+    assert Scenario.objects.exclude(intent=None).update(intent=None, intent_origin="") == 1
+    hand_out(Scenario.objects.get(), split)
+    assert load_catalogue(folder=folder).scenarios == {step: 1}
 
 
 @pytest.mark.parametrize("use", [augment, hand_out])

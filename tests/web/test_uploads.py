@@ -92,6 +92,7 @@ def test_the_ego_of_a_map_is_put_where_somebody_clicks(researcher: Client) -> No
     assert "unknown &#x27;9&#x27;; known: 1" in put("9,-1,5"), "a worker says so"
     for place in ("here", "1,-1", "1,-1,nan"):
         assert "no place; needs ROAD,LANE,S" in put(place) or "place: " in put(place)
+    assert "characters that print" in put("1\0,-1,5")
     assert "too long" in put(f"{'1' * 200},-1,5")
     send(researcher)
     upload = SceneUpload.objects.get(name="street.json")

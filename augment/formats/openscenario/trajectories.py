@@ -83,9 +83,8 @@ def _follow_vertices(
         poses[-1] = replace(poses[-1], heading_rad=poses[-2].heading_rad)
     if not has_times:
         return poses, None
-    return poses, foreign.read_finite([v.get("time") for v in vertices], f"{place}.Vertex", 1)[
-        :, 0
-    ]
+    times = [vertex.get("time") for vertex in vertices]
+    return poses, foreign.read_finite(times, f"{place}.Vertex", 1)[:, 0]
 
 
 def _follow_clothoid(

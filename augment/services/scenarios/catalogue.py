@@ -14,11 +14,12 @@ from typing import Any, TypeVar
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Q
+from django.db.models import Q, QuerySet
 
+from augment.benchmark.values import Split
 from augment.errors import Conflict, InvalidDocument, InvalidModification, check_names
 from augment.formats.documents import read_json
-from augment.models import Augmentation, BaseScene, Scenario
+from augment.models import Augmentation, BaseScene, BenchmarkItem, Scenario
 from augment.scene import codec
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
@@ -284,9 +285,11 @@ def _update_scenario(row: Scenario, wanted: dict[str, Any], actor: User | None) 
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
         return CatalogueStep.UNCHANGED
-    # An intent where there was none changes nothing that anybody was shown or asked.
+    # An intent where there was none changes nothing that anybody was shown, asked or handed out.
     seen = set(changed) - {"intent", "intent_origin"}
-    if (row.intent is not None or seen) and _is_in_use(row, wanted["follows"]):
+    of_practice = _handed_out(row).filter(split=Split.PRACTICE)
+    is_other = row.intent is not None or seen or of_practice.exists()
+    if is_other and _is_in_use(row, wanted["follows"]):
         return CatalogueStep.RENEWED
     image = {"original_image": ""} if seen else {}
     Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
@@ -299,6 +302,9 @@ def _is_in_use(row: Scenario, follows: Scenario | None) -> bool:
 
     What it follows comes before it, so it is written anew after a new version of that.
     """
-    handed_out = row.benchmark_items.filter(benchmark__retired_at=None)
     is_before = follows is not None and follows.pk > row.pk
-    return is_before or row.augmentations.exists() or handed_out.exists()
+    return is_before or row.augmentations.exists() or _handed_out(row).exists()
+
+
+def _handed_out(row: Scenario) -> QuerySet[BenchmarkItem]:
+    return BenchmarkItem.objects.filter(scenario=row, benchmark__retired_at=None)

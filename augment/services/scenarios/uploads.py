@@ -32,7 +32,7 @@ from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import draw_scene, store_as
 from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.texts import check_slug
+from augment.services.texts import check_slug, is_readable_line
 from augment.services.work import Lease, Settlement, WorkKind
 
 State = SceneUpload.State
@@ -260,12 +260,14 @@ def ask_for_place(upload: SceneUpload, place: str, *, actor: User | None = None)
 
     Raises:
         InvalidDocument: It is no place.
-        Conflict: The upload is no map alone.
+        Conflict: The upload is no map alone, or no name of a road has such characters.
     """
     # Locked, so that two places that are added at once are both kept.
     row = SceneUpload.objects.select_for_update().get(pk=upload.pk)
     if row.format != MAP_FORMAT:
         raise Conflict(f"“{row.name}” is no map alone: its ego is recorded.")
+    if not is_readable_line(place.strip()):
+        raise Conflict("A place has characters that print alone.")
     road, lane, s_m = parse_place(f"@{place.strip()}")
     item = f"@{road},{lane},{s_m:g}"
     if len(item) > LONGEST_ITEM:
