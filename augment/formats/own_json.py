@@ -60,7 +60,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
 
 def _recording(cell: Cell) -> Recording:
     """Return the part of a recording that a log contains, without assumptions."""
-    motion = cell.motion
+    motion = replace(cell, expected=None).motion  # what rules move was not recorded
     ego = motion.ego.states.copy()
     if motion.ego.source is not MotionSource.RECORDED:
         ego[1:] = np.nan  # written as null: nobody recorded it

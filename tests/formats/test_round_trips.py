@@ -14,7 +14,7 @@ from augment.formats.reading import Reading
 from augment.formats.roads import RADIUS_M
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
-from augment.scene.codec import modification_from_document
+from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import (
     AgentType,
     Lane,
@@ -275,6 +275,12 @@ def test_whom_interplans_rules_move_goes_out_so_and_who_is_never_there_is_named(
         "Agent2, Agent4, Agent5: goes as interPlan's rules move it beside this ego, for whom "
         "nobody brakes",
     } <= set(lines)
+
+
+def test_whom_interplans_rules_move_nobody_recorded() -> None:
+    files = writers.WRITERS["json"]([replace(ruled(), recording=RECORDING.ego_alone)]).files
+    (written,) = (text for name, text in files.items() if name.endswith(".recording.json"))
+    assert recording_from_document(json.loads(written)).tracks == ()
 
 
 def test_a_recorded_agent_that_is_given_a_motion_is_lost_in_interplan_by_name() -> None:
