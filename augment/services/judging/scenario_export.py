@@ -142,7 +142,8 @@ def export_rows(
             text = f"there is no modification: {row.state}"
             missing.append(Loss(cell=name, text=text, changes_scene=True))
             continue
-        cells.append(_cell(name, row, many=many))
+        # Interplan's own format says where things are, not how they move.
+        cells.append(_cell(name, row, many=many, moves=file_format != "interplan"))
         scenes[row.scenario.base_scene.slug] = row.scenario.base_scene
     if not cells:
         raise Conflict(f"{origin.name} has no modification that could be written.")
@@ -158,7 +159,7 @@ def export_rows(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
+def _cell(name: str, row: Augmentation, *, many: bool, moves: bool) -> Cell:
     scenario, scene = row.scenario, row.scenario.base_scene
     loaded, modification = LoadedScenario(scenario), modification_from_document(row.modification)
     source = None
@@ -173,7 +174,7 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
         recording=loaded.recording,
-        expected=loaded.expect_by_rules(modification),
+        expected=loaded.expect_by_rules(modification) if moves else None,
         augmentation=str(row.code),
         contestant=row.contestant.slug,
         source=source,
