@@ -52,7 +52,8 @@ def read_motion(
         with doubts.about("events"):
             draft.add(event)
         # Others may wait for somebody who moves so, and its own later events.
-        stage.follow(draft.move_agent())
+        stage.follow(draft.move_agent(Doubts()))
+    draft.move_agent(doubts)  # what breaks a bound is noted once
 
 
 class _Draft:
@@ -66,13 +67,13 @@ class _Draft:
         self._line: Polyline | None = None
         self._step = 0
 
-    def move_agent(self) -> TrafficAgent:
+    def move_agent(self, doubts: Doubts) -> TrafficAgent:
         """Return the agent with the motion so far."""
         if self.start is None or not (self.path or self.speeds):
             return self._agent
         motion = PlannedMotion(path=self.path, speeds=tuple(self.speeds), start=self.start)
         # What breaks a bound of motions is left out.
-        bounded = self._doubts.read("motions", _MOTION.from_parts, _MOTION.dump(motion))
+        bounded = doubts.read("motions", _MOTION.from_parts, _MOTION.dump(motion))
         return replace(self._agent, motion=bounded)
 
     def add(self, event: StoryEvent) -> None:
@@ -222,7 +223,8 @@ class _Draft:
         every = math.ceil(len(kept) / _MOST_POINTS)
         thinned = np.round([*kept[::every][: _MOST_POINTS - 1], kept[-1]], 4)
         self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
-        here = np.array([[self._here.x_m, self._here.y_m]])
+        begin = self._find_begin(place)
+        here = np.array([[begin.x_m, begin.y_m]])
         line = np.vstack([here, kept])
         self._line = Polyline(line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > 0.005)])
 
@@ -230,7 +232,7 @@ class _Draft:
         """Return where it is so far after its start."""
         if self._line is not None:
             return self._line.pose_at(gone_m)
-        here = self._here
+        here = self._find_begin(place)
         agent = replace(
             self._agent, x_m=here.x_m, y_m=here.y_m, heading_rad=here.heading_rad, lane_id=None
         )
@@ -238,6 +240,12 @@ class _Draft:
         if row is None:
             raise fault_at(place, "is past the map when it begins")
         return Pose(x_m=row[0], y_m=row[1], heading_rad=row[2])
+
+    def _find_begin(self, place: str) -> Pose:
+        """Return where it is at its start."""
+        if not math.isfinite(self._here.x_m):
+            raise fault_at(place, "is past the map when it begins")
+        return self._here
 
     def _follow(self, action: Element, at_s: float, place: str) -> float:
         middles, times_s = self._stage.trace(self._name, action, place, self._step_since(at_s))
