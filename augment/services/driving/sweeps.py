@@ -147,7 +147,6 @@ def write_values(scenario: Scenario, request: SweepRequest) -> dict[str, bytes]:
             modification=change,
             keeps_traffic=scenario.keep_traffic,
             recording=loaded.recording,
-            expected=loaded.expect_by_rules(change),
         )
         for value, change in map_changes(scenario, request).items()
         if isinstance(change, Modification)

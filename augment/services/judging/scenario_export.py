@@ -142,8 +142,9 @@ def export_rows(
             text = f"there is no modification: {row.state}"
             missing.append(Loss(cell=name, text=text, changes_scene=True))
             continue
-        # Interplan's own format says where things are, not how they move.
-        cells.append(_cell(name, row, many=many, moves=file_format != "interplan"))
+        # interPlan's format has no motion, and our own only what was recorded.
+        moves = file_format not in ("interplan", "json")
+        cells.append(_cell(name, row, many=many, moves=moves))
         scenes[row.scenario.base_scene.slug] = row.scenario.base_scene
     if not cells:
         raise Conflict(f"{origin.name} has no modification that could be written.")
