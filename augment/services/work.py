@@ -302,7 +302,7 @@ class WorkKind(ABC, Generic[Row]):
         except BudgetSpent as error:
             held.release(end=TryEnd.STOPPED, reason=str(error))
         except Exception as error:
-            if is_passing(error):
+            if isinstance(error, DatabaseLocked) or is_passing(error):
                 logger.warning("Gave %s back: %s", held, error)
                 wait_out(partial(held.release, reason=f"The database was locked: {error}"))
                 return False
