@@ -386,8 +386,9 @@ addEventListener("beforeunload", (event) => {
   if (isDirty) event.preventDefault();
 });
 new ResizeObserver(() => {
-  const [x, y, width] = stage.box;
-  stage.show([x, y, width, (width * svg.clientHeight) / (svg.clientWidth || 1)]);
+  const [x, y, width, height] = stage.box;
+  const seen = (width * svg.clientHeight) / (svg.clientWidth || 1);
+  stage.show([x, y + (height - seen) / 2, width, seen]);
   stage.draw(edit);
 }).observe(svg);
 
