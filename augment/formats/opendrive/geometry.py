@@ -150,7 +150,9 @@ def _read_piece(element: Element, place: str) -> LinePiece:
     start = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
     line = LinePiece(s_m=s_m, start=start, length_m=length_m)
     shape = next((child for child in element if child.tag != "userData"), None)
-    if shape is None or shape.tag == "line":
+    if shape is None:
+        raise fault_at(place, f"has no shape; allowed are line, {', '.join(_CURVATURES)}")
+    if shape.tag == "line":
         return line
     bounds = place, -SHARPEST_PM, SHARPEST_PM
     names = foreign.look_up(_CURVATURES, shape.tag, place)

@@ -232,8 +232,15 @@ def _list_connections(network: RoadNetwork, roads: Mapping[str, MapRoad]) -> Ite
             inner, incoming = roads.get(connecting), roads.get(connection.get("incomingRoad", ""))
             if inner is None or incoming is None:
                 continue
-            end = CONTACTS.get(connection.get("contactPoint", ""), START)
-            outer_end, place = _nearest_end(incoming, inner, end), f"junction {junction.get('id')}"
+            place, contact = (
+                f"junction {junction.get('id')}",
+                connection.get("contactPoint", "start"),
+            )
+            with network.doubts.about("connections of junctions"):
+                end = foreign.look_up(CONTACTS, contact, f"{place}.contactPoint")
+            if contact not in CONTACTS:
+                continue
+            outer_end = _nearest_end(incoming, inner, end)
             for link in connection.findall("laneLink"):
                 with network.doubts.about("links of junctions"):
                     outer, onto = (foreign.read_whole(link.get(n), place) for n in ("from", "to"))

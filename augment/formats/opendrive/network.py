@@ -247,17 +247,12 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
     ]
     is_flat = all(text.strip("+-0.eE") == "" for text in slopes)
     doubts.assume("A road's slopes and superelevation were left out: scenes are flat", not is_flat)
-    joined = ((link.find(end), end) for link in element.findall("link") for end in (START, END))
     junction = element.get("junction", "-1")
     return MapRoad(
         id=road_id,
         junction=None if junction == "-1" else junction,
         is_left_hand=foreign.look_up(_RULES, element.get("rule", "RHT"), f"{place}.rule"),
-        links={
-            end: (link.get("elementId", ""), CONTACTS.get(link.get("contactPoint", ""), ""))
-            for link, end in joined
-            if link is not None and link.get("elementType") == "road"
-        },
+        links=_read_links(element, place, doubts),
         line=line,
         lane_offset=PiecewiseCubic.read(
             element.findall("lanes/laneOffset"), "s", f"{place}.laneOffset"
@@ -269,6 +264,22 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
         limits=tuple(sorted(limits, key=lambda row: row[0])),
         element=element,
     )
+
+
+def _read_links(element: Element, place: str, doubts: Doubts) -> dict[str, tuple[str, str]]:
+    """Return the road at either end and the end at which it is entered, empty if none is said."""
+    links = {}
+    for end in (START, END):
+        for link in element.findall(f"link/{end}"):
+            with doubts.about("links of roads"):
+                kinds = {"road": True, "junction": False}
+                if foreign.look_up(kinds, link.get("elementType", ""), f"{place}.elementType"):
+                    contact = link.get("contactPoint", "")
+                    entered = foreign.look_up(
+                        {**CONTACTS, "": ""}, contact, f"{place}.contactPoint"
+                    )
+                    links[end] = link.get("elementId", ""), entered
+    return links
 
 
 def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLane]:
