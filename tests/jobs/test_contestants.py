@@ -209,6 +209,8 @@ def test_a_known_vendor_s_key_is_bound_without_being_told(settings: Any) -> None
     assert find_key_obstacle("OPENAI_API_KEY", vendor) == ""
     for other in ("http://api.openai.com/v1", "https://api.groq.com/openai/v1", LOCAL):
         assert "not bound to" in find_key_obstacle("OPENAI_API_KEY", other)
+    for plain in ("http://api.openai.com:443/v1", "HTTP://API.openai.com.:0443"):
+        assert "unencrypted" in find_key_obstacle("OPENAI_API_KEY", plain)
     settings.KEY_VARIABLES = ["OPENAI_API_KEY=proxy.example"]
     assert find_key_obstacle("OPENAI_API_KEY", "https://proxy.example/v1") == ""
     assert find_key_obstacle("OPENAI_API_KEY", vendor), "the proxy's key is not for the vendor"

@@ -67,7 +67,9 @@ def test_from_a_file_to_a_scene(researcher: Client) -> None:
     assert "picture" in researcher.get(page).content.decode()
 
 
-def test_the_ego_of_a_map_is_put_where_somebody_clicks(researcher: Client) -> None:
+def test_the_ego_of_a_map_is_put_where_somebody_clicks(
+    researcher: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shown = send(researcher, ROADS.encode(), "roads.xodr")
     upload = SceneUpload.objects.get()
     (moment,) = upload.moments.exclude(report=None)
@@ -94,6 +96,9 @@ def test_the_ego_of_a_map_is_put_where_somebody_clicks(researcher: Client) -> No
         assert "no place; needs ROAD,LANE,S" in put(place) or "place: " in put(place)
     assert "characters that print" in put("1\0,-1,5")
     assert "too long" in put(f"{'1' * 200},-1,5")
+    monkeypatch.setattr(uploads, "MOST_PLACES", upload.moments.count())
+    assert "places of this map are drawn already" in put("1,-2,301")
+    assert 'value="1,-2,300"' in put("1,-2,300"), "one of them"
     send(researcher)
     upload = SceneUpload.objects.get(name="street.json")
     assert "no map alone" in put("1,-2,300")

@@ -225,6 +225,8 @@ def find_key_obstacle(variable: str, base_url: str | None) -> str:
     if not variable or base_url is None:
         return ""
     server, hosts = host_and_port(base_url), _read_bindings().get(variable, "").split("|")
+    if server.endswith(":443") and base_url[:5].lower() == "http:":
+        return f"{variable} would go to {server} unencrypted: https is needed"
     # A host without a port stands for all of its ports; with two ports it is no address.
     anywhere = server[server.rfind(":") :]
     bound = {host_and_port(f"https://{host}{port}") for host in hosts for port in ("", anywhere)}

@@ -45,6 +45,8 @@ STRIP = 20
 """Moments of a recording that are drawn unasked, evenly spread over it."""
 MOST_STOPS = 2_000
 """Moments that are offered; later ones of a longer recording are not."""
+MOST_PLACES = 200
+"""Places of a map that are drawn, each a picture."""
 MAP_FORMAT = OpenDrive.name
 MAP_WINDOW = Camera(x_min_m=-120.0, x_max_m=120.0, y_min_m=-90.0, y_max_m=90.0, px_per_m=5.0)
 """Of a map's picture: wide, since the ego's place is chosen on it. Its corners are 150 m away."""
@@ -260,7 +262,8 @@ def ask_for_place(upload: SceneUpload, place: str, *, actor: User | None = None)
 
     Raises:
         InvalidDocument: It is no place.
-        Conflict: The upload is no map alone, or no name of a road has such characters.
+        Conflict: The upload is no map alone, has MOST_PLACES, or no road's name has such
+            characters.
     """
     # Locked, so that two places that are added at once are both kept.
     row = SceneUpload.objects.select_for_update().get(pk=upload.pk)
@@ -273,6 +276,8 @@ def ask_for_place(upload: SceneUpload, place: str, *, actor: User | None = None)
     if len(item) > LONGEST_ITEM:
         raise Conflict(f"That road's name is too long: at most {LONGEST_ITEM} characters.")
     if all(item != stop["item"] for track in row.tracks for stop in track["stops"]):
+        if row.moments.count() >= MOST_PLACES:
+            raise Conflict(f"{MOST_PLACES} places of this map are drawn already; send it anew.")
         row.tracks += _parts([Moment(item=item)])
         row.save(update_fields=["tracks"])
     return ask_for_moment(row, item, 0, actor=actor)
