@@ -47,7 +47,9 @@ def test_what_is_served_can_be_prepared_while_no_old_chart_can_be_deleted(
 
     prepare, err = "arena.management.commands.prepare", io.StringIO()
     monkeypatch.setattr(f"{prepare}.delete_computed", refuse)
-    for name in ("call_command", "compile_catalogue"):
-        monkeypatch.setattr(f"{prepare}.{name}", lambda *_, **__: None)
+    called: list[str] = []
+    monkeypatch.setattr(f"{prepare}.call_command", lambda name, **_: called.append(name))
+    monkeypatch.setattr(f"{prepare}.compile_catalogue", lambda: None)
     call_command("prepare", stderr=err)
+    assert called == ["migrate", "clearsessions", "collectstatic"]
     assert "Old charts stay: The storage of pictures failed" in err.getvalue()

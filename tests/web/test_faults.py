@@ -1,7 +1,8 @@
 """Pages of faults look like the product, and nothing on any page is inline."""
 
 import pytest
-from django.test import RequestFactory
+from django.test import Client, RequestFactory
+from pytest_django import DjangoAssertNumQueries
 
 from arena.config.faults import answer_broken
 from tests.web.cast import people, signed_in
@@ -12,6 +13,15 @@ def test_a_missing_page_is_said_in_the_products_own_words() -> None:
     answer = signed_in(people()["expert"]).get("/nowhere/")
     assert answer.status_code == 404
     assert "There is nothing here" in answer.content.decode()
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize("page", ["enrol", "i", "shared", "shared/boards", "api/v1/pictures"])
+def test_the_database_is_never_asked_for_what_postgresql_has_no_text_for(
+    page: str, django_assert_num_queries: DjangoAssertNumQueries
+) -> None:
+    with django_assert_num_queries(0):
+        assert Client().get(f"/{page}/a%00b/").status_code == 404
 
 
 @pytest.mark.django_db

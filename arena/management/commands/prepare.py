@@ -35,13 +35,14 @@ class Command(TerminalCommand):
 
     help = (
         "Apply migrations, add contestants that ask no model, collect the static files, compile "
-        "the German texts, redraw pictures of earlier versions, delete old charts."
+        "the German texts, redraw pictures of earlier versions, delete old charts and sessions."
     )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Apply and collect, one process after the other."""
         with _lock_database():
             call_command("migrate", interactive=False, verbosity=0)
+            call_command("clearsessions")
             ensure_builtin()
             settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
             call_command("collectstatic", interactive=False, verbosity=0)
