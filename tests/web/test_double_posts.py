@@ -24,6 +24,7 @@ from arena.shell import receipts
 from arena.site.api_urls import urlpatterns as OPERATIONS
 from arena.site.urls import urlpatterns as PAGES
 from arena.studies.services.opening import close_study
+from arena.studies.services.taking_part import set_enrolment
 from augment.models import (
     Augmentation,
     Benchmark,
@@ -40,11 +41,13 @@ from tests import entering, study_rows
 from tests.api.asking import error_of
 from tests.api.test_making import CAR, STREET
 from tests.api.tokens import secret_of
+from tests.board_rows import newcomer
 from tests.jobs.models import Model, add_llama, ran
 from tests.jobs.rows import add_scenario, only_row
 from tests.opening import open_study
 from tests.web.addresses import address
 from tests.web.cast import World, people, signed_in, world
+from tests.web.test_enrolments import RULES
 from tests.web.test_vote_uploads import FINE as VOTES
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow, pytest.mark.timeout(900)]
@@ -78,6 +81,8 @@ class Cast:
     def url(self, name: str) -> str:
         if name == "invite":
             return reverse(name, args=[self.open_study.code])
+        if name == "enrol":
+            return reverse(name, args=[self.open_study.enrolment.token])
         if name.endswith(("correct", "follow-up", "follow-ups")):
             return reverse(name, args=[self.answer.code])
         if name in ("faults", "job-simulate"):
@@ -113,16 +118,27 @@ class Cast:
             "benchmark-new": ({"benchmark": 1}, tasks | {"slug": "places", "title": "Places"}),
             "benchmark-write": ({"benchmarkfile": 1}, {}),
             "board-publish": ({"boardtable": 1}, {}),
+            "board-batch": (
+                {"study": 1},
+                {"newcomers": ["dot"], "experts": ["eva"], "votes_per_expert": "4"},
+            ),
             "contestant-new": (
                 {"contestant": 1},
                 {"model": "local|llama3.1", "variant": "fc", "slug": "newest"},
             ),
             "correct": ({"augmentation": 1, "generationjob": 1}, {"modification": moved}),
+            "enrol": (
+                {"enrolledvoter": 1, "user": 1},
+                {
+                    **{"external_id": "w-1", "agreed": "on"},
+                    "agreed_sha256": self.open_study.enrolment.consent_sha256,
+                },
+            ),
             "endpoint-model-new": ({"endpointmodel": 1, "probe": 1}, {"model": "newest"}),
             "endpoint-probe": ({"probe": 1}, {}),
             "faults": ({"labellinground": 1}, {"name": "Faults", "experts": "eva", "seed": "1"}),
             "import-votes": ({"study": 1}, {"name": "Elsewhere", "file": ("votes.csv", VOTES)}),
-            "invite": ({"invitation": 2}, {}),
+            "invite": ({"invitation": 3}, {}),
             "job-simulate": ({"simulation": 3}, {}),
             "results-share": ({"sharedrating": 1}, {}),
             "scenarios-bulk": ({"scenario": 1}, {"file": ("rows.csv", rows)}),
@@ -202,11 +218,14 @@ def cast() -> Cast:
     upload = keep_upload(name="street.json", content=ContentFile(STREET), source="")
     UPLOADS.perform(upload.pk)
     upload.moments.all().delete()  # reading asked for the first
+    second = open_study(**Cast.study() | {"name": "Second", "experts": ["eva", "finn"]})
+    set_enrolment(study=second, rules=RULES)
+    newcomer("dot")
     return Cast(
         here=here,
         answer=answer,
         ranged=ranged,
-        open_study=open_study(**Cast.study() | {"name": "Second", "experts": ["eva", "finn"]}),
+        open_study=second,
         streets=make_benchmark(
             BenchmarkRequest(slug="streets", title="Streets", scenarios=["far"])
         ),
@@ -268,14 +287,18 @@ def test_every_form_counts_once(cast: Cast, admin: Client) -> None:
         name, url = pattern.name or "", cast.url(pattern.name or "")
         expected, body = forms.pop(name, ({}, {}))
 
-        def send(url: str = url, body: Body = body, token: str = f"{number:064d}") -> Any:
+        def send(
+            url: str = url, body: Body = body, token: str = f"{number:064d}", name: str = name
+        ) -> Any:
             client = Client(raise_request_exception=False)
-            client.cookies = admin.cookies
+            if name != "enrol":
+                client.cookies = admin.cookies
             return client.post(url, as_files(body) | {"csrfmiddlewaretoken": token})
 
         if name not in ("logout", "edit-check"):  # which sends JSON and makes nothing
             answers, made = send_thrice(send)
             check_growth(name, made, expected, answers)
+            assert name != "enrol" or {answer.status_code for answer in answers} == {302}
     assert not forms
 
 

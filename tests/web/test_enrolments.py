@@ -128,6 +128,20 @@ def test_who_comes_again_from_prolific_goes_on_at_that_device_alone(enrolment: E
     assert "Go on here" not in stranger.get(url + FROM_PROLIFIC).content.decode()
 
 
+def test_a_form_whose_answer_was_lost_lets_its_sender_in_when_it_is_sent_again(
+    enrolment: Enrolment,
+) -> None:
+    sent = {"csrfmiddlewaretoken": 64 * "x"}
+    assert join(Client(), enrolment, **sent) == 302
+    client = Client()
+    assert join(client, enrolment, csrfmiddlewaretoken=64 * "y") == 422, "another form"
+    assert join(client, enrolment, **sent) == 302
+    ballot = reverse("vote", args=[enrolment.study.code])
+    assert (client.get(ballot).status_code, enrolment.voters.count()) == (200, 1)
+    User.objects.filter(enrolled__isnull=False).update(is_active=False)
+    assert join(Client(), enrolment, **sent) == 404
+
+
 @pytest.mark.parametrize(
     ("text", "status"),
     [

@@ -19,9 +19,20 @@ from arena.exports.formats import attach
 from arena.models import Enrolment, Study
 from arena.people import links, services
 from arena.people.pages import find_account, link_page, show_new_links, with_own_language
-from arena.shell.access import ADMIN, BACKEND, GONE, act_for, form_for, get_user, page_for
+from arena.shell.access import (
+    ADMIN,
+    BACKEND,
+    CREATED,
+    CSRF_FIELD,
+    GONE,
+    act_for,
+    form_for,
+    get_user,
+    page_for,
+)
 from arena.shell.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.shell.listing import read_page
+from arena.shell.receipts import StoredAnswer, answer_once, digest_body
 from arena.studies.forms import AuthorForm
 from arena.studies.queries import expert_lines, state_of
 from arena.studies.services.planning import Planning
@@ -231,14 +242,10 @@ def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) ->
     form = NewcomerForm(request.POST or None, initial=ids)
     is_over = not enrolment.is_open or enrolment.study.state != Study.State.OPEN
     if form.is_valid():
+        ids |= {name: form.cleaned_data[name] for name in ("external_id", "agreed_sha256")}
         with refusals_in(form, "external_id"):
             try:
-                voter = enrol(
-                    token=enrolment.token,
-                    agreed_sha256=form.cleaned_data["agreed_sha256"],
-                    **ids | {"external_id": form.cleaned_data["external_id"]},
-                )
-                return _sign_in(request, voter.expert, enrolment.study)
+                return _sign_in(request, _enrol_once(request, enrolment, ids), enrolment.study)
             except EnrolmentOver:
                 is_over = True
         enrolment.refresh_from_db()
@@ -247,6 +254,21 @@ def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) ->
     pairs = Planning.begin(enrolment.study).count_pairs(enrolment.votes_each)
     context = {"enrolment": enrolment, "form": form, "pairs": pairs}
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
+
+
+def _enrol_once(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) -> User:
+    """Take somebody on; the same form again is the same newcomer, whose first answer was lost."""
+    made = digest_body(ids)
+    enrolled = answer_once(
+        f"enrol {enrolment.token} {request.POST.get(CSRF_FIELD) or uuid.uuid4()} {made}",
+        made,
+        lambda: enrol(token=enrolment.token, **ids),
+        lambda voter: (CREATED, str(voter.expert_id).encode()),
+    )
+    if not isinstance(enrolled, StoredAnswer):
+        return enrolled.expert
+    accounts = User.objects.select_related("person").filter(pk=int(enrolled.content))
+    return get_object_or_404(accounts, is_active=True)
 
 
 @form_for(ADMIN)
