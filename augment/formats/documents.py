@@ -184,13 +184,16 @@ def _not_plain(where: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_xml(path: Path, *, what: str) -> ET.Element:
-    """Return the root of an XML file.
+    """Return the root of an XML file; names are without a namespace.
 
     Raises:
         InvalidDocument: The file is not there, is no XML, or has a document type.
     """
     try:
-        return ET.XML(path.read_bytes(), parser=ET.XMLParser(target=_NoDoctype()))
+        root: ET.Element = ET.XML(path.read_bytes(), parser=ET.XMLParser(target=_NoDoctype()))
+        for element in root.iter() if root.tag.startswith("{") else ():
+            element.tag = element.tag.rpartition("}")[2]
+        return root
     except OSError as fault:
         problem = fault.strerror or str(fault)
     except (ET.ParseError, LookupError, ValueError) as fault:

@@ -68,9 +68,20 @@ def test_an_ego_can_be_put_at_every_place_that_a_map_names(seed: int, tmp_path: 
     origin = first.scene.origin.pose
     assert len(first.places) >= 2
     for lane, rows in first.places.items():
-        s_m, *middle = rows[len(rows) // 2]
-        put = read(file, f"@{lane},{s_m}").scene.origin.pose
-        assert math.dist(origin.to_local(np.array([[put.x_m, put.y_m]]))[0], middle) < 0.1, lane
+        for s_m, *middle in (rows[0], rows[len(rows) // 2], rows[-1]):
+            put = read(file, f"@{lane},{s_m}").scene.origin.pose
+            place = origin.to_local(np.array([[put.x_m, put.y_m]]))[0]
+            assert math.dist(place, middle) < 0.1, lane
+
+
+def test_an_ego_can_be_put_at_both_ends_of_a_lane(tmp_path: Path) -> None:
+    outer = f'<lane id="-2" type="driving">{WIDTH}</lane>'
+    first, second = (LANES.format(width=WIDTH, outer=part) for part in ("", outer))
+    text = by_hand(lanes=first + second.replace('s="0"', 's="33.36"', 1))
+    rows = read_text(tmp_path, text).places["1,-2"]
+    for s_m in (rows[0][0], rows[-1][0]):
+        assert read_text(tmp_path, text, f"@1,-2,{s_m}").scene.lanes
+    assert (rows[0][0], rows[-1][0]) == pytest.approx((33.36, 100.0), abs=0.002)
 
 
 SIGNAL = (
@@ -105,6 +116,7 @@ def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
         ({"width": '<border sOffset="0" a="-3" b="0" c="0" d="0"/>', "x": "0"}, "width_m=3.0"),
         ({"outer": f'<lane id="-2" type="bus">{WIDTH}</lane>'}, "right_neighbor='Lane2'"),
         ({"offset": '<laneOffset s="0" a="1" b="0" c="0" d="0"/>'}, "y_m=-0.75"),
+        ({"offset": '<laneOffset s="80" a="0" b="0" c="0.01" d="0"/>'}, "y_m=-1.75"),
         ({"shape": '<poly3 a="0" b="0" c="0.001" d="0"/>'}, "y_m=0.7"),
         ({"more": 'rule="LHT"'}, "heading_rad=3.14"),
     ],
@@ -154,6 +166,25 @@ def test_a_crosswalk_is_an_area_whatever_its_outline(outline: str, tmp_path: Pat
     assert any("object tree" in note for note in reading.notes)
 
 
+def test_each_outline_of_an_object_is_an_area(tmp_path: Path) -> None:
+    corner = '<cornerRoad s="{}" t="{}"/>'
+    outlines = (
+        "".join(corner.format(s + ds, t) for ds, t in ((0, -4), (3, -4), (3, 4), (0, 4)))
+        for s in (20, 60)
+    )
+    parts = "".join(f"<outline>{outline}</outline>" for outline in outlines)
+    end = f'<objects><object type="crosswalk" s="0" t="0">{parts}</object></objects>'
+    text = by_hand(end=end).replace("<OpenDRIVE>", '<OpenDRIVE xmlns="http://asam.net/odr">')
+    areas = read_text(tmp_path, text).scene.areas
+    assert sorted(min(x for x, _ in area.boundary_m) for area in areas) == [-30.0, 10.0]
+
+
+PARKED = (
+    '<object type="parkingSpace" s="9" t="5" length="5" width="2"><repeat s="9" length="30" '
+    'distance="6"/></object>'
+)
+
+
 @pytest.mark.parametrize(
     ("parts", "note"),
     [
@@ -174,6 +205,14 @@ def test_a_crosswalk_is_an_area_whatever_its_outline(outline: str, tmp_path: Pat
                   'contactPoint="mid"/></junction>'}, "junction 5.contactPoint: unknown 'mid'"),
         ({"end": SIGNAL.replace('"+"', '"-"')}, "A light governs no way"),
         ({"header": '<offset x="0.0" y="-7" z="0" hdg="0"/>'}, "The header's offset was left out"),
+        ({"type": '<type s="0"/><type s="40"><speed max="9"/></type>'}, "A limit that begins within"),
+        ({"width": f'{WIDTH}<speed sOffset="9" max="7"/>'}, "A limit that begins within"),
+        ({"outer": f'<lane id="-2" type="bus" direction="reversed">{WIDTH}</lane>'},
+         "A lane's direction was left out"),
+        ({"lanes": LANES.format(width=WIDTH, outer="").replace(" s=", ' singleSide="true" s=')},
+         "ended the lanes of the other"),
+        ({"end": f'<objects><tunnel id="1"/>{PARKED}</objects>'}, "object tunnel"),
+        ({"end": f'<objects>{PARKED}</objects>'}, "An object that is repeated was laid once"),
     ],
 )  # fmt: skip
 def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: Path) -> None:

@@ -68,11 +68,11 @@ class PiecewiseCubic:
         return cls(starts_m=numbers[:, 0], rows=numbers[:, 1:])
 
     def values_at(self, s_m: FloatArray) -> FloatArray:
-        """Return the values (N,) at stations, 0 where the profile has no cubic at all."""
+        """Return the values (N,) at stations, before the first cubic its start's; 0 without any."""
         if not len(self.rows):
             return np.zeros(len(s_m))
         row = np.maximum(np.searchsorted(self.starts_m, s_m + 1e-9, side="right") - 1, 0)
-        since_m, (a, b, c, d) = s_m - self.starts_m[row], self.rows[row].T
+        since_m, (a, b, c, d) = np.maximum(s_m - self.starts_m[row], 0.0), self.rows[row].T
         return np.asarray(a + since_m * (b + since_m * (c + since_m * d)))
 
 

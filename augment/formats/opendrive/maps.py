@@ -65,13 +65,14 @@ def map_around(
     for road in roads:
         for number, section in enumerate(road.sections):
             areas += _lay_section(road, number, section, segments, left_out)
-        things = ((road, element) for element in road.element.findall("objects/object"))
-        kept = [row for row in things if row[1].get("type") in AREA_OBJECTS]
-        areas += network.doubts.read_all("objects", _read_area, kept)
-        others = road.element.findall("objects/object")
-        left_out.update(
-            f"object {o.get('type')}" for o in others if o.get("type") not in AREA_OBJECTS
-        )
+        for element in road.element.findall("objects/*"):
+            kind = element.get("type") if element.tag == "object" else element.tag
+            if kind in AREA_OBJECTS:
+                areas += network.doubts.read("objects", _read_areas, road, element) or ()
+                is_repeated = element.find("repeat") is not None
+                network.doubts.assume("An object that is repeated was laid once", is_repeated)
+            else:
+                left_out[f"object {kind}"] += 1
     following = _join(network, {road.id: road for road in roads}, segments)
     governing = _find_lights(network, roads, segments, following, left_out)
     shown = {
@@ -170,22 +171,24 @@ def _thin(points: FloatArray) -> FloatArray:
     )
 
 
-def _read_area(road: MapRoad, element: Element) -> tuple[AreaKind, FloatArray]:
-    """Return the outline of an object in the map's frame."""
-    place = f"road {road.id}.object {element.get('id', '')[:20]}"
-    own_s_m, own_t_m = (read_float(element, name, place) for name in "st")
-    corners = [[read_float(c, name, place) for name in "st"] for c in element.iter("cornerRoad")]
-    if corners:
-        s_m, t_m = np.array(corners).T
-        return AREA_OBJECTS[element.get("type", "")], road.places_at(s_m, t_m)[:, :2]
-    local = [[read_float(c, name, place) for name in "uv"] for c in element.iter("cornerLocal")]
-    if not local:
-        half_m = [read_float(element, n, place, 0.0) / 2.0 for n in ("length", "width")]
-        local = [[x * half_m[0], y * half_m[1]] for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-    turn_rad = foreign.read_number(element.get("hdg", "0"), f"{place}.hdg")
-    x_m, y_m, heading_rad = road.places_at(np.array([own_s_m]), np.array([own_t_m]))[0].tolist()
-    pose = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad + turn_rad)
-    return AREA_OBJECTS[element.get("type", "")], pose.to_parent(np.array(local))
+def _read_areas(road: MapRoad, element: Element) -> Areas:
+    """Return the outlines of an object in the map's frame; of one without, its box."""
+    kind, place = AREA_OBJECTS[element.get("type", "")], f"road {road.id}"
+    place += f".object {element.get('id', '')[:20]}"
+    pose = road.pose_at(*(read_float(element, name, place) for name in "st"))
+    pose = pose.turn(read_float(element, "hdg", place, default=0.0))
+    areas = Areas()
+    for outline in [*element.iter("outline")] or [element]:
+        corners = [[read_float(c, n, place) for n in "st"] for c in outline.iter("cornerRoad")]
+        local = [[read_float(c, n, place) for n in "uv"] for c in outline.iter("cornerLocal")]
+        if corners:
+            areas.append((kind, road.places_at(*np.array(corners).T)[:, :2]))
+            continue
+        if not local:
+            u_m, v_m = (read_float(element, n, place, 0.0) / 2.0 for n in ("length", "width"))
+            local = [[u_m, v_m], [-u_m, v_m], [-u_m, -v_m], [u_m, -v_m]]
+        areas.append((kind, pose.to_parent(np.array(local))))
+    return areas
 
 
 # Joints

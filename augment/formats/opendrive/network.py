@@ -28,6 +28,7 @@ DRIVEN = (
 LIGHT_TYPES = ("1000001", "1000009", "1000010", "1000011", "1000012", "1000016")
 """Signals that are lights for cars."""
 UNLIMITED = (None, "no limit", "undefined")
+LIMIT_CHANGES = "A limit that begins within a part of a lane was left out"
 START, END = "predecessor", "successor"
 """The ends of a road or lane, as links call them."""
 CONTACTS = {"start": START, "end": END}
@@ -130,10 +131,10 @@ class MapRoad:
         right_m, left_m = foreign.look_up(edges, lane_id, f"{place}.lane")
         return self.pose_at(s_m, float((right_m + left_m)[0]) / 2.0 + offset_m, lane_id)
 
-    def pose_at(self, s_m: float, t_m: float, lane_id: int = -1) -> Pose:
-        """Return the pose at a place of the road, in the direction of travel of a lane."""
+    def pose_at(self, s_m: float, t_m: float, lane_id: int | None = None) -> Pose:
+        """Return the pose at a place, along the road or in the direction of travel of a lane."""
         x_m, y_m, heading_rad = self.places_at(np.array([s_m]), np.array([t_m]))[0].tolist()
-        turn_rad = 0.0 if self.is_forward(lane_id) else np.pi
+        turn_rad = 0.0 if lane_id is None or self.is_forward(lane_id) else np.pi
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad + turn_rad))
 
     def limit_at(self, s_m: float) -> float | None:
@@ -232,6 +233,8 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
         text = f"has {len(sections)} lane sections; 1 to {MOST_SECTIONS} are read"
         raise fault_at(place, text)
     starts = [read_float(section, "s", place, 0.0, LONGEST_M) for section in sections]
+    halves = sum(section.get("singleSide") in ("true", "1") for section in sections)
+    doubts.assume("A lane section of one side ended the lanes of the other", halves)
     ends = [*starts[1:], line.length_m]
     if sorted(starts) != starts:
         raise fault_at(f"{place}.laneSection", "lane sections need starts that ascend")
@@ -239,6 +242,7 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
     for kind in element.findall("type"):
         limit = _read_limit(kind.find("speed"), place, doubts)
         limits.append((read_float(kind, "s", place), limit))
+    doubts.assume(LIMIT_CHANGES, len({s_m for s_m, _ in limits if s_m > 0.01}.difference(starts)))
     slopes = [
         row.get(name, "0")
         for path, names in (("elevationProfile/*", "bcd"), ("lateralProfile/*", "abcd"))
@@ -288,7 +292,11 @@ def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLa
         for element in section.findall(f"{side}/lane"):
             number = foreign.read_whole(element.get("id"), f"{road}.{side}.lane", least, most)
             place = f"{road}.lane {number}"
-            widths = element.findall("width")
+            widths, speeds = element.findall("width"), element.findall("speed")
+            changes = [s for s in speeds if read_float(s, "sOffset", place, default=0.0) > 0.0]
+            doubts.assume(LIMIT_CHANGES, len(changes))
+            is_odd = element.get("direction", "standard") != "standard"
+            doubts.assume("A lane's direction was left out: it is that of its side", is_odd)
             lanes[number] = RoadLane(
                 kind=element.get("type", "none"),
                 widths=PiecewiseCubic.read(widths or element.findall("border"), "sOffset", place),
@@ -300,7 +308,7 @@ def _read_lanes(section: Element, road: str, doubts: Doubts) -> dict[int, RoadLa
                     )
                     for end in (START, END)
                 },
-                speed_limit_mps=_read_limit(element.find("speed"), place, doubts),
+                speed_limit_mps=_read_limit(speeds[0] if speeds else None, place, doubts),
             )
     return lanes
 

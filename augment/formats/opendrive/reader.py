@@ -91,7 +91,9 @@ def _list_places(
     places = defaultdict[str, list[tuple[float, float, float]]](list)
     for road in network.roads_near(ego.x_m, ego.y_m, reach_m):
         for section in road.sections:
-            s_m = np.arange(section.start_m, section.end_m, PLACES_EVERY_M).round(1)
+            s_m = np.arange(section.start_m, section.end_m, PLACES_EVERY_M)
+            # Within the section after rounding, at its very end too.
+            s_m = np.append(s_m + 0.0005, section.end_m - 0.001).round(3)
             for lane_id, (right_m, left_m) in road.edges_at(section, s_m).items():
                 if section.lanes[lane_id].is_driven:
                     middle = road.places_at(s_m, (right_m + left_m) / 2.0)[:, :2]

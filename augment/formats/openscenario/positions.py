@@ -146,7 +146,7 @@ class PositionReader:
             lane_id = foreign.read_whole(inside.get(name), f"{place}.{name}")
             return road.lane_pose(lane_id, s_m, _number(inside, "laneOffset"))
         pose = road.pose_at(s_m, read_float(inside, name, place))
-        return pose if is_along == road.is_forward(-1) else pose.turn(math.pi)
+        return pose if is_along else pose.turn(math.pi)
 
     def find_waypoints(self, holder: Element, place: str) -> list[Place]:
         """Return where the waypoints of a route lie."""

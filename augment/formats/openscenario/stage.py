@@ -102,7 +102,6 @@ class Stage:
                     raise fault_at(place, f"{other[:40]} is on another road, {theirs.id[:20]}")
             # To the left of where it heads.
             is_along = math.cos(own.heading_rad - road.pose_at(s_m, 0.0).heading_rad) > 0.0
-            is_along = is_along == road.is_forward(-1)
             number = step_lanes(lane_id, number if is_along else -number)
         return self._origin.pose_to_local(road.lane_pose(number, s_m))
 
