@@ -28,6 +28,7 @@ from tests.formats.openscenario_files import (
     BRAKES,
     CAR,
     CHANGE,
+    EGO_AT,
     FOLLOW,
     GAP,
     RIGHT,
@@ -133,19 +134,60 @@ def test_the_shortest_way_is_taken_not_the_one_of_fewest_roads() -> None:
     assert sum(leg.to_m - leg.from_m for leg in legs) == 155.0
 
 
-def test_a_position_goes_on_along_the_next_road(tmp_path: Path) -> None:
-    joined = '<link><{} elementType="road" elementId="{}" contactPoint="{}"/></link>'
-    width = f'<link><predecessor id="-1"/><successor id="-1"/></link>{WIDTH}'
-    second = ROAD.format(
-        **{"id": "2", "junction": "-1", "x": "100", "shape": "<line/>", "more": "", "type": ""},
-        **{"offset": "", "end": "", "lanes": LANES.format(width=width, outer="")},
-        link=joined.format("predecessor", "1", "end"),
-    )
-    first = joined.format("successor", "2", "start")
-    roads = by_hand(width=width, link=first, rest=second)
-    text = scenario(other_at='<RelativeLanePosition entityRef="Ego" dLane="0" ds="95"/>')
+JOINED = '<link><{} elementType="road" elementId="{}" contactPoint="{}"/></link>'
+LINKED = f'<link><predecessor id="{{0}}"/><successor id="{{0}}"/></link>{WIDTH}'
+
+
+def second_road(contact: str, hdg: str, x: str, lane: str) -> str:
+    """Two roads of 100 m, the second met at one of its ends."""
+    parts = {"id": "2", "junction": "-1", "x": x, "shape": "<line/>", "more": "", "type": ""}
+    lanes = LANES.format(width=LINKED.format(lane), outer="")
+    end = "predecessor" if contact == "start" else "successor"
+    link = JOINED.format(end, "1", "end")
+    second = ROAD.format(**parts, offset="", end="", lanes=lanes, link=link)
+    first = JOINED.format("successor", "2", contact)
+    turned = second.replace('hdg="0"', f'hdg="{hdg}"')
+    return by_hand(width=LINKED.format(lane), link=first, rest=turned)
+
+
+def renumbered() -> str:
+    """A road of 100 m on which a lane begins at 50 m beside the middle, 2 m wide."""
+    link = f'<link><successor id="-2"/></link>{WIDTH}'
+    first = f'<right><lane id="-1" type="driving">{link}</lane></right>'
+    begins = f'<lane id="-1" type="driving">{WIDTH.replace("3.5", "2")}</lane>'
+    second = f'<right>{begins}<lane id="-2" type="driving">{WIDTH}</lane></right>'
+    return by_hand(lanes=f'<laneSection s="0">{first}</laneSection>'
+                         f'<laneSection s="50">{second}</laneSection>')  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("roads", "position", "expected"),
+    [
+        (second_road("start", "0", "100", "-1"),
+         '<RelativeLanePosition entityRef="Ego" dLane="0" ds="95"/>', (115.0, -1.75, 0.0)),
+        (second_road("end", "3.14159265", "200", "1"),
+         '<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="95"/>', (115.0, -1.75, 0.0)),
+        (second_road("end", "3.14159265", "200", "1"),
+         '<RelativeRoadPosition entityRef="Ego" ds="95" dt="1"/>', (115.0, -0.75, 0.0)),
+        (renumbered(), '<RelativeLanePosition entityRef="Ego" dLane="0" ds="60"/>',
+         (80.0, -3.75, 0.0)),
+        # 40 m along the lane, which lies 1.75 m outside of a circle of 50 m.
+        (by_hand(shape='<arc curvature="0.02"/>'),
+         '<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="40"/>',
+         (51.75 * math.sin(0.4 + 40 / 51.75), 50.0 - 51.75 * math.cos(0.4 + 40 / 51.75),
+          0.4 + 40 / 51.75)),
+        (by_hand(more='rule="LHT"'), '<RoadPosition roadId="1" s="60" t="-3"/>',
+         (60.0, -3.0, 0.0)),
+    ],
+)  # fmt: skip
+def test_a_position_is_counted_along_its_roads(
+    roads: str, position: str, expected: tuple[float, ...], tmp_path: Path
+) -> None:
+    text = scenario(other_at=position)
+    if "arc" in roads:
+        text = text.replace(EGO_AT, '<LanePosition roadId="1" laneId="-1" s="20"/>')
     file = write(tmp_path, text, **{"roads.xodr": roads})
-    assert pose_of_other(read(file)) == pytest.approx([115.0, -1.75, 0.0], abs=2e-3)
+    assert pose_of_other(read(file)) == pytest.approx(expected, abs=2e-3)
 
 
 def test_a_place_on_a_route_lies_past_a_junction(tmp_path: Path) -> None:

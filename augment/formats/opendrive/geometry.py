@@ -68,7 +68,7 @@ class PiecewiseCubic:
         return cls(starts_m=numbers[:, 0], rows=numbers[:, 1:])
 
     def values_at(self, s_m: FloatArray) -> FloatArray:
-        """Return the values (N,) at stations, before the first cubic its start's; 0 without any."""
+        """Return the values (N,) at stations, the first before the first cubic; 0 without any."""
         if not len(self.rows):
             return np.zeros(len(s_m))
         row = np.maximum(np.searchsorted(self.starts_m, s_m + 1e-9, side="right") - 1, 0)

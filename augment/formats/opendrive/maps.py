@@ -175,8 +175,8 @@ def _read_areas(road: MapRoad, element: Element) -> Areas:
     """Return the outlines of an object in the map's frame; of one without, its box."""
     kind, place = AREA_OBJECTS[element.get("type", "")], f"road {road.id}"
     place += f".object {element.get('id', '')[:20]}"
-    pose = road.pose_at(*(read_float(element, name, place) for name in "st"))
-    pose = pose.turn(read_float(element, "hdg", place, default=0.0))
+    s_m, t_m = (read_float(element, name, place) for name in "st")
+    pose = road.pose_at(s_m, t_m).turn(read_float(element, "hdg", place, default=0.0))
     areas = Areas()
     for outline in [*element.iter("outline")] or [element]:
         corners = [[read_float(c, n, place) for n in "st"] for c in outline.iter("cornerRoad")]

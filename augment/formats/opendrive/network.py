@@ -28,7 +28,7 @@ DRIVEN = (
 LIGHT_TYPES = ("1000001", "1000009", "1000010", "1000011", "1000012", "1000016")
 """Signals that are lights for cars."""
 UNLIMITED = (None, "no limit", "undefined")
-LIMIT_CHANGES = "A limit that begins within a part of a lane was left out"
+LIMIT_CHANGES = "A limit that begins in a section was left out"
 START, END = "predecessor", "successor"
 """The ends of a road or lane, as links call them."""
 CONTACTS = {"start": START, "end": END}
@@ -271,7 +271,7 @@ def _read_road(element: Element, doubts: Doubts) -> MapRoad:
 
 
 def _read_links(element: Element, place: str, doubts: Doubts) -> dict[str, tuple[str, str]]:
-    """Return the road at either end and the end at which it is entered, empty if none is said."""
+    """Return the road at either end and the end at which it is entered, as far as said."""
     links = {}
     for end in (START, END):
         for link in element.findall(f"link/{end}"):
@@ -279,9 +279,7 @@ def _read_links(element: Element, place: str, doubts: Doubts) -> dict[str, tuple
                 kinds = {"road": True, "junction": False}
                 if foreign.look_up(kinds, link.get("elementType", ""), f"{place}.elementType"):
                     contact = link.get("contactPoint", "")
-                    entered = foreign.look_up(
-                        {**CONTACTS, "": ""}, contact, f"{place}.contactPoint"
-                    )
+                    entered = foreign.look_up(CONTACTS, contact, f"{place}.contactPoint")
                     links[end] = link.get("elementId", ""), entered
     return links
 

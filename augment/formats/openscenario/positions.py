@@ -24,8 +24,12 @@ from augment.geometry.frames import Pose, difference, wrap
 
 _REACH_M: Final = 30.0
 """So far from a reference line a place can be on its road."""
-_MOST_ROADS = 200
+_MOST_PARTS = 1_000
 """A way along roads that is longer is none."""
+_STEP_M = 0.25
+"""Lanes are measured by steps so long."""
+_MOST_OPEN = 100
+"""Positions relative to each other."""
 _LONGEST_M = 20_000.0
 """Nor is a route."""
 Place = tuple[MapRoad, float, float, int]
@@ -56,8 +60,9 @@ class PositionReader:
         Raises:
             InvalidDocument: Nobody placed it, or positions refer to each other in a circle.
         """
-        if name in self._open:
-            raise fault_at(f"entity {name[:40]}", "its position refers to itself in a circle")
+        if name in self._open or len(self._open) > _MOST_OPEN:
+            text = f"refers to itself in a circle, or over {_MOST_OPEN} others"
+            raise fault_at(f"entity {name[:40]}", f"its position {text}")
         if name not in self._poses:
             position = foreign.look_up(self._positions, name, "position of an entity at t0")
             self._open.add(name)
@@ -165,25 +170,24 @@ class PositionReader:
         return road, read_float(element, "s", place), 0.0, lane_id
 
     def _find_relative_lane(self, element: Element, place: str) -> Pose:
-        road, s_m, _, lane_id = self._locate_other(element, place)
-        step = foreign.read_whole(element.get("dLane"), f"{place}.dLane")
-        other = step_lanes(lane_id, step)
-        along_m = _number(element, "ds")
-        along_m += _number(element, "dsLane") * (1 if road.is_forward(lane_id) else -1)
-        away_rad = difference(
-            self.entity_pose(element.get("entityRef", "")).heading_rad,
-            road.pose_at(s_m, 0.0, lane_id).heading_rad,
-        )
-        road, s_m, other = self._advance(road, s_m, other, along_m, place)
-        pose = road.lane_pose(other, s_m, _number(element, "offset"))
+        pose = self.entity_pose(element.get("entityRef", ""))
+        start = road, s_m, _, lane_id = self.locate(pose, place)
+        by_lane, step = "dsLane" in element.attrib, foreign.read_whole(element.get("dLane"), place)
+        along_m = _number(element, "dsLane" if by_lane else "ds")
+        along_m *= 1 if road.is_forward(lane_id) or not by_lane else -1
+        away_rad = difference(pose.heading_rad, road.pose_at(s_m, 0.0, lane_id).heading_rad)
+        road, s_m, lane_id, turns = self._advance(start, along_m, place, by_lane=by_lane)
+        pose = road.lane_pose(step_lanes(lane_id, turns * step), s_m, _number(element, "offset"))
         # Beside who drives against the lane one does too.
         return pose if abs(away_rad) <= math.pi / 2.0 else pose.turn(math.pi)
 
     def _find_relative_road(self, element: Element, place: str) -> Pose:
-        road, s_m, t_m, lane_id = self._locate_other(element, place)
-        t_m += _number(element, "dt")
-        road, s_m, lane_id = self._advance(road, s_m, lane_id, _number(element, "ds"), place)
-        return road.pose_at(s_m, t_m, lane_id)
+        pose = self.entity_pose(element.get("entityRef", ""))
+        road, s_m, t_m, lane_id = self.locate(pose, place)
+        is_forward, along_m = road.is_forward(lane_id), _number(element, "ds")
+        road, s_m, _, turns = self._advance((road, s_m, t_m, 0), along_m, place)
+        pose = road.pose_at(s_m, turns * (t_m + _number(element, "dt")))
+        return pose if is_forward == (turns > 0) else pose.turn(math.pi)
 
     def _find_relative_object(self, element: Element, place: str) -> Pose:
         pose = self.entity_pose(element.get("entityRef", ""))
@@ -196,27 +200,43 @@ class PositionReader:
         x_m, y_m = pose.x_m + _number(element, "dx"), pose.y_m + _number(element, "dy")
         return replace(pose, x_m=x_m, y_m=y_m)
 
-    def _locate_other(self, element: Element, place: str) -> Place:
-        return self.locate(self.entity_pose(element.get("entityRef", "")), place)
-
     def _advance(
-        self, road: MapRoad, s_m: float, lane_id: int, along_m: float, place: str
-    ) -> tuple[MapRoad, float, int]:
-        """Return road, station and lane so far along s, over no junction."""
-        s_m += along_m
-        for _ in range(_MOST_ROADS):
-            beyond_m = max(-s_m, s_m - road.line.length_m)
-            if beyond_m <= 0.01:
-                return road, s_m, lane_id
-            end = START if s_m < 0.0 else END
-            section = road.sections[0 if end == START else -1]
-            lane = foreign.look_up(section.lanes, lane_id, place)
-            if end not in road.links or not lane.links[end]:
-                raise fault_at(place, f"leads {beyond_m:.1f} m past the end of road {road.id}")
-            name, other_end = road.links[end]
-            road, (lane_id, *_) = self._network.road(name, place), lane.links[end]
-            s_m = beyond_m if other_end == START else road.line.length_m - beyond_m
-        raise fault_at(place, f"leads over more than {_MOST_ROADS} roads")
+        self, start: Place, along_m: float, place: str, *, by_lane: bool = False
+    ) -> tuple[MapRoad, float, int, int]:
+        """Return road, station and lane so far along s, and -1 where s runs the other way.
+
+        It leads over no junction. The lane 0 is the road's own line. By lane the way is that
+        of the lane's middle.
+        """
+        (road, s_m, _, lane_id), turns = start, 1
+        number, is_ahead, left_m = road.section_at(s_m), along_m >= 0.0, abs(along_m)
+        for _ in range(_MOST_PARTS):
+            section, end = road.sections[number], END if is_ahead else START
+            until_m = section.end_m if is_ahead else section.start_m
+            stations_m, ways_m = np.array([s_m, until_m]), np.array([0.0, abs(until_m - s_m)])
+            if by_lane:
+                stations_m = np.linspace(s_m, until_m, math.ceil(ways_m[1] / _STEP_M) + 1)
+                edges = road.edges_at(section, stations_m)
+                right_m, left_edge_m = foreign.look_up(edges, lane_id, place)
+                middles = road.places_at(stations_m, (right_m + left_edge_m) / 2.0)[:, :2]
+                ways_m = np.cumsum(np.hypot(*np.diff(middles, axis=0, prepend=middles[:1]).T))
+            if left_m <= ways_m[-1] + 0.01:
+                return road, float(np.interp(left_m, ways_m, stations_m)), lane_id, turns
+            left_m, number = left_m - ways_m[-1], number + (1 if is_ahead else -1)
+            is_inside = 0 <= number < len(road.sections)
+            lane_ids = (
+                foreign.look_up(section.lanes, lane_id, place).links[end] if lane_id else [0]
+            )
+            if not lane_ids or not (is_inside or end in road.links):
+                raise fault_at(place, f"leads {left_m:.1f} m past an end on road {road.id[:20]}")
+            s_m, lane_id = until_m, lane_ids[0]
+            if not is_inside:
+                name, met = road.links[end]
+                road, is_ahead = self._network.road(name, place), met == START
+                turns *= -1 if met == end else 1
+                s_m, number = (0.0, 0) if is_ahead else (road.line.length_m, -1)
+                number %= len(road.sections)
+        raise fault_at(place, f"leads over more than {_MOST_PARTS} parts of roads")
 
 
 def step_lanes(lane_id: int, step: int) -> int:
