@@ -16,7 +16,7 @@ from email.utils import parsedate_to_datetime
 from augment.errors import ModelFault, ParameterRefused
 from augment.foreign import Doubts, Value, describe_kind, read_as, read_whole
 from augment.llm.costs import FAR_BELOW
-from augment.llm.messages import LengthName, Reply, ToolCall, shorten
+from augment.llm.messages import CALL_FIELDS, LengthName, Reply, ToolCall, extra_of, shorten
 from augment.llm.vendors import says
 
 LONGEST_REFUSAL = 4_000
@@ -35,6 +35,8 @@ MOST_TOKENS = 100_000_000
 
 _ANSWER = "answer"
 _REASONING = ("reasoning_content", "reasoning", "reasoning_details", "thinking")
+# DeepSeek, Moonshot and others; OpenRouter.
+_GIVEN_BACK = {"reasoning_content", "reasoning_details"}
 _FIELDS = frozenset({"content", "refusal", "tool_calls", "function_call", *_REASONING})
 _KINDS = {"refusal": "refusal"} | dict.fromkeys(
     ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
@@ -111,7 +113,9 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
     first = choices[0] if isinstance(choices, list) and choices else None
     choice = first if isinstance(first, dict) else {}
     message = choice.get("message")
-    pieces, calls = _read_message(message if isinstance(message, dict) else {}, doubts)
+    message = message if isinstance(message, dict) else {}
+    pieces, calls = _read_message(message, doubts)
+    thoughts_back = extra_of(message, message.keys() - _GIVEN_BACK) if calls else ""
     texts, thoughts, refusals, unread = (
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
@@ -145,6 +149,7 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
         tool_calls=tuple(calls[:MOST_CALLS]),
         calls_left_out=len(calls[MOST_CALLS:]),
         reasoning=shorten("\n".join(thoughts), LONGEST_EXTRA),
+        extra=_bounded(thoughts_back, "reasoning", doubts),
         remarks=tuple(shorten(note, LONGEST_MESSAGE) for note in notes[:MOST_REMARKS]),
     )
 
@@ -244,20 +249,24 @@ def _read_message(
         arguments = function.get("arguments")
         if arguments is None or not isinstance(arguments, str):
             arguments = "" if arguments is None else json.dumps(arguments)
-        rest = {key: fields[key] for key in fields if key not in ("id", "type", "function")}
-        extra = json.dumps(rest, sort_keys=True) if rest else ""
-        if len(extra) > LONGEST_EXTRA:
-            too_much = f"{path} carries more than {LONGEST_EXTRA} characters: left out"
-            doubts.faults[_ANSWER].append(too_much)
         made.append(
             ToolCall(
                 id=shorten(call_id, LONGEST_NAME),
                 name=shorten(name, LONGEST_NAME),
                 arguments=shorten(arguments, LONGEST_ARGUMENTS),
-                extra=extra if len(extra) <= LONGEST_EXTRA else "",
+                extra=_bounded(extra_of(fields, CALL_FIELDS), path, doubts),
             )
         )
     return pieces, made
+
+
+def _bounded(extra: str, path: str, doubts: Doubts) -> str:
+    """Return what is to go back as it came, or nothing and a remark where it is too long."""
+    if len(extra) <= LONGEST_EXTRA:
+        return extra
+    too_much = f"{path} carries more than {LONGEST_EXTRA} characters: left out"
+    doubts.faults[_ANSWER].append(too_much)
+    return ""
 
 
 def _find_uses(content: object) -> list[object]:

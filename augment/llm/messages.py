@@ -6,7 +6,7 @@ Everything that is stored, replayed or shown goes through these values.
 import base64
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -14,6 +14,8 @@ from typing import Any
 from augment.llm.vendors import says
 
 DEFAULT_MAX_TOKENS = 8192
+CALL_FIELDS = ("id", "type", "function")
+MESSAGE_FIELDS = ("role", "content", "tool_calls", "tool_call_id")
 
 
 ImageUrl = Callable[[bytes], str]
@@ -51,9 +53,8 @@ class ToolCall:
 
     def to_document(self) -> dict[str, object]:
         """The call in the form of the OpenAI-compatible wire, with all that hung on it."""
-        extra: dict[str, object] = json.loads(self.extra) if self.extra else {}
         function = {"name": self.name, "arguments": self.arguments}
-        return extra | {"id": self.id, "type": "function", "function": function}
+        return json.loads(self.extra or "{}") | {"id": self.id, "type": "function", "function": function}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +65,7 @@ class Message:
         images: PNG files that go with the text, in order; only a user shows images.
         calls: Of tools, made by an assistant.
         answers: The id of the call that a tool's message answers, empty for all others.
+        extra: What has to come back beside an assistant's calls, as `Reply.extra` has it.
     """
 
     speaker: Speaker
@@ -71,6 +73,7 @@ class Message:
     images: tuple[bytes, ...] = ()
     calls: tuple[ToolCall, ...] = ()
     answers: str = ""
+    extra: str = ""
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The message in the form of the OpenAI-compatible wire."""
@@ -78,6 +81,7 @@ class Message:
         if self.calls:
             # Several servers refuse an empty text beside calls.
             calls = [call.to_document() for call in self.calls]
+            document |= json.loads(self.extra or "{}")
             return document | {"content": self.text or None, "tool_calls": calls}
         if self.answers:
             return document | {"tool_call_id": self.answers}
@@ -90,17 +94,22 @@ class Message:
 
 def message_from_document(document: Mapping[str, Any]) -> Message:
     """Return the message that `to_document` wrote, for one without images."""
-    calls = []
-    for call in document.get("tool_calls", ()):
-        extra = {name: call[name] for name in call if name not in ("id", "type", "function")}
-        written = json.dumps(extra) if extra else ""
-        calls.append(ToolCall(id=call["id"], **call["function"], extra=written))
     return Message(
         speaker=Speaker(document["role"]),
         text=document["content"] or "",
-        calls=tuple(calls),
+        calls=tuple(
+            ToolCall(id=call["id"], **call["function"], extra=extra_of(call, CALL_FIELDS))
+            for call in document.get("tool_calls", ())
+        ),
         answers=document.get("tool_call_id", ""),
+        extra=extra_of(document, MESSAGE_FIELDS),
     )
+
+
+def extra_of(document: Mapping[str, object], read: Collection[str]) -> str:
+    """Return what a document has beside the fields that are read, as JSON; empty for nothing."""
+    rest = {name: value for name, value in document.items() if name not in read}
+    return json.dumps(rest, sort_keys=True) if rest else ""
 
 
 class LengthName(StrEnum):
@@ -205,6 +214,7 @@ class Reply:
         tool_calls: What the model wants called natively.
         calls_left_out: So many more calls than anybody reads came after those.
         reasoning: What the model thought aloud, apart from its answer.
+        extra: Thoughts that several endpoints insist on getting back with the calls, as JSON.
         remarks: What of the answer was not understood, or contradicts what was sent.
         latency_s: From sending the request to the whole answer.
     """
@@ -220,6 +230,7 @@ class Reply:
     calls_left_out: int = 0
     cached_tokens: int | None = None
     reasoning: str = ""
+    extra: str = ""
     remarks: tuple[str, ...] = ()
 
     @property

@@ -377,7 +377,9 @@ class _ToolDesk:
             echoes.append(call if is_object else replace(call, arguments="{}"))
             result = self._answer(written)
             results.append(Message(speaker=Speaker.TOOL, text=result, answers=call.id))
-        echo = Message(speaker=Speaker.ASSISTANT, text=reply.text, calls=tuple(echoes))
+        echo = Message(
+            speaker=Speaker.ASSISTANT, text=reply.text, calls=tuple(echoes), extra=reply.extra
+        )
         return echo, *results
 
     def _answer(self, call: WrittenCall) -> str:

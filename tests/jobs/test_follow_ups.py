@@ -284,7 +284,7 @@ def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the
 def test_a_message_with_calls_comes_back_as_it_was_written() -> None:
     call = ToolCall(id="c1", name="pose_on_lane", arguments='{"lane": 1', extra='{"seal": "x"}')
     said = (
-        Message(speaker=Speaker.ASSISTANT, text="", calls=(call,)),
+        Message(speaker=Speaker.ASSISTANT, text="", calls=(call,), extra='{"thoughts": "Hm."}'),
         Message(speaker=Speaker.TOOL, text="{}", answers="c1"),
         Message(speaker=Speaker.USER, text="Go on."),
     )

@@ -151,6 +151,11 @@ def test_calls_in_other_forms_are_calls() -> None:
         ("3", ""),
         ("call_3", "{}"),
     ]
+    thoughts = {"reasoning_content": "", "reasoning_details": [{"data": "x"}], "reasoning": "Hm."}
+    back = read(answer({"content": None, "tool_calls": calls} | thoughts))
+    del thoughts["reasoning"]
+    assert json.loads(back.extra) == thoughts, "DeepSeek refuses the next request without"
+    assert read(answer({"content": "Hi"} | thoughts)).extra == ""
     old = read(answer({"content": None, "function_call": {"name": "f", "arguments": "{}"}}))
     assert [one.name for one in old.tool_calls] == ["f"]
 

@@ -1,6 +1,7 @@
 """The FC variants: calls in the answer and native ones, their limits, and what goes wrong."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -101,13 +102,14 @@ def test_a_native_call_where_calls_are_written_is_told_so_and_counts() -> None:
 
 def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> None:
     signed = '{"extra_content": {"google": {"thought_signature": "abc"}}}'
-    play = Play("fc-plus", [native(POSE, POSE, extra=signed), car(21.4)], native=True)
+    called = replace(native(POSE, POSE, extra=signed), extra='{"reasoning_content": "Hm."}')
+    play = Play("fc-plus", [called, car(21.4)], native=True)
     first, second = play.client.requests
     assert [tool.name for tool in first.tools] == ["pose_on_lane"]
     assert '{"call"' not in first.messages[0].text
     said, *told = second.messages[2:]
     document = said.to_document()
-    assert document["content"] is None
+    assert (document["content"], document["reasoning_content"]) == (None, "Hm.")
     calls = document["tool_calls"]
     assert isinstance(calls, list)
     assert calls[0]["extra_content"] == {"google": {"thought_signature": "abc"}}

@@ -349,6 +349,7 @@ def _reply_columns(reply: Reply) -> dict[str, Any]:
         "tool_calls": [asdict(call) for call in reply.tool_calls],
         "calls_left_out": reply.calls_left_out,
         "reasoning": reply.reasoning,
+        "extra": reply.extra,
         "remarks": list(reply.remarks),
     }
     extras = {name: value for name, value in extras.items() if value}
@@ -378,4 +379,5 @@ def _read_reply(call: ModelCall) -> Reply:
         completion_tokens=call.completion_tokens,
         cached_tokens=call.cached_tokens,
         reasoning=extras.get("reasoning", ""),
+        extra=extras.get("extra", ""),
     )
