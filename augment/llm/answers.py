@@ -9,9 +9,11 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
+from itertools import islice
 
 from augment.errors import ModelFault, ParameterRefused
 from augment.foreign import Doubts, Value, describe_kind, read_as, read_whole
@@ -30,6 +32,8 @@ LONGEST_MESSAGE, LONGEST_CODE = 300, 80
 MOST_CALLS = 64
 """Of one answer."""
 MOST_REMARKS = 20
+MOST_LEAVES = 1_000
+"""Texts of an error body that are looked at."""
 MOST_TOKENS = 100_000_000
 """A count beyond is none: no model reads or writes so much at once."""
 
@@ -43,6 +47,8 @@ _KINDS = {"refusal": "refusal"} | dict.fromkeys(
 )
 _WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal", "parts")
 """Names under which a part of a message holds its text."""
+_SEALED = {"data", "encrypted_content", "signature"}
+"""Names under which a thought stands that nobody is to read."""
 _DETAILS = ("prompt_tokens_details", "input_tokens_details")
 _PLACES = ("", *(f"{name}." for name in _DETAILS))
 _CACHED_NAMES = (
@@ -54,18 +60,25 @@ _CREATED_NAMES = "cache_creation_input_tokens cache_creation_tokens cache_write_
 _CREATED = [place + name for place in _PLACES for name in _CREATED_NAMES.split()]
 
 _PASSING = frozenset({408, 409, 425, 429})
-_SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
 # Names under which an error body says what is wrong.
 _SENTENCES = re.compile(
-    r"(error_?)?(message|msg|description)|errors?|details?|reason|title|status_msg|"
+    r"(error_?)?(message|msg|description)|errors?|details?|reason|title|status_msg|raw|"
 )
-_CODES = ("code", "error_code", "error_type", "type", "status", "reason", "error")
+_HEADLINE = re.compile(r"<(title|h1)\b[^>]*>(.*?)</", re.DOTALL | re.IGNORECASE)
+_CODES = (
+    *("code", "error_code", "error_type", "type", "status", "reason", "error"),
+    *("finishReason", "stop_reason"),
+)
 _BLOCKED = ("blockReason", "block_reason", "flagged_input")
 _FLAGS = ("filtered", "input_sensitive", "output_sensitive")
 _FILTERED = ("code", "content_filter")
 
-# Headers, and Google's word in the body, that ask to wait.
-_WAITS = ("retry-after-ms", "retry-after", "retryDelay")
+# What asks to wait: headers, fields of the body, and its sentence.
+_WAITS = ("retry-after-ms", "retry-after", "retryDelay", "retry_after", "estimated_time", "asks")
+_ASKS_TO_WAIT = re.compile(
+    r"\b(?:try again|retry|wait) (?:in |after |for )?((?:\d+m(?!s))?[\d.]+ ?m?s\w*|\d+ ?min\w*)",
+    re.IGNORECASE,
+)
 _WAIT = re.compile(
     r"(?:PT)?(?:(?P<minutes>\d+)\s*m(?:in\w*)?)?\s*"
     r"(?:(?P<number>-?\d+(?:\.\d+)?(?:e\d+)?)\s*(?P<unit>ms|s(?:ec\w*)?)?)?",
@@ -86,12 +99,14 @@ class ForeignError:
         code: The vendor's word for it.
         parameter: What of the request it names.
         is_withheld: Whether a filter withheld the answer.
+        is_spent: Whether a quota or a balance is exhausted, which does not pass by waiting.
     """
 
     message: str
     code: str
     parameter: str
     is_withheld: bool
+    is_spent: bool
 
     def __str__(self) -> str:
         code = f" ({shorten(self.code, LONGEST_CODE)})" if self.code else ""
@@ -120,9 +135,12 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
     )
-    ending = choice.get("finish_reason") or choice.get("native_finish_reason")
+    native = choice.get("native_finish_reason")
+    ending = choice.get("finish_reason") or native
     ending = ending.get("type", ending) if isinstance(ending, dict) else ending  # of SGLang
+    ending = native if isinstance(native, str) and says("withheld", native[:40]) else ending
     reason = doubts.read(_ANSWER, read_as, ending, str, "choices.0.finish_reason") or ""
+    reason = shorten(reason, 40)
     # Without a choice the answer itself is the error, whatever its form.
     error = read_error([answer.get("error"), choice.get("error")] if choice else answer)
     around = [{**answer, "choices": 0, "usage": 0}, {**choice, "message": 0}]
@@ -141,13 +159,12 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
     return Reply(
         text="".join(texts),
         model=shorten(model, 120),
-        finish_reason=shorten(reason, 40),
+        finish_reason=reason,
         refusal=shorten("".join(refusals), LONGEST_REFUSAL) if refusals else None,
         prompt_tokens=prompt,
         completion_tokens=completion,
         cached_tokens=cached,
-        tool_calls=tuple(calls[:MOST_CALLS]),
-        calls_left_out=len(calls[MOST_CALLS:]),
+        tool_calls=tuple(calls),
         reasoning=shorten("\n".join(thoughts), LONGEST_EXTRA),
         extra=_bounded(thoughts_back, "reasoning", doubts),
         remarks=tuple(shorten(note, LONGEST_MESSAGE) for note in notes[:MOST_REMARKS]),
@@ -156,16 +173,18 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
 
 def read_error(body: object) -> ForeignError:
     """Read an error: OpenAI's form, a text, or what LM Studio, TGI, FastAPI and others write."""
-    leaves = list(_leaves(body))
+    leaves = list(islice(_leaves(body), MOST_LEAVES))
     sentences = [text for name, text in leaves if _SENTENCES.fullmatch(name)]
     message = "; ".join(dict.fromkeys(text for text in sentences if not text.isdigit()))
     codes = [text for key in _CODES for name, text in leaves if name == key and " " not in text]
+    codes = [text for text in codes if len(text) <= LONGEST_NAME]
     return ForeignError(
         message=message,
         code=next((text for name, text in leaves if name in _CODES[:3] and text != "0"), ""),
         parameter=next((text for name, text in leaves if name == "param"), ""),
         is_withheld=any(says("withheld", code) for code in codes)
         or (says("withheld_sentence", message) and not says("about_account", message)),
+        is_spent=any(says("spent", text) for text in (*codes, message)),
     )
 
 
@@ -174,20 +193,20 @@ def fault_of_status(
 ) -> ModelFault | Reply:
     """Return the fault that an HTTP status and its decoded body stand for, or a refusal.
 
-    An exhausted quota comes as a 429 and does not pass by waiting.
-
     Args:
         status: Of the answer.
         body: Of the answer, decoded; a text where it is no JSON.
         headers: Of the answer, by names in lower case.
         sent: What the request had, of which the endpoint may refuse something.
     """
-    page = re.search(r"<title>(.*?)</title>", body, re.DOTALL) if isinstance(body, str) else None
-    error = read_error(page[1] if page else body)
+    page = _HEADLINE.search(body[:LONGEST_REFUSAL]) if isinstance(body, str) else None
+    error = read_error(page[2] if page else body)
     if error.is_withheld and status not in (401, 404) and status not in _PASSING:
         refusal = shorten(error.message or error.code, LONGEST_REFUSAL)
         return Reply(text="", finish_reason="content_filter", refusal=refusal, completion_tokens=0)
     message = error.message or (json.dumps(body, ensure_ascii=False) if body else "")
+    if "location" in headers:
+        message = f"it leads to {headers['location']}; {message}".removesuffix("; ")
     code = "" if error.code == str(status) else error.code
     text = f"the endpoint answered {status}{replace(error, message=message, code=code)}"
     refused = _find_refused_parameter(error, sent) if status in (400, 422) else None
@@ -197,8 +216,11 @@ def fault_of_status(
         refused = str(asked["type"])
     if refused:
         return ParameterRefused(refused, text, status=status)
-    passing = (status in _PASSING or status >= 500) and error.code not in _SPENT
-    wait_s, remark = _read_wait({**dict(_leaves(body)), **headers}) if passing else (None, "")
+    passing = status in _PASSING or (status >= 500 and not says("lacks", error.message))
+    passing = passing and not error.is_spent
+    asks = {"asks": asked[1]} if (asked := _ASKS_TO_WAIT.search(error.message)) else {}
+    fields = {**dict(islice(_leaves(body), MOST_LEAVES)), **asks, **headers} if passing else {}
+    wait_s, remark = _read_wait(fields)
     return ModelFault(text + remark, retryable=passing, status=status, retry_after_s=wait_s)
 
 
@@ -224,6 +246,7 @@ def _read_message(
     if message.keys() - {"role"} and not message.keys() & _FIELDS:
         pieces.append(("unread", "the message has none of the fields of a message"))
     made: list[ToolCall] = []
+    ids: set[str] = set()
     calls = message.get("tool_calls")
     calls = calls or _find_uses(message.get("content")) or calls
     if calls is None and message.get("function_call"):
@@ -231,10 +254,13 @@ def _read_message(
     if calls is not None and not isinstance(calls, list):
         pieces.append(("unread", f"tool_calls is {describe_kind(calls)}, not a list"))
         calls = None
-    for number, fields in enumerate(calls or [], start=1):
+    calls = calls or []
+    if calls[MOST_CALLS:]:
+        pieces.append(("unread", f"{len(calls) - MOST_CALLS} more calls"))
+    for number, fields in enumerate(calls[:MOST_CALLS], start=1):
         path = f"tool_calls.{number}."
         fields = fields if isinstance(fields, dict) else {}
-        function = _read(doubts, fields, "function", dict, path) or {}
+        function = _read(doubts, fields, "function", dict, path) or fields
         name = _read(doubts, function, "name", str, path)
         if not name:
             pieces.append(("unread", f"call {number} names no function"))
@@ -243,8 +269,9 @@ def _read_message(
         given = fields.get("id")
         named = {"id": str(given)} if type(given) is int else fields
         call_id = _read(doubts, named, "id", str, path)
-        if not call_id or any(call_id == earlier.id for earlier in made):
+        if not call_id or call_id in ids:
             call_id = f"call_{number}"
+        ids.add(call_id)
         # A text, which may be broken; some servers send the object itself.
         arguments = function.get("arguments")
         if arguments is None or not isinstance(arguments, str):
@@ -286,11 +313,14 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
             yield from _pieces(item, f"{path}.{number}", kind)
     elif isinstance(value, dict) and value.get("type") != "tool_use":
         name = next((name for name in _WORDS if value.get(name) is not None), None)
-        if name is None:
-            yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
+        kind = "thought" if value.get("thought") is True else kind  # as Google has it
+        kind = _KINDS.get(str(value.get("type")), kind)
+        if name is not None:
+            yield from _pieces(value[name], path, kind)
+        elif kind == "thought" and value.keys() & _SEALED:
+            yield kind, ""
         else:
-            kind = "thought" if value.get("thought") is True else kind  # as Google has it
-            yield from _pieces(value[name], path, _KINDS.get(str(value.get("type")), kind))
+            yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
     elif value is True and kind == "refusal":
         yield kind, ""
     elif value is not None and not isinstance(value, dict):
@@ -311,7 +341,7 @@ def _insist_on_answer(
     Raises:
         ModelFault: There is none.
     """
-    message, is_passing = choice.get("message"), error.code not in _SPENT
+    message, is_passing = choice.get("message"), not error.is_spent
     if says("broken", reason):
         problem = f"broke off its answer, finish_reason {shorten(reason, 40)!r}{error}"
     elif str(error):
@@ -358,6 +388,8 @@ def _read_usage(
         whole = prompt + beside
         if beside > prompt or total == whole + (completion or 0) or prompt < least <= whole:
             prompt = whole
+    elif prompt and prompt < least <= (total or 0) - (completion or 0):
+        prompt = (total or 0) - (completion or 0)
     if prompt and total and completion is not None and has_output:
         # Google and xAI count thoughts in the total alone.
         completion = max(completion, total - prompt)
@@ -385,8 +417,20 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
     elif isinstance(value, list):
         for item in value:
             yield from _leaves(item, name)
-    elif isinstance(value, str | int) and not isinstance(value, bool) and str(value).strip():
-        yield name, str(value).strip()
+    elif isinstance(value, str | float | int) and not isinstance(value, bool):
+        text = str(value).strip()
+        if (inner := _inner(name, text)) is not None:
+            yield from _leaves(inner, name)
+        elif text:
+            yield name, text
+
+
+def _inner(name: str, text: str) -> object:
+    """Return the JSON that a sentence holds where a gateway passes on what it was told."""
+    if text[:1] == "{" and text.count("{") <= MOST_CALLS and _SENTENCES.fullmatch(name):
+        with suppress(ValueError, RecursionError):
+            return json.loads(text)
+    return None
 
 
 def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> str | None:
@@ -395,7 +439,7 @@ def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> 
     A value that is not taken (too large, not one of a list, only the default) is no parameter
     that is not taken, and a word that stands in a sentence is no parameter at all.
     """
-    named, text = error.parameter.partition(".")[0], error.message
+    named, text = error.parameter.partition(".")[0], error.message[:LONGEST_REFUSAL]
     for name in _DROPPABLE:
         if name not in sent or named not in ("", name):
             continue

@@ -54,7 +54,8 @@ class ToolCall:
     def to_document(self) -> dict[str, object]:
         """The call in the form of the OpenAI-compatible wire, with all that hung on it."""
         function = {"name": self.name, "arguments": self.arguments}
-        return json.loads(self.extra or "{}") | {"id": self.id, "type": "function", "function": function}
+        document: dict[str, object] = json.loads(self.extra or "{}")
+        return document | {"id": self.id, "type": "function", "function": function}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,7 +213,6 @@ class Reply:
         refusal: What the model, or a filter, said when it declined; None where neither did.
         cached_tokens: So many of the prompt's came from the endpoint's cache.
         tool_calls: What the model wants called natively.
-        calls_left_out: So many more calls than anybody reads came after those.
         reasoning: What the model thought aloud, apart from its answer.
         extra: Thoughts that several endpoints insist on getting back with the calls, as JSON.
         remarks: What of the answer was not understood, or contradicts what was sent.
@@ -227,7 +227,6 @@ class Reply:
     completion_tokens: int | None = None
     latency_s: float | None = None
     tool_calls: tuple[ToolCall, ...] = ()
-    calls_left_out: int = 0
     cached_tokens: int | None = None
     reasoning: str = ""
     extra: str = ""

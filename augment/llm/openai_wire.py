@@ -15,13 +15,13 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from augment.errors import CallDropped, InvalidDocument, ModelFault, NotNeeded, NotSent
 from augment.llm import wire_transport
 from augment.llm.addresses import Resolve
-from augment.llm.answers import fault_of_status, read_completion
+from augment.llm.answers import fault_of_status, read_completion, read_error
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.costs import least_tokens
 from augment.llm.messages import Reply, Request
@@ -38,8 +38,9 @@ _HERE = ("localhost", "127.0.0.1", "::1")
 # Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY.
 _KEYLESS = "no-key"
 _BROKEN_JSON = "the endpoint's answer is not valid JSON"
-_ERROR_EVENT = re.compile(r"^data:[ ]*(\{[ ]*\"error\".*)$", re.MULTILINE)
+_ERROR_EVENT = re.compile(r"^data:[ ]*(\{.*\"error\"[ ]*:[ ]*[{\"].*)$", re.MULTILINE)
 _STREAM = "the endpoint answered with a stream of events, which was not asked for"
+_EMPTY = "the endpoint answered with an empty body"
 _PAGE = "the endpoint answered with a page of text instead of JSON: is its base URL right?"
 # A stand-in server is used with keys like "x"; those are no secret.
 _SHORTEST_SECRET = 8
@@ -119,12 +120,18 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         Raises:
             ModelFault: It lists none.
         """
-        document = self._exchange("/models")
-        rows = document.get("data") if isinstance(document, dict) else None
-        lines = [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
-        names = {name for row in lines if isinstance(name := row.get("id"), str)}
+        document: Any = self._exchange("/models")
+        rows = document
+        if isinstance(rows, dict):
+            rows = rows.get("data") or rows.get("models")
+        rows = rows.values() if isinstance(rows, dict) else rows if isinstance(rows, list) else ()
+        keys = ("id", "model", "name")
+        ids = [[row[key] for key in keys if key in row] for row in rows if isinstance(row, dict)]
+        named = [*rows, *(name for some in ids for name in some[:1])]
+        names = {name for name in named if isinstance(name, str)}
         if not names:
-            raise ModelFault("the endpoint lists no models", retryable=False)
+            reason = read_error(document)
+            raise ModelFault(f"the endpoint lists no models{reason}", retryable=False)
         return sorted(names)
 
     def _exchange(self, path: str, sent: dict[str, object] | None = None) -> object:
@@ -156,8 +163,9 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             is_json = "json" in answer.headers.get("content-type", "")
             is_stream = document.startswith(("data:", "event:", ":"))
             problem = _STREAM if is_stream else _BROKEN_JSON if is_json else _PAGE
+            problem = problem if document.strip() else _EMPTY
             fault: ModelFault | NotNeeded | Reply = ModelFault(
-                problem, retryable=problem == _BROKEN_JSON, status=200
+                problem, retryable=problem in (_BROKEN_JSON, _EMPTY), status=200
             )
         except openai.APIStatusError as error:
             fault = fault_of_status(
@@ -206,7 +214,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         """Return the document of a body or an error in its events, or the text that is no JSON."""
         error = _ERROR_EVENT.search(text)
         try:
-            return self._clear(json.loads(error[1] if error else text))
+            return self._clear(json.loads(error[1] if error else text.removeprefix("\ufeff")))
         except (ValueError, RecursionError):
             return self._clear(text)
 

@@ -21,7 +21,7 @@ LONGEST_VALUE = 4_000
 
 _LONGEST_REFUSAL = 2_000
 _NOTHING = re.compile(
-    r"(?:\A|^[ \t#*_]*Modified Vectors[ \t#*_]*:)[\s*`]*(?:json)?\s*"
+    r"(?:\A|^[ \t#*_]*Modified Vectors[ \t#*_]*:)[\s*`]*(?:json\s*)?"
     r"(?:none|null|nothing|n/a|\{\s*\}|\[\s*\])[\s.*`]*\Z",
     re.IGNORECASE | re.MULTILINE,
 )

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import time
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from pathlib import Path
@@ -39,6 +40,7 @@ def read(document: object, least: int = 0) -> Reply:
 
 # --- No silent default -------------------------------------------------------------------------
 
+SENT = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh", "max_completion_tokens": 8192}
 WRONG: tuple[object, ...] = (7, -1.5, True, "word", "", [], [7], [["a"]], {}, {"a": 1}, None)
 
 
@@ -178,7 +180,13 @@ def test_an_answer_of_its_own_is_withheld_by_nobody(reason: str) -> None:
     assert not read(answer({"content": "Hi"}, reason, content_filter_results=quiet)).is_withheld
 
 
-@pytest.mark.parametrize("reason", ["length", "MAX_TOKENS", "model_length", "max_output_tokens"])
+@pytest.mark.parametrize(
+    "reason",
+    [
+        *("length", "MAX_TOKENS", "model_length", "max_output_tokens"),
+        *("contextLengthReached", "TOO_LONG", "model_context_window_exceeded"),
+    ],
+)
 def test_a_limit_has_several_names(reason: str) -> None:
     assert read(answer({"content": "Hi"}, reason)).is_cut_off
 
@@ -190,6 +198,43 @@ def test_an_error_of_a_filter_is_a_refusal_and_no_other_is(row: dict[str, Any]) 
     if isinstance(reply, Reply):
         assert reply.is_withheld
         assert reply.refusal
+
+
+@pytest.mark.parametrize("row", rows("lasting"), ids=str)
+def test_what_does_not_pass_by_waiting_is_not_asked_for_again(row: dict[str, Any]) -> None:
+    fault = fault_of_status(row["status"], row["body"], {}, sent={})
+    assert isinstance(fault, ModelFault)
+    assert not fault.retryable
+
+
+def test_thoughts_that_nobody_may_read_are_thoughts() -> None:
+    """OpenRouter hands out those of several vendors sealed; all tokens may have gone into them."""
+    sealed = {
+        "reasoning": None,
+        "reasoning_details": [{"type": "reasoning.encrypted", "data": "x"}],
+    }
+    reply = read(answer({"content": ""} | sealed, "length"))
+    assert (reply.text, reply.is_cut_off, reply.remarks) == ("", True, ())
+
+
+ENDLESS = (
+    "<title>",
+    "unsupported ",
+    "seed_",
+    "does not support the parameter 'seed' ",
+    "max",
+    "1m",
+)
+
+
+@pytest.mark.parametrize("words", ENDLESS)
+def test_nothing_that_a_server_repeats_without_end_holds_a_worker_up(words: str) -> None:
+    text, started = words * 50_000, time.process_time()
+    fields = {"message": text, "code": text, "retryDelay": text}
+    for body in (text, {"error": fields}, {"error": [fields] * 3}):
+        assert isinstance(fault_of_status(500, body, {}, sent=SENT), ModelFault)
+    assert not read(answer({"content": "Hi"}, text)).is_withheld
+    assert time.process_time() - started < 10.0
 
 
 @pytest.mark.parametrize("row", rows("usage"), ids=str)
@@ -228,9 +273,6 @@ def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int |
     assert (reply.text, reply.prompt_tokens, reply.completion_tokens) == ("Hi", count, count)
 
 
-SENT = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh", "max_completion_tokens": 8192}
-
-
 @pytest.mark.parametrize("row", [*rows("unknown parameter"), *rows("refused value")], ids=str)
 def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -> None:
     """Not where a value is not taken, and not where its name is a word in a sentence."""
@@ -250,6 +292,14 @@ def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -
         ({"retry-after": "Wed, 21 Oct 2015 07:28:00 GMT"}, 0.0),
         ({"body": "37.5s"}, 37.5),
         *(
+            ({"sentence": f"Slow down. {asks}. More at x."}, wait_s)
+            for asks, wait_s in {
+                **{"Please try again in 8s": 8.0, "Please try again in 612ms": 0.612},
+                **{"Please retry in 34.07s": 34.07, "Try again in 7m12.5s": 432.5},
+                **{"Please retry after 12 seconds": 12.0, "wait 1 minute": 60.0},
+            }.items()
+        ),
+        *(
             ({"retry-after": said}, wait_s)
             for said, wait_s in {
                 **{"0": 0.0, "-5": 0.0, "1e3": 1000.0, "99999999999999999999": 1e20},
@@ -262,11 +312,21 @@ def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -
 def test_the_wait_that_is_asked_for_has_three_forms(
     headers: dict[str, str], wait_s: float | None
 ) -> None:
-    body = {"details": [{"retryDelay": headers.pop("body", "")}]}
+    body = {"details": [{"retryDelay": headers.pop("body", "")}]} | {
+        "message": headers.pop("sentence", "")
+    }
     fault = fault_of_status(429, body, headers, sent={})
     assert isinstance(fault, ModelFault)
     assert fault.retry_after_s == wait_s
     assert ("can't be read" in str(fault)) == (wait_s is None)
+
+
+@pytest.mark.parametrize("wait", [{"retry_after": 20}, {"estimated_time": 20.0}], ids=str)
+def test_a_wait_may_be_a_number_of_the_body(wait: dict[str, object]) -> None:
+    for body in (wait, {"error": "m is loading"} | wait, {"error": wait}):
+        fault = fault_of_status(503, body, {}, sent={})
+        assert isinstance(fault, ModelFault)
+        assert fault.retry_after_s == 20.0
 
 
 def test_a_date_is_waited_for() -> None:

@@ -93,6 +93,59 @@ def test_any_other_json_is_a_fault(body: object) -> None:
         client.complete(request("m"))
 
 
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        (b"\xef\xbb\xbf" + BODY, ""),
+        (b"", "an empty body"),
+        (b" \n", "an empty body"),
+        (b'data: {"type": "error", "error": {"message": "Busy"}}\n\n', "an error: Busy"),
+    ],
+    ids=["byte order mark", "nothing", "blank", "error in a stream"],
+)
+def test_a_success_without_an_answer_may_be_asked_for_again(body: bytes, problem: str) -> None:
+    with speaking(whole(body)) as server, OpenAIWire(base_url=server.url, api_key=None) as client:
+        if not problem:
+            assert client.complete(ASKED).text == "Hi"
+            return
+        with pytest.raises(ModelFault, match=problem) as raised:
+            client.complete(ASKED)
+    assert raised.value.retryable
+
+
+def test_a_redirect_is_not_followed_and_says_where_it_leads() -> None:
+    moved = {"location": "https://elsewhere.example/v1"}
+    with (
+        recorder(301, {}, moved) as server,
+        OpenAIWire(base_url=server.url, api_key=None) as client,
+        pytest.raises(ModelFault, match=r"301: it leads to https://elsewhere\.example/v1"),
+    ):
+        client.complete(ASKED)
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [
+        {"object": "list", "data": [{"id": "b"}, {"id": None}, None, 7, {"id": "a"}]},
+        [{"id": "a"}, {"id": "b"}],
+        ["a", "b"],
+        {"data": ["b", "a"]},
+        {"models": [{"name": "a", "model": "a"}, {"name": "b"}]},
+        {"data": {"x": {"id": "a"}, "y": {"id": "b"}}},
+    ],
+    ids=str,
+)
+def test_a_list_of_models_has_several_shapes(
+    listed: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with OpenAIWire(base_url="http://127.0.0.1:1/v1", api_key=None) as client:
+        monkeypatch.setattr(client, "_exchange", lambda path: listed)
+        assert client.list_models() == ["a", "b"]
+        monkeypatch.setattr(client, "_exchange", lambda path: {"error": {"message": "No key."}})
+        with pytest.raises(ModelFault, match=r"lists no models: No key\."):
+            client.list_models()
+
+
 def test_a_key_goes_to_its_endpoint_and_nothing_of_the_environment(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

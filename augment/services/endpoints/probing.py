@@ -19,6 +19,7 @@ from augment.llm.client import ChatClient, ModelProfile
 from augment.llm.costs import find_cut, to_usd
 from augment.llm.messages import LengthName, Reply, Request, SchemaForm, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
+from augment.llm.vendors import says
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
 from augment.services.endpoints.contestants import SAMPLING
@@ -233,7 +234,8 @@ class _Prober:
             # A value that is not taken says nothing of others.
             is_other = ability in (Ability.ANSWERS, Ability.TEMPERATURE)
             lacks_schema = self.profile.refused.issuperset(SchemaForm)
-            refuses = fault.status in _REFUSALS and not is_other
+            refuses = fault.status in _REFUSALS or says("lacks", str(fault))
+            refuses &= not is_other
             refuses |= ability == Ability.SCHEMA and lacks_schema
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))

@@ -347,7 +347,6 @@ def _reply_columns(reply: Reply) -> dict[str, Any]:
     """Return the answer as columns; a refusal that says nothing else is the answer."""
     extras = {
         "tool_calls": [asdict(call) for call in reply.tool_calls],
-        "calls_left_out": reply.calls_left_out,
         "reasoning": reply.reasoning,
         "extra": reply.extra,
         "remarks": list(reply.remarks),
