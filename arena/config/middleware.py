@@ -30,7 +30,7 @@ class FaultMiddleware:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        if "\0" in request.path:  # PostgreSQL has no such text, so nothing is called so
+        if "%00" in request.get_full_path():  # PostgreSQL has no such text
             return faults.answer_missing(request)
         return self.get_response(request)
 

@@ -21,7 +21,7 @@ def page_asked(request: HttpRequest, name: str = "page") -> int:
 
 def search_asked(request: HttpRequest) -> str:
     """Return the search term; empty for everything."""
-    return request.GET.get("q", "").replace("\0", "").strip()[:LONGEST_SEARCH]
+    return request.GET.get("q", "").strip()[:LONGEST_SEARCH]
 
 
 def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:

@@ -71,6 +71,8 @@ def test_every_queue_has_a_worker_that_is_probed(services: dict[str, Any]) -> No
 def test_what_the_env_file_leaves_empty_is_as_if_it_were_not_there(
     services: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    ours = ("prepare", "web", "worker", "render-worker")
+    assert {services[name]["env_file"] for name in ours} == {".env"}, "with keys of models"
     names = services["web"]["environment"].keys() & Environment.model_fields.keys()
     assert {"ARENA_HOSTS", "ARENA_PROXIES", "ARENA_LOG_FORM", "ARENA_METRICS_TOKEN"} <= names
     for name in (*names, "ARENA_VAR_DIR"):  # tests have one of their own

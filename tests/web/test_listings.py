@@ -76,8 +76,7 @@ def test_lists_are_shown_page_by_page_and_found_in(
             first = page(admin, name)
         assert (first.count(mark), "<span>1 of " in first) == (size, True), name
         assert 0 < page(admin, name, "?page=99").count(mark) <= size, name
-        for odd in ("?page=nonsense", "?q=%00"):
-            assert page(admin, name, odd).count(mark) == size, name
+        assert page(admin, name, "?page=nonsense").count(mark) == size, name
         assert page(admin, name, "?q=077").count(mark) == 1, name
         nothing = page(admin, name, "?q=no-such-thing")
         assert (nothing.count(mark), "Nothing is like that." in nothing) == (0, True), name
