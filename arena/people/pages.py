@@ -10,7 +10,12 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth import login, update_session_auth_hash
 from django.contrib.auth.decorators import login_not_required
-from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm, SetPasswordForm
+from django.contrib.auth.forms import (
+    AuthenticationForm,
+    PasswordChangeForm,
+    SetPasswordForm,
+    UsernameField,
+)
 from django.contrib.auth.models import User
 from django.contrib.auth.views import LoginView
 from django.db import transaction
@@ -118,10 +123,17 @@ class TokenForm(forms.Form):
 # --- Signing in --------------------------------------------------------------------------------
 
 
+class SignInForm(AuthenticationForm):
+    """Django's, with a username no longer than a failed login is stored with."""
+
+    username = UsernameField(max_length=150)
+
+
 class SignIn(LoginView):
     """The login; the pages that follow speak the language of the account."""
 
     template_name = "login.html"
+    authentication_form = SignInForm
     redirect_authenticated_user = True
 
     def get(self, request: HttpRequest, *args: Any, **named: Any) -> HttpResponse:

@@ -31,13 +31,17 @@ def look_at_database() -> PartState:
     """Return whether the database answers and has the tables of this release."""
     try:
         # Migrations don't go away under a running process.
-        missing = [] if cache.get("is_prepared") else find_unapplied_migrations()
+        is_known = cache.get("is_prepared")
+        missing = [] if is_known else find_unapplied_migrations()
+        later = [] if is_known or missing else find_later_migrations()
         with connection.cursor() as cursor:
             cursor.execute("SELECT 1")
     except DatabaseError as error:
         return PartState("database", False, "unreachable", str(error))
     if missing:
         return PartState("database", False, "unprepared", f"not applied: {', '.join(missing)}")
+    if later:
+        return PartState("database", False, "later", f"of a later release: {', '.join(later)}")
     cache.set("is_prepared", True, timeout=None)
     return PartState("database", True, "ok")
 
@@ -47,6 +51,13 @@ def find_unapplied_migrations() -> list[str]:
     executor = MigrationExecutor(connection)
     plan = executor.migration_plan(executor.loader.graph.leaf_nodes())
     return [f"{migration.app_label}.{migration.name}" for migration, _ in plan]
+
+
+def find_later_migrations() -> list[str]:
+    """The migrations of ours that a later release has applied."""
+    loader = MigrationExecutor(connection).loader
+    strange = loader.applied_migrations.keys() - loader.disk_migrations.keys()
+    return sorted(f"{app}.{name}" for app, name in strange if app in ("arena", "augment"))
 
 
 def look_at_broker() -> PartState:

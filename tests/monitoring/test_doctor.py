@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from django.core.cache import cache
 from django.core.management import CommandError, call_command
+from django.db import connection
+from django.db.migrations.recorder import MigrationRecorder
 from pytest_django import Settings
 
 from arena.management.commands.doctor import Level, examine
@@ -57,6 +59,13 @@ def test_a_database_of_another_release(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readiness, "find_unapplied_migrations", lambda: ["arena.0999_new"])
     cache.clear()
     assert wrong() == {"database": Level.BROKEN}
+
+
+def test_a_database_of_a_later_release() -> None:
+    MigrationRecorder(connection).record_applied("arena", "0999_new")
+    cache.clear()
+    assert wrong() == {"database": Level.BROKEN}
+    assert any("later release: arena.0999_new" in found.text for found in examine())
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,13 @@ def test_a_missing_page_is_said_in_the_products_own_words() -> None:
 @pytest.mark.parametrize(
     "address",
     [
-        *("/enrol/a%00b/", "/i/%00", "/shared/%00/", "/shared/boards/%00/", "/api/v1/pictures/%00"),
+        *(
+            "/enrol/a%00b/",
+            "/i/%00",
+            "/shared/%00/",
+            "/shared/boards/%00/",
+            "/api/v1/pictures/%00",
+        ),
         *("/contestants/new/?model=%00", "/scenarios/?q=a%00"),
     ],
 )

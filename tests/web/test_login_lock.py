@@ -1,6 +1,7 @@
 """Wrong passwords lock an account for the address they came from, and for nobody else."""
 
 import pytest
+from axes.models import AccessAttempt
 from django.conf import LazySettings
 from django.http import HttpResponse
 from django.test import Client, RequestFactory
@@ -25,6 +26,11 @@ def test_five_wrong_passwords_lock_the_account_and_the_page_says_for_how_long() 
     assert answer.status_code == 429
     assert "Too many wrong passwords" in page
     assert "for 15 minutes" in page
+
+
+def test_a_name_that_no_account_can_have_is_not_stored() -> None:
+    assert attempt("wrong", 151 * "x").status_code == 200
+    assert not AccessAttempt.objects.exists()
 
 
 def test_others_and_other_places_are_not_locked() -> None:

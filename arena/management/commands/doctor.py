@@ -173,7 +173,10 @@ def _database() -> Ailments:
     if state.is_ok:
         yield fine("database", f"{connection.vendor} answers and has the tables of this release")
         return
-    remedies = {"unprepared": "Run `manage.py prepare`."}
+    remedies = {
+        "unprepared": "Run `manage.py prepare`.",
+        "later": "Install that release, or restore a backup of this one into a new database.",
+    }
     remedy = remedies.get(state.state, "Check DATABASE_URL and that the server runs.")
     yield broken("database", f"{state.state}: {state.detail}", remedy)
 
