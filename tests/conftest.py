@@ -2,7 +2,7 @@
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from xdist.scheduler import LoadScopeScheduling
 import tests.properties  # noqa: F401
 from arena.management.commands.prepare import compile_catalogue
 from augment.fake_llm.server import FakeServer, running
+from augment.services.judging import compute_once
 from tests.append_only import empty_with_triggers
 from tests.brokers import MEMORY, NOWHERE, Broker, broker_at
 from tests.intents import known
@@ -103,6 +104,25 @@ def _own_language() -> Iterator[None]:
     """A request in German leaves its thread speaking German; no other test may notice."""
     yield
     translation.deactivate()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _charts_drawn_once() -> Iterator[None]:
+    """A chart of the same content is drawn once for all tests; each stores it as if it drew it."""
+    drawn: dict[str, bytes] = {}
+
+    def draw(suffix: str, compute: Callable[[], bytes], *parts: object) -> bytes:
+        def compute_first() -> bytes:
+            key = repr((suffix, *parts))
+            if key not in drawn:
+                drawn[key] = compute()
+            return drawn[key]
+
+        return compute_once(suffix, compute_first, *parts)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("arena.exports.drawing.compute_once", draw)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

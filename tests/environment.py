@@ -27,6 +27,18 @@ KEPT = {
 FIXED = {"LC_ALL": "C.UTF-8", "TZ": "UTC", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 STARTED = "ARENA_TESTS_HOME"
 """Tells a worker of xdist that its home has been made."""
+MOST_BYTES = 4 << 30
+"""What all tests leave behind until the end."""
+
+
+def roomy_memory() -> Path | None:
+    """Return a file system in memory with room for what the tests write, if there is one.
+
+    Each vote, picture and file that is written is confirmed by the disk, which takes most of it.
+    """
+    memory = Path("/dev/shm")
+    has_room = memory.is_dir() and shutil.disk_usage(memory).free > MOST_BYTES
+    return memory if has_room else None
 
 
 def fix_environment() -> None:
@@ -39,9 +51,10 @@ def fix_environment() -> None:
         if name in KEPT or name.startswith(("PYTEST_", "COVERAGE_"))
     }
     browsers = Path(os.environ.get("HOME", "/nonexistent")) / ".cache" / "ms-playwright"
-    home = tempfile.mkdtemp(prefix="arena-tests-home-")
+    home = tempfile.mkdtemp(prefix="arena-", dir=None if "TMPDIR" in kept else roomy_memory())
     # In a folder of all runs the next one would take the database away from under this one.
     own = {"HOME": home, "ARENA_VAR_DIR": kept.get(VAR, f"{home}/var"), STARTED: home}
+    own |= {} if "TMPDIR" in kept else {"TMPDIR": home}
     atexit.register(shutil.rmtree, home, ignore_errors=True)
     os.environ.clear()
     os.environ.update({"PLAYWRIGHT_BROWSERS_PATH": str(browsers)} | kept | FIXED | own)

