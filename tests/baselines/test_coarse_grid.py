@@ -107,6 +107,7 @@ def errors_m() -> dict[str, list[float]]:
     return dict(found)
 
 
+@pytest.mark.slow
 def test_brackets_lose_what_none_keeps_over_the_catalogue() -> None:
     found = errors_m()
     assert min(len(values) for values in found.values()) > 15 * SEEDS

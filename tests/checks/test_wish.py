@@ -250,6 +250,7 @@ def test_the_distance_is_never_above_that_to_a_placement_that_meets_the_intent(
     further_m=st.floats(0.1, 9.0),
 )
 @settings(max_examples=60, deadline=None)
+@pytest.mark.slow
 def test_the_distance_grows_by_as_much_as_one_goes_further_away(
     name: str, shift: tuple[float, float], further_m: float
 ) -> None:

@@ -33,6 +33,7 @@ def snapshot() -> Snapshot:
     return rate(study=full_study(size=SMALL), rounds=300, unit="vote", seed=4)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn_anew")
 def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
     snapshot: Snapshot,

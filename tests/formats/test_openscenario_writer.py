@@ -49,6 +49,7 @@ def authored(name: str) -> Scene:
     return scene_from_document(json.loads((SCENES / f"{name}.json").read_text()))
 
 
+@pytest.mark.slow
 def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) -> None:
     log, seen = recorded(realdata)
     before, recording = recorded_street()

@@ -48,5 +48,6 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else round(float(value), 3)
 
 
+@pytest.mark.slow
 def test_drives_have_the_scores_that_they_had(check: Check) -> None:
     check("drives.json", {name: driven(*given) for name, given in SETTINGS.items()})

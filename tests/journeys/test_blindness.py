@@ -115,6 +115,7 @@ def test_following_every_link_tells_nothing(eva: Client, study: Study) -> None:
     assert leaks(study, seen) == []
 
 
+@pytest.mark.slow
 def test_trying_every_address_tells_nothing(eva: Client, study: Study) -> None:
     known = [address for address in every_address(study) if address not in OF_PROGRAMS]
     addresses = [address for address in known if not address.startswith("/i/")]

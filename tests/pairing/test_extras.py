@@ -36,6 +36,7 @@ def test_a_study_of_the_papers_size_keeps_every_rule(seed: int) -> None:
         assert set(scenarios.values()) == {12, 13}
 
 
+@pytest.mark.slow
 def test_two_hundred_smaller_studies_keep_every_rule() -> None:
     for seed in range(200):
         asked = paper_rules(seed, votes=100, experts=6)

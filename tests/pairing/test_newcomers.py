@@ -64,6 +64,7 @@ def test_voters_who_follow_each_other_keep_all_units_equal(
 
 
 @given(st.integers(0, 2**32))
+@pytest.mark.slow
 def test_scenarios_stay_equal_too_and_hardly_come_twice_to_one_voter(seed: int) -> None:
     of = grid(scenarios=20)
     judges = nobody(of)

@@ -64,6 +64,7 @@ def decided(rating: Snapshot) -> Iterator[tuple[Augmentation, Augmentation]]:
         yield tuple(sorted(sides, key=lambda side: side.pk != row.winner_id))  # type: ignore[misc]
 
 
+@pytest.mark.slow
 def test_a_simulated_study_that_was_cut_short_is_gone_on_with(
     rating: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def assert_on_the_lanes(scene: Scene) -> None:
             assert math.dist(drawn.tolist(), wanted) <= 0.1, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", AUTHORED, ids=lambda scene: scene.name)
 def test_on_authored_lanes_the_tool_and_the_text_are_on_the_lane(scene: Scene) -> None:
     assert_on_the_lanes(scene)
