@@ -1,5 +1,7 @@
 """Driving scores and their parts, of drives that stop, pass and turn."""
 
+import pytest
+
 from augment.scene.entities import Modification, ScenarioType, Scene
 from augment.simulation.drive import find_expert, run
 from augment.simulation.pdm_closed import PdmClosed
