@@ -6,6 +6,7 @@ Whatever the text, nothing but ReplyUnreadable comes out of here, and nothing is
 import json
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -32,10 +33,19 @@ _FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re
 _STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
 _STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
-_THOUGHTS_END = re.compile(
-    r"</(?:seed:)?(?:think|thinking|thought|reasoning)>|\[/THINK\]|◁/think▷"
-    r"|<\|channel\|>final<\|message\|>"
+_THOUGHTS_BEGIN = re.compile(
+    r"\s*(?:<(?:seed:)?(?:think|thinking|thought|reasoning)>|\[THINK\]|◁think▷"
+    r"|<\|(?:start|begin)_(?:of_)?(?:thinking|thought)\|>|<\|channel\|?>(?:analysis|thought))",
+    re.IGNORECASE,
 )
+_THOUGHTS_END = re.compile(
+    r"</(?:seed:)?(?:think|thinking|thought|reasoning)\s*>|\[/THINK\]|◁/think▷"
+    r"|<\|end_(?:of_)?(?:thinking|thought)\|>|<channel\|>"
+    r"|<\|channel\|>final\s*(?:<\|constrain\|>\w+)?<\|message\|>",
+    re.IGNORECASE,
+)
+# Of an answer that is a document of its own: its end passes for a block without a word.
+_WRAPPER = re.compile(r"^[ \t]*`{3,}(?:markdown|md)[ \t]*\n", re.MULTILINE | re.IGNORECASE)
 _Loaded = TypeVar("_Loaded")
 
 
@@ -80,15 +90,16 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     the draft may differ from what the model settled on.
 
     Raises:
-        ReplyUnreadable: There is no such block, or it breaks JSON.
+        ReplyUnreadable: There is no such block, it breaks JSON, or it is only the last part of
+            what several blocks ask for.
     """
     if len(answer) > LONGEST_ANSWER:
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
-    text = without_thoughts(answer)
+    text = _WRAPPER.sub("", without_thoughts(answer))
     # The last fence may lack its end; without any fences bare objects count.
     blocks = [match.group(1) for match in _FENCE.finditer(text)] or _bare_objects(text)
-    for block in reversed(blocks):
+    for number, block in reversed([*enumerate(blocks)]):
         if not named.search(block):
             continue
         clean = block
@@ -100,6 +111,9 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
                 raise
             value = strict_json(clean)
         if isinstance(value, dict) and keys & value.keys():
+            asked = {key for earlier in blocks[:number] for key in _wishes(earlier)}
+            if asked & keys - value.keys():
+                raise ReplyUnreadable(["there are several blocks: write all of it into one"])
             return value, clean != block
     wanted = ", ".join(f'"{key}"' for key in sorted(keys))
     other = re.compile(rf"""[{{,]\s*'?(?:{"|".join(sorted(keys))})'?\s*:""")
@@ -155,6 +169,11 @@ def refuses(answer: str) -> bool:
     return "{" not in rest.replace("{}", "") and (rest != text or says_so)
 
 
+def only_thinks(answer: str) -> bool:
+    """Return whether the answer holds thoughts that have no end."""
+    return _THOUGHTS_BEGIN.match(without_thoughts(answer)) is not None
+
+
 def without_thoughts(answer: str) -> str:
     """Return the text after the last reasoning tag of models that think aloud."""
     return _THOUGHTS_END.split(answer)[-1]
@@ -180,6 +199,14 @@ def _bare_objects(answer: str) -> list[str]:
             if not depth:
                 objects.append(answer[start : index + 1])
     return [*objects, answer[start:]] if depth else objects
+
+
+def _wishes(block: str) -> set[str]:
+    """Return the keys of a block under which something stands."""
+    with suppress(ReplyUnreadable):
+        value = strict_json(_mend(block))
+        return {key for key in value if value[key]} if isinstance(value, dict) else set()
+    return set()
 
 
 def _mend(block: str) -> str:

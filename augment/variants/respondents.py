@@ -11,7 +11,7 @@ from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
 from augment.llm.costs import find_cut
 from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
-from augment.prompts.blocks import declines
+from augment.prompts.blocks import declines, only_thinks
 from augment.prompts.fill import prompt_version, review_re_ask_messages
 
 Messages = tuple[Message, ...]
@@ -159,8 +159,9 @@ class Respondents:
         max_tokens, re_asked = self.max_tokens, 0
         reply, has_declined = reply or ask(messages), True
         while True:
+            has_begun = not (reply.is_cut_off and only_thinks(reply.text))
             try:
-                return reader(reply.text), messages, reply
+                return reader(reply.text if has_begun else ""), messages, reply
             except errors.ReplyUnreadable as unreadable:
                 problems = list(unreadable.problems)
                 if reply.is_cut_off:

@@ -89,6 +89,9 @@ def at(name: str) -> dict[str, object]:
         GOOD + "\n```text\nnothing\n```",
         f"  ```json\n{block(agent())}\n  ```",
         f"```json\n{block(agent())}",
+        f"```markdown\nSummary: x\n```json\n{block(agent())}\n```\n```",
+        f"<THINK>```json\n{DRAFT}\n```</THINK >{GOOD}",
+        f'```json\n{{"remove": []}}\n```\n```json\n{{"add": [{json.dumps(agent())}]}}\n```',
         GOOD + '\n```json\n{"Action": "add"}\n```',
     ],
 )
@@ -136,6 +139,7 @@ def test_mending_leaves_strings_alone() -> None:
         (block(agent(colour="red")), "add.0.colour: Extra inputs are not permitted"),
         (block(agent(type="EGO_VEHICLE")), "add.0.type: Input should be one of VEHICLE, BUS,"),
         (block(agent(type=["BUS"])), "add.0.type: Input should be one of VEHICLE, BUS,"),
+        (GOOD + '\n```json\n{"remove": ["Agent7"]}\n```', "there are several blocks"),
         (GOOD.replace('"', "'"), "is not JSON: keys and texts stand in double quotes"),
         ("```js\n{add: [], move: [], remove: []}\n```", "keys and texts stand in double quotes"),
         (block(agent(speed_mps=-1.0)), "add.0.speed_mps: Input should be greater than"),

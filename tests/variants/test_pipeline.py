@@ -79,6 +79,16 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
         "There is no bus in the scene. I therefore make no changes.",
         "The user's wish is unsatisfiable: no lane comes the other way.",
         "Summary: cannot be done.\n\nModification Dict: {}\n",
+        "The requested placement is impossible in this scene.",
+        "That's not something I can help with.",
+        "Leider kann ich dabei nicht helfen.",
+        "Malheureusement, je ne suis pas en mesure de le faire.",
+        "К сожалению, я не могу выполнить этот запрос.",
+        "Niestety nie mogę pomóc.",
+        "Helaas kan ik dat niet.",
+        "Maaf, saya tidak dapat membantu.",
+        "<|START_THINKING|>" + GOOD + "<|END_THINKING|>I can't do that.",
+        "<|channel>thought\n" + GOOD + "<channel|>I can't do that.",
     ],
 )
 def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -> None:
@@ -97,11 +107,24 @@ def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -
         "There is no traffic behind, so the car stands 20 m ahead.",
         "There is no crosswalk, so pedestrians can't cross there; the car stands 20 m ahead.",
         "",
+        "I can't wait to see it! A car stands 20 m ahead.",
+        "I'm sorry for the earlier mistake. The car stands 20 m ahead.",
+        "It is not possible to overtake here: the car stands 20 m ahead.",
+        "No changes to existing agents; a car 20 m ahead.",
+        "La voiture ne peut pas être dépassée, à 20 m.",
+        "El coche no puede ser adelantado y está a 20 m.",
+        "无法超车，因此车辆放在20米处。",
     ],
 )
 def test_prose_that_does_not_decline_is_unreadable(said: str) -> None:
     made = Play("otm", [said] * 2)
     assert (made.outcome.status, len(made.client.requests)) == (OutcomeStatus.UNREADABLE, 2)
+
+
+def test_a_draft_in_thoughts_that_were_cut_off_is_no_answer() -> None:
+    made = Play("otm", [Reply(text=f"<think>Maybe {GOOD}\nor", finish_reason="length"), GOOD])
+    assert made.outcome.status is OutcomeStatus.DONE
+    assert "cut off at its length limit" in made.client.requests[1].messages[-1].text
 
 
 @pytest.mark.parametrize(
