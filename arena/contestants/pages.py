@@ -131,7 +131,7 @@ class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
         model = EndpointModel
         fields = MODEL_FACTS
         labels = ABILITIES
-        widgets = {name: forms.NullBooleanSelect(attrs={"class": "input"}) for name in ABILITIES}
+        widgets = dict.fromkeys(ABILITIES, forms.NullBooleanSelect)
 
 
 # --- Contestants -------------------------------------------------------------------------------

@@ -72,7 +72,7 @@ class AccountForm(forms.Form):
         max_length=20_000,
         label="Names or mail addresses",
         help_text="One a line. Others see a pseudonym, made up or after a comma: ada, Expert A.",
-        widget=forms.Textarea(attrs={"class": "input", "rows": 3, "spellcheck": "false"}),
+        widget=forms.Textarea(attrs={"rows": 3, "spellcheck": "false"}),
     )
     role = forms.ChoiceField(
         choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)],
@@ -101,13 +101,17 @@ class FirstForm(forms.Form):
         help_text="It ends the link that the terminal shows, below the address of this server.",
     )
     username = forms.CharField(max_length=150)
-    password = forms.CharField(widget=forms.PasswordInput)
+    password = forms.CharField(widget=forms.PasswordInput({"autocomplete": "new-password"}))
 
 
 class TokenForm(forms.Form):
     """A new token."""
 
-    name = forms.CharField(max_length=80, label=gettext_lazy("What it is for"))
+    name = forms.CharField(
+        max_length=80,
+        label=gettext_lazy("What it is for"),
+        widget=forms.TextInput({"autocomplete": "off"}),
+    )
     role = forms.ChoiceField(label=gettext_lazy("Role"))
     days = forms.TypedChoiceField(
         coerce=int, initial=str(USUAL_DAYS), label=gettext_lazy("Works for")

@@ -73,7 +73,9 @@ def create_person(
             user.person.pseudonym, user.person.is_simulated = pseudonym, is_simulated
             user.person.save(update_fields=["pseudonym", "is_simulated"])
     except IntegrityError:
-        raise Conflict(f"The username {username!r} or pseudonym {pseudonym!r} is taken.") from None
+        is_name = User.objects.filter(username=username).exists()
+        taken = f"username {username!r}" if is_name else f"pseudonym {pseudonym!r}"
+        raise Conflict(f"The {taken} is taken.") from None
     user.groups.add(Group.objects.get_or_create(name=role)[0])
     after = {"role": role, "is_simulated": is_simulated}
     log_change(user.person, "add", actor, after=after)

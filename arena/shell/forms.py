@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from django import forms
+from django.forms.renderers import TemplatesSetting
 
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
@@ -31,6 +32,29 @@ class Offer:
 
     row: Contestant
     obstacle: str = ""
+
+
+class InputField(forms.BoundField):
+    """A field in the look of the pages; what is typed there is no prose to correct."""
+
+    def build_widget_attrs(
+        self, attrs: dict[str, Any], widget: forms.Widget | None = None
+    ) -> dict[str, Any]:
+        """Add what all fields have that hold a text, a number or a choice of one."""
+        built = super().build_widget_attrs(attrs, widget)
+        typed = (forms.TextInput, forms.NumberInput, forms.PasswordInput, forms.Textarea)
+        if isinstance(widget or self.field.widget, (*typed, forms.Select)):
+            built |= {"class": "input"}
+        if self.widget_type == "text":
+            built |= {"autocapitalize": "none", "spellcheck": "false"}
+        return built
+
+
+class PageRenderer(TemplatesSetting):
+    """Forms by our templates."""
+
+    field_template_name = "parts/field.html"
+    bound_field_class = InputField
 
 
 def offer(form: forms.BaseForm, field: str, choices: Iterable[tuple[str, Any]]) -> None:
@@ -96,7 +120,7 @@ class ChoiceForm(forms.Form):
 class LinesField(forms.CharField):
     """A text whose lines are the values."""
 
-    widget = forms.Textarea(attrs={"class": "input", "rows": 3})
+    widget = forms.Textarea(attrs={"rows": 3})
 
     def clean(self, value: Any) -> list[str]:
         """Return the lines."""
@@ -113,31 +137,17 @@ def form_field(declared: Input) -> forms.Field:
     if not declared.is_required:
         options["initial"] = declared.default
     bounds = {"min_value": declared.least, "max_value": declared.most}
-    look = {"class": "input"}
     choices = [("", "–")] * (declared.default is None) + list(declared.choices.items())
     kinds: dict[InputKind, tuple[type[forms.Field], dict[str, Any]]] = {
-        InputKind.TEXT: (
-            forms.CharField,
-            {"max_length": declared.most, "widget": forms.TextInput(attrs=look)},
-        ),
-        InputKind.WHOLE: (
-            forms.IntegerField,
-            bounds
-            | {"required": declared.default is not None, "widget": forms.NumberInput(attrs=look)},
-        ),
-        InputKind.NUMBER: (
-            forms.FloatField,
-            bounds | {"widget": forms.NumberInput(attrs={**look, "step": "any"})},
-        ),
+        InputKind.TEXT: (forms.CharField, {"max_length": declared.most}),
+        InputKind.WHOLE: (forms.IntegerField, bounds | {"required": declared.default is not None}),
+        InputKind.NUMBER: (forms.FloatField, bounds),
         InputKind.DECIMAL: (
             forms.DecimalField,
             bounds | {"max_digits": 16, "decimal_places": 9, "required": declared.is_required},
         ),
         InputKind.SWITCH: (forms.BooleanField, {"required": False}),
-        InputKind.CHOICE: (
-            forms.ChoiceField,
-            {"choices": choices, "widget": forms.Select(attrs=look)},
-        ),
+        InputKind.CHOICE: (forms.ChoiceField, {"choices": choices}),
         InputKind.LINES: (LinesField, {"initial": "", "max_length": LONGEST_LINES}),
         InputKind.NAMES: (forms.MultipleChoiceField, {}),
     }

@@ -116,8 +116,8 @@ class HandOverForm(forms.Form):
 class AuthorForm(forms.Form):
     """Expert who made a contestant of the study."""
 
-    expert = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))
-    contestant = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))
+    expert = forms.ChoiceField()
+    contestant = forms.ChoiceField()
 
     def __init__(self, *args: Any, study: Study, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

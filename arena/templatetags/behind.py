@@ -62,7 +62,7 @@ def details_of(event: Event, names: Mapping[str, str] | None = None) -> str:
     for key in {**before, **after}:
         values = [_plain(part.get(key), names or {}) for part in (before, after)]
         text = " → ".join(value for value in dict.fromkeys(values) if value)
-        parts += [f"{key}: {text}"] if text else []
+        parts += [f"{key.replace('_', ' ')}: {text}"] if text else []
     return "; ".join(parts) or "–"
 
 
@@ -74,7 +74,9 @@ def _plain(value: Any, names: Mapping[str, str]) -> str:
         case bool():
             return "yes" if value else "no"
         case Mapping():
-            parts = {names.get(str(k), str(k)): _plain(v, names) for k, v in value.items()}
+            parts = {
+                names.get(k) or k.replace("_", " "): _plain(v, names) for k, v in value.items()
+            }
             return ", ".join(f"{key}: {text}" for key, text in parts.items() if text)
         case list() | tuple():
             return ", ".join(_plain(item, names) for item in value)

@@ -25,6 +25,10 @@ _LABELS: dict[str, dict[str, str]] = {
         "svg": "SVG",
         "pdf": "PDF",
         "png": "PNG",
+        "interplan": "interPlan",
+        "commonroad": "CommonRoad",
+        "openscenario": "OpenSCENARIO",
+        "scenarionet": "ScenarioNet",
     },
     "left_out": REASONS,
     "verb_label": {

@@ -18,6 +18,8 @@ function show(page) {
   for (const id of ["facts", "places"]) {
     document.getElementById(id)?.replaceChildren(...(page.getElementById(id)?.childNodes ?? []));
   }
+  const place = document.getElementById("place");
+  if (place) place.value = page.getElementById("place")?.value ?? "";
 }
 
 /** Returns the place on a lane that is nearest to a point of the picture, "" if none is near. */

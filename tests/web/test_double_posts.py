@@ -273,7 +273,7 @@ def check_growth(name: str, made: Counter[str], expected: dict[str, int], answer
         name,
         made,
         answers[0].status_code,
-        re.findall(r'class="error"[^>]*>([^<]*)', answers[0].content.decode())
+        re.findall(r'errorlist"[^>]*>(?:<li>)?([^<]*)', answers[0].content.decode())
         or answers[0].content[-300:],
     )
     assert {kind: made[kind] for kind in expected} == expected, told

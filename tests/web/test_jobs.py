@@ -114,6 +114,6 @@ def test_a_page_with_waiting_work_says_since_when_no_worker_runs(
     Presence("here 1").beat()
     Worker.objects.update(seen_at=rows.NOON)
     found = page(staff, name, job)
-    assert "No worker has been running since 20 November 2026, 12:00." in found
+    assert "No worker has been running since 20 November 2026, 12:00 UTC." in found
     assert "goes on as soon as one starts" in found
     assert not is_worked_on(staff, job)

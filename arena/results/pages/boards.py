@@ -38,7 +38,6 @@ class BoardForm(forms.Form):
 
     name = forms.CharField(
         max_length=LONGEST_NAME,
-        widget=forms.TextInput({"class": "input"}),
         help_text="Experts see it in the names of batches: it should name no contestant.",
     )
     study = forms.ModelChoiceField(
@@ -46,7 +45,6 @@ class BoardForm(forms.Form):
         label="First study",
         to_field_name="code",
         empty_label=None,
-        widget=forms.Select({"class": "input"}),
         help_text="Its scenarios and rules are those of the board.",
     )
     benchmark = forms.ModelChoiceField(
@@ -54,7 +52,6 @@ class BoardForm(forms.Form):
         to_field_name="code",
         required=False,
         empty_label="None",
-        widget=forms.Select({"class": "input"}),
         help_text="Where the study shows just its test split; its version stands in every table.",
     )
     provisional_above = forms.IntegerField(
@@ -62,7 +59,6 @@ class BoardForm(forms.Form):
         min_value=1,
         max_value=1000,
         initial=PROVISIONAL_ABOVE,
-        widget=forms.NumberInput({"class": "input"}),
         help_text="A contestant with a wider interval is marked as provisional in every table.",
     )
 

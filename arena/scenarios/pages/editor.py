@@ -59,9 +59,7 @@ class ScenarioForm(forms.Form):
         max_length=scenes.INSTRUCTION_LENGTH,
         strip=True,
         label="Sentence",
-        widget=forms.Textarea(
-            attrs={"class": "input", "rows": 4, "placeholder": "Made from the drawing."}
-        ),
+        widget=forms.Textarea({"rows": 4, "placeholder": "Made from the drawing."}),
     )
     modification = forms.CharField(required=False, max_length=LONGEST_CHANGE)
     derives = forms.BooleanField(required=False)

@@ -70,7 +70,7 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
 @page_for(*STAFF)
 def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what a file holds and one moment of it; a moment that is kept leads to its scene."""
-    row = get_object_or_404(SceneUpload.objects.select_related("uploaded_by"), code=code)
+    row = get_object_or_404(SceneUpload.objects.select_related("uploaded_by__person"), code=code)
     wanted = read_code(request.GET.get("moment", ""))
     moments = row.moments.select_related("scene")
     moment = moments.filter(code=wanted).first() or moments.first()
@@ -79,6 +79,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     waits = row.state in row.UNDER_WAY or any(one.state in one.UNDER_WAY for one in moments)
     context = {
         "upload": row,
+        "format": uploads.FORMATS.get(row.format, row.format),
         "what": "place" if row.format == uploads.MAP_FORMAT else "moment",
         "stops": list(enumerate(_stops(row))),
         "moment": moment,
