@@ -12,6 +12,7 @@ from django.db.models import Count, Q
 
 from arena.errors import NotYours
 from arena.models import LabellingRound, LabelTask, Study
+from arena.shell.listing import Listing
 from augment.models import (
     Augmentation,
     Contestant,
@@ -33,37 +34,25 @@ CELLS = 240
 """About so many cells are sent at once; whoever scrolls on gets as many again."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
-    """Part of a grid; pages count from 1."""
-
-    row: int = 1
-    state: str = ""
-    search: str = ""
-
-
-def grid_part(job: GenerationJob, part: Part) -> dict[str, Any]:
+def grid_part(job: GenerationJob, listing: Listing, row: int) -> dict[str, Any]:
     """Return scenarios down, contestants across; four queries, however large the job is.
 
-    A page beyond the last one is the last one. Each row has a scenario and its samples by
-    contestant.
+    Rows come in pages, counted from 1; beyond the last one it is the last one. Each row has a
+    scenario and its samples by contestant.
     """
     cells = job.augmentations.order_by()
     rows = Contestant.objects.filter(pk__in=cells.values("contestant"))
     contestants = list(rows.only("slug", "name", "kind", "code").order_by("name", "pk"))
-    shown = cells.filter(state=part.state) if part.state else cells
-    scenarios = Scenario.objects.filter(
-        pk__in=shown.values("scenario"), slug__icontains=part.search
-    )
+    shown = listing.narrow(cells, "scenario__slug", by=["state"])
+    scenarios = Scenario.objects.filter(pk__in=shown.values("scenario"))
     wide = max(1, len(contestants)) * job.samples
     ordered = scenarios.only("slug", "type", "code").order_by("type", "slug")
-    lines = Paginator(ordered, max(1, CELLS // wide)).get_page(part.row)
+    lines = Paginator(ordered, max(1, CELLS // wide)).get_page(row)
     by_place: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
     wanted = cells.filter(scenario__in=list(lines.object_list))
     for cell in wanted.only(*_LEAN).order_by("sample"):
         by_place[cell.scenario_id, cell.contestant_id].append(cell)
     return {
-        "part": part,
         "contestants": contestants,
         "scenarios": lines,
         "rows": [

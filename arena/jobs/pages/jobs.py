@@ -11,12 +11,12 @@ from django.urls import reverse
 
 from arena.jobs.exports.realism import realism_context
 from arena.jobs.pages.measures import ask_to_measure, displacement_section, driving_section
-from arena.jobs.queries import Part, grid_part
+from arena.jobs.queries import grid_part
 from arena.models import ScenarioFile
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.shell.forms import CapsForm
-from arena.shell.listing import choice_asked, page_asked, read_listing, read_page, search_asked
+from arena.shell.listing import choice_asked, page_asked, read_listing, read_page
 from augment.models import Augmentation, GenerationJob
 from augment.services import read_request
 from augment.services.judging import repeatability
@@ -97,12 +97,15 @@ def _first_tab(counts: JobCounts, tabs: list[str]) -> str:
 
 
 def _show_grid(request: HttpRequest, counts: JobCounts) -> Context:
-    part = Part(
-        row=page_asked(request, "row"),
-        state=choice_asked(request, "state", State.values),
-        search=search_asked(request),
-    )
-    return {"grid": grid_part(counts.job, part)}
+    chosen = choice_asked(request, "state", State.values)
+    states = [
+        (state, f"{state.label} ({number})")
+        for state, number in counts.by_state.items()
+        if number or state == chosen
+    ]
+    listing = read_listing(request, {"state": ("With a result that is", states)})
+    grid = grid_part(counts.job, listing, page_asked(request, "row"))
+    return {"grid": grid, "listing": listing}
 
 
 def _show_failures(_request: HttpRequest, counts: JobCounts) -> Context:
