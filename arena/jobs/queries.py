@@ -34,7 +34,7 @@ CELLS = 240
 """About so many cells are sent at once; whoever scrolls on gets as many again."""
 
 
-def grid_part(job: GenerationJob, listing: Listing, row: int) -> dict[str, Any]:
+def grid_part(job: GenerationJob, listing: Listing, page: int) -> dict[str, Any]:
     """Return scenarios down, contestants across; four queries, however large the job is.
 
     Rows come in pages, counted from 1; beyond the last one it is the last one. Each row has a
@@ -47,7 +47,7 @@ def grid_part(job: GenerationJob, listing: Listing, row: int) -> dict[str, Any]:
     scenarios = Scenario.objects.filter(pk__in=shown.values("scenario"))
     wide = max(1, len(contestants)) * job.samples
     ordered = scenarios.only("slug", "type", "code").order_by("type", "slug")
-    lines = Paginator(ordered, max(1, CELLS // wide)).get_page(row)
+    lines = Paginator(ordered, max(1, CELLS // wide)).get_page(page)
     by_place: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
     wanted = cells.filter(scenario__in=list(lines.object_list))
     for cell in wanted.only(*_LEAN).order_by("sample"):
