@@ -124,8 +124,8 @@ def test_one_scenario_is_tried_first_and_the_rest_is_remembered(
     slugs = set(job.contestants.values_list("slug", flat=True))
     assert {value for name, value in ticked if name == "contestants"} == slugs
     assert {value for name, value in ticked if name == "scenarios"} == {"one", "two"}
-    assert 'name="samples" type="number" value="3"' in form
-    assert 'name="cap_calls" type="number" value="500"' in form
+    assert 'type="number" name="samples" value="3"' in form
+    assert 'type="number" name="cap_calls" value="500"' in form
 
 
 def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models: Endpoint) -> None:
@@ -145,7 +145,7 @@ def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models:
         'value="Old (2)"',
         'name="contestants" value="reference" checked',
         'name="scenarios" value="two" checked',
-        'name="cap_tokens" type="number" value="7"',
+        'type="number" name="cap_tokens" value="7"',
         'name="is_fresh" value="on" checked',
     ):
         assert part in form

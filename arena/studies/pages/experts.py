@@ -72,7 +72,7 @@ class EnrolmentForm(forms.Form):
     """The rules of an enrolment link."""
 
     consent = forms.CharField(max_length=LONGEST_CONSENT, initial=CONSENT)
-    asks_for = forms.CharField(max_length=120, initial="Your name or worker ID")
+    asks_for = forms.CharField(max_length=120, initial=gettext_lazy("Your name or worker ID"))
     places = forms.IntegerField(min_value=1, max_value=100_000, initial=100)
     votes_each = forms.IntegerField(min_value=1, max_value=10_000, initial=30)
     drop_out_after_h = forms.IntegerField(
