@@ -207,7 +207,8 @@ def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     parts = {part: analyse(answers) for part, analyse in ANALYSES.items()}
     has_wishes = any(entry.wish for measured in answers.values() for entry in measured)
     context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), "has_wishes": has_wishes}
-    context |= {"who": {slug: rows[0].row.contestant for slug, rows in answers.items()}} | parts
+    context |= parts
+    context["who"] = {slug: rows[0].row.contestant for slug, rows in answers.items()}
     return render(request, "jobs/analyses.html", context)
 
 
