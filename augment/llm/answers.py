@@ -19,7 +19,7 @@ from augment.errors import ModelFault, ParameterRefused
 from augment.foreign import Doubts, Value, describe_kind, read_as, read_whole
 from augment.llm.costs import FAR_BELOW
 from augment.llm.messages import CALL_FIELDS, LengthName, Reply, ToolCall, extra_of, shorten
-from augment.llm.vendors import says
+from augment.llm.vendors import names_of, says
 
 LONGEST_REFUSAL = 4_000
 LONGEST_NAME = 200
@@ -38,43 +38,14 @@ MOST_TOKENS = 100_000_000
 """A count beyond is none: no model reads or writes so much at once."""
 
 _ANSWER = "answer"
-_REASONING = ("reasoning_content", "reasoning", "reasoning_details", "thinking")
-# DeepSeek, Moonshot and others; OpenRouter.
-_GIVEN_BACK = {"reasoning_content", "reasoning_details"}
-_FIELDS = frozenset({"content", "refusal", "tool_calls", "function_call", *_REASONING})
 _KINDS = {"refusal": "refusal"} | dict.fromkeys(
     ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
 )
-_WORDS = ("text", "value", "thinking", "reasoning", "summary", "content", "refusal", "parts")
-"""Names under which a part of a message holds its text."""
-_SEALED = {"data", "encrypted_content", "signature"}
-"""Names under which a thought stands that nobody is to read."""
-_DETAILS = ("prompt_tokens_details", "input_tokens_details")
-_PLACES = ("", *(f"{name}." for name in _DETAILS))
-_CACHED_NAMES = (
-    "cached_tokens num_cached_tokens prompt_cache_hit_tokens cached_content_tokens "
-    "cached_content_token_count cache_read_input_tokens cache_read_tokens"
-)
-_CACHED = [place + name for place in _PLACES for name in _CACHED_NAMES.split()]
-_CREATED_NAMES = "cache_creation_input_tokens cache_creation_tokens cache_write_tokens"
-_CREATED = [place + name for place in _PLACES for name in _CREATED_NAMES.split()]
 
 _PASSING = frozenset({408, 409, 425, 429})
-# Names under which an error body says what is wrong.
-_SENTENCES = re.compile(
-    r"(error_?)?(message|msg|description)|errors?|details?|reason|title|status_msg|raw|"
-)
 _HEADLINE = re.compile(r"<(title|h1)\b[^>]*>(.*?)</", re.DOTALL | re.IGNORECASE)
-_CODES = (
-    *("code", "error_code", "error_type", "type", "status", "reason", "error"),
-    *("finishReason", "stop_reason"),
-)
-_BLOCKED = ("blockReason", "block_reason", "flagged_input")
-_FLAGS = ("filtered", "input_sensitive", "output_sensitive")
 _FILTERED = ("code", "content_filter")
 
-# What asks to wait: headers, fields of the body, and its sentence.
-_WAITS = ("retry-after-ms", "retry-after", "retryDelay", "retry_after", "estimated_time", "asks")
 _ASKS_TO_WAIT = re.compile(
     r"\b(?:try again|retry|wait) (?:in |after |for )?((?:\d+m(?!s))?[\d.]+ ?m?s\w*|\d+ ?min\w*)",
     re.IGNORECASE,
@@ -87,7 +58,6 @@ _WAIT = re.compile(
 
 # What a request can do without, or say in another way.
 _DROPPABLE: tuple[str, ...] = ("temperature", "seed", "reasoning_effort", *LengthName)
-_NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter", "extra_forbidden"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +100,7 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
     message = choice.get("message")
     message = message if isinstance(message, dict) else {}
     pieces, calls = _read_message(message, doubts)
-    thoughts_back = extra_of(message, message.keys() - _GIVEN_BACK) if calls else ""
+    thoughts_back = extra_of(message, message.keys() - names_of("given_back")) if calls else ""
     texts, thoughts, refusals, unread = (
         [text for kind, text in pieces if kind == wanted]
         for wanted in ("text", "thought", "refusal", "unread")
@@ -174,13 +144,14 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
 def read_error(body: object) -> ForeignError:
     """Read an error: OpenAI's form, a text, or what LM Studio, TGI, FastAPI and others write."""
     leaves = list(islice(_leaves(body), MOST_LEAVES))
-    sentences = [text for name, text in leaves if _SENTENCES.fullmatch(name)]
+    sentences = [text for name, text in leaves if name in names_of("sentences")]
     message = "; ".join(dict.fromkeys(text for text in sentences if not text.isdigit()))
-    codes = [text for key in _CODES for name, text in leaves if name == key and " " not in text]
+    order = names_of("codes")
+    codes = [text for key in order for name, text in leaves if name == key and " " not in text]
     codes = [text for text in codes if len(text) <= LONGEST_NAME]
     return ForeignError(
         message=message,
-        code=next((text for name, text in leaves if name in _CODES[:3] and text != "0"), ""),
+        code=next((text for name, text in leaves if name in order[:3] and text != "0"), ""),
         parameter=next((text for name, text in leaves if name == "param"), ""),
         is_withheld=any(says("withheld", code) for code in codes)
         or (says("withheld_sentence", message) and not says("about_account", message)),
@@ -237,13 +208,13 @@ def _read_message(
     message: Mapping[str, object], doubts: Doubts
 ) -> tuple[list[tuple[str, str]], list[ToolCall]]:
     """Return text, thoughts, refusal and what can't be read, each by its kind, and the calls."""
-    thoughts = next((message[name] for name in _REASONING if message.get(name)), None)
+    thoughts = next((message[name] for name in names_of("thoughts") if message.get(name)), None)
     pieces = [
         *_pieces(message.get("content"), "content"),
         *_pieces(thoughts, "reasoning", "thought"),
         *_pieces(message.get("refusal") or None, "refusal", "refusal"),
     ]
-    if message.keys() - {"role"} and not message.keys() & _FIELDS:
+    if message.keys() - {"role"} and not message.keys() & names_of("message"):
         pieces.append(("unread", "the message has none of the fields of a message"))
     made: list[ToolCall] = []
     ids: set[str] = set()
@@ -312,12 +283,12 @@ def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str,
         for number, item in enumerate(value):
             yield from _pieces(item, f"{path}.{number}", kind)
     elif isinstance(value, dict) and value.get("type") != "tool_use":
-        name = next((name for name in _WORDS if value.get(name) is not None), None)
+        name = next((name for name in names_of("texts") if value.get(name) is not None), None)
         kind = "thought" if value.get("thought") is True else kind  # as Google has it
         kind = _KINDS.get(str(value.get("type")), kind)
         if name is not None:
             yield from _pieces(value[name], path, kind)
-        elif kind == "thought" and value.keys() & _SEALED:
+        elif kind == "thought" and value.keys() & names_of("sealed"):
             yield kind, ""
         else:
             yield "unread", f"{path} is a part of type {str(value.get('type'))[:40]!r}"
@@ -368,21 +339,24 @@ def _read_usage(
     Zeros are unknown. Gateways to Anthropic leave what came from the cache out of the prompt: it
     is then more than the prompt, or what lacks to the total or to what was sent.
     """
-    counts = dict(usage)
-    for name in _DETAILS:
-        details = _read(doubts, usage, name, dict, "usage.") or {}
-        counts |= {f"{name}.{inner}": value for inner, value in details.items()}
+    places = {"usage.": usage}
+    for name in ("prompt_tokens_details", "input_tokens_details"):
+        places[f"usage.{name}."] = _read(doubts, usage, name, dict, "usage.") or {}
 
     def count(*names: str) -> int | None:
-        rows = ((counts.get(name), f"usage.{name}", 0, MOST_TOKENS) for name in names)
+        rows = (
+            (fields.get(name), place + name, 0, MOST_TOKENS)
+            for place, fields in places.items()
+            for name in names
+        )
         return max(doubts.read_all(_ANSWER, read_whole, rows), default=None)
 
     prompt = count("prompt_tokens", "input_tokens")
     completion = count("completion_tokens", "output_tokens")
-    cached = count(*_CACHED)
-    beside = (cached or 0) + (count(*_CREATED) or 0)
+    cached = count(*names_of("cached"))
+    beside = (cached or 0) + (count(*names_of("created")) or 0)
     total, least = count("total_tokens"), FAR_BELOW * least_prompt
-    if usage and not any("tokens" in name for name in counts):
+    if usage and not any("tokens" in name for name in usage):
         doubts.faults[_ANSWER].append(f"usage has no count of tokens: {shorten(str(usage), 100)}")
     if prompt is not None and beside:
         whole = prompt + beside
@@ -409,8 +383,8 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(place, list) and place and isinstance(value.get("msg"), str):
             yield "param", str(place[-1])
             value = {**value, "msg": f"{place[-1]}: {value['msg']}"}
-        blocked = any(value.get(name) for name in _BLOCKED)
-        if blocked or any(value.get(flag) is True for flag in _FLAGS):
+        blocked = any(value.get(name) for name in names_of("blocked"))
+        if blocked or any(value.get(flag) is True for flag in names_of("flags")):
             yield _FILTERED
         for key, inner in value.items():
             yield from _leaves(inner, key)
@@ -427,7 +401,7 @@ def _leaves(value: object, name: str = "") -> Iterator[tuple[str, str]]:
 
 def _inner(name: str, text: str) -> object:
     """Return the JSON that a sentence holds where a gateway passes on what it was told."""
-    if text[:1] == "{" and text.count("{") <= MOST_CALLS and _SENTENCES.fullmatch(name):
+    if text[:1] == "{" and text.count("{") <= MOST_CALLS and name in names_of("sentences"):
         with suppress(ValueError, RecursionError):
             return json.loads(text)
     return None
@@ -447,7 +421,9 @@ def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> 
         is_about_value = says("about_value", text) or re.search(
             rf"(?<![\w.-]){re.escape(sent_value)}\b", text
         )
-        if (named and error.code in _NOT_TAKEN) or says("unknown_parameter", text, name=name):
+        if (named and error.code in names_of("not_taken")) or says(
+            "unknown_parameter", text, name=name
+        ):
             return name
         is_unknown = says("unknown_unless_value", text, name=name) or (
             named and says("unknown", text)
@@ -459,7 +435,9 @@ def _find_refused_parameter(error: ForeignError, sent: Mapping[str, object]) -> 
 
 def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
     """Return the seconds that an answer asks to wait, and a remark on what can't be read."""
-    waits = {name: fields[name].strip() for name in _WAITS if fields.get(name, "").strip()}
+    waits = {
+        name: fields[name].strip() for name in names_of("waits") if fields.get(name, "").strip()
+    }
     for name, text in waits.items():
         match = _WAIT.fullmatch(text)
         try:

@@ -20,9 +20,19 @@ def says(meaning: str, text: str, *, name: str = "") -> bool:
     return _pattern(meaning, name).search(text, 0, _LONGEST) is not None
 
 
+def names_of(meaning: str) -> list[str]:
+    """Return the names under which vendors write something: a list of the file, in its order."""
+    return _words()[meaning]
+
+
+@cache
+def _words() -> dict[str, list[str]]:
+    return tomllib.loads(files(__package__).joinpath("vendors.toml").read_text("utf-8"))
+
+
 @cache
 def _pattern(meaning: str, name: str) -> re.Pattern[str]:
-    words = tomllib.loads(files(__package__).joinpath("vendors.toml").read_text("utf-8"))
+    words = _words()
     names = "|".join(words.get(name, [name.replace("_", "_?")]))
     text = "|".join(words[meaning]).replace("NAME", f"({names})")
     for part in ("noun", "unknown"):
