@@ -150,13 +150,6 @@ def names_changes(answer: str) -> bool:
     return _CHANGES.search(answer) is not None
 
 
-def declines(answer: str) -> bool:
-    """Return whether an answer is a refusal in prose: it begins as one and holds no block."""
-    text = without_thoughts(answer).strip()
-    is_prose = len(text) <= _LONGEST_REFUSAL and "{" not in text
-    return is_prose and says("declines", text)
-
-
 def refuses(answer: str) -> bool:
     """Return whether a modifier's answer without a block is a refusal.
 

@@ -11,7 +11,7 @@ from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
 from augment.llm.costs import find_cut
 from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
-from augment.prompts.blocks import declines, only_thinks
+from augment.prompts.blocks import only_thinks
 from augment.prompts.fill import prompt_version, review_re_ask_messages
 
 Messages = tuple[Message, ...]
@@ -157,7 +157,7 @@ class Respondents:
         """
         ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE, schema=schema)
         max_tokens, re_asked = self.max_tokens, 0
-        reply, has_declined = reply or ask(messages), True
+        reply = reply or ask(messages)
         while True:
             has_begun = not (reply.is_cut_off and only_thinks(reply.text))
             try:
@@ -170,9 +170,6 @@ class Respondents:
                     problems.insert(0, "no native call is answered: write the answer itself")
                 elif reply.reasoning and not reply.text:
                     problems.insert(0, "there are thoughts and no answer: write it as well")
-                has_declined = has_declined and declines(reply.text)
-                if re_asked == self.re_asks and has_declined:
-                    raise ModelRefused(reply.text.strip()) from None
                 if re_asked == self.re_asks:
                     raise errors.ReplyUnreadable(problems) from None
             messages = again(messages, reply.text, problems)

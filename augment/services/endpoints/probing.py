@@ -241,16 +241,13 @@ class _Prober:
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = find_cut(request, reply, context_tokens=self._row.context_tokens)
         is_good = question.is_good(reply) if cut is None else False
-        if ability == Ability.ANSWER_LIMIT and is_good is False:
+        if is_good is False and ability in (Ability.ANSWER_LIMIT, Ability.SCHEMA):
             # Some servers pass over a parameter that they do not know instead of refusing it.
-            renamed = self.profile.without(request.length_name)
-            if not renamed.refused.issuperset(LengthName):
-                self.profile = renamed
-                return replace(self.ask(question), cost_usd=None)
-        if ability == Ability.SCHEMA and is_good is False:
-            # Others answer 200 and ignore it.
-            self.profile = self.profile.without(request.schema_form)
-            if not self.profile.refused.issuperset(SchemaForm):
+            is_limit = ability == Ability.ANSWER_LIMIT
+            other = self.profile.without(request.length_name if is_limit else request.schema_form)
+            is_last = other.refused.issuperset(LengthName if is_limit else SchemaForm)
+            self.profile = self.profile if is_limit and is_last else other
+            if not is_last:
                 return replace(self.ask(question), cost_usd=None)
         calls = ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
         text = str(cut) if cut else reply.text or reply.refusal or calls
