@@ -38,6 +38,7 @@ MOST_TOKENS = 100_000_000
 """A count beyond is none: no model reads or writes so much at once."""
 
 _ANSWER = "answer"
+_OF_A_CALL = (*CALL_FIELDS, "name", "arguments", "input")
 _KINDS = {"refusal": "refusal"} | dict.fromkeys(
     ("thinking", "redacted_thinking", "reasoning", "reasoning_content"), "thought"
 )
@@ -244,15 +245,15 @@ def _read_message(
             call_id = f"call_{number}"
         ids.add(call_id)
         # A text, which may be broken; some servers send the object itself.
-        arguments = function.get("arguments")
-        if arguments is None or not isinstance(arguments, str):
+        arguments = function.get("arguments", function.get("input"))
+        if not isinstance(arguments, str):
             arguments = "" if arguments is None else json.dumps(arguments)
         made.append(
             ToolCall(
                 id=shorten(call_id, LONGEST_NAME),
                 name=shorten(name, LONGEST_NAME),
                 arguments=shorten(arguments, LONGEST_ARGUMENTS),
-                extra=_bounded(extra_of(fields, CALL_FIELDS), path, doubts),
+                extra=_bounded(extra_of(fields, _OF_A_CALL), path, doubts),
             )
         )
     return pieces, made
@@ -270,9 +271,7 @@ def _bounded(extra: str, path: str, doubts: Doubts) -> str:
 def _find_uses(content: object) -> list[object]:
     """Return the calls that Anthropic puts among the parts of a message."""
     parts = content if isinstance(content, list) else []
-    uses = [part for part in parts if isinstance(part, dict) and part.get("type") == "tool_use"]
-    functions = [{"name": part.get("name"), "arguments": part.get("input")} for part in uses]
-    return [{"id": use.get("id"), "function": functions[at]} for at, use in enumerate(uses)]
+    return [part for part in parts if isinstance(part, dict) and part.get("type") == "tool_use"]
 
 
 def _pieces(value: object, path: str, kind: str = "text") -> Iterator[tuple[str, str]]:
@@ -312,13 +311,11 @@ def _insist_on_answer(
     Raises:
         ModelFault: There is none.
     """
-    message, is_passing = choice.get("message"), not error.is_spent
+    message = choice.get("message")
     if says("broken", reason):
         problem = f"broke off its answer, finish_reason {shorten(reason, 40)!r}{error}"
     elif str(error):
         problem = f"answered 200 with an error{error}"
-        is_final = re.fullmatch(r"4\d\d", error.code) and int(error.code) not in _PASSING
-        is_passing = is_passing and not is_final
     elif not choice:
         problem = "answered without a choice"
     elif not isinstance(message, dict):
@@ -328,7 +325,8 @@ def _insist_on_answer(
         problem = f"answered in a form that can't be read: {unread[0]}"
     else:
         return
-    raise ModelFault(f"the endpoint {problem}", retryable=is_passing, status=200)
+    is_lasting = error.is_spent or says("lasting", error.code)
+    raise ModelFault(f"the endpoint {problem}", retryable=not is_lasting, status=200)
 
 
 def _read_usage(

@@ -207,6 +207,13 @@ def test_what_does_not_pass_by_waiting_is_not_asked_for_again(row: dict[str, Any
     assert not fault.retryable
 
 
+@pytest.mark.parametrize("code", [400, "402", "invalid_api_key", "model_not_found"])
+def test_an_error_in_a_200_that_stays_is_not_asked_for_again(code: object) -> None:
+    fault = outcome({"error": {"message": "No.", "code": code}})
+    assert isinstance(fault, ModelFault)
+    assert not fault.retryable
+
+
 def test_thoughts_that_nobody_may_read_are_thoughts() -> None:
     """OpenRouter hands out those of several vendors sealed; all tokens may have gone into them."""
     sealed = {
