@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError, CommandParser, OutputWrapper
+from django.db import OperationalError
 
 from augment.errors import AugmentError
 from augment.escaping import escape_controls
@@ -66,12 +67,18 @@ class TerminalCommand(BaseCommand):
         super().__setattr__(name, _wrap(value) if is_stream else value)
 
     def execute(self, *args: Any, **options: Any) -> str | None:
-        """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
+        """Run the command; an AugmentError ends it as a CommandError with the same sentence.
+
+        So does a database that is full, locked or not there.
+        """
         foreseen = (AugmentError, OSError) if self.failure else AugmentError
         try:
             return super().execute(*args, **options)
         except foreseen as error:
             raise CommandError(f"{self.failure} {error}".lstrip()) from error
+        except OperationalError as error:
+            text = f"{self.failure} The database: {error}; `manage.py doctor` looks at all parts."
+            raise CommandError(text.lstrip()) from error
 
 
 def _wrap(stream: OutputWrapper) -> TerminalOutput:

@@ -3,6 +3,8 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from django.core.management import CommandError, call_command
+from django.db import OperationalError
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -54,6 +56,15 @@ def test_a_name_in_an_error_of_a_command_is_escaped(
     printed = capsys.readouterr().err
     assert r"\x1b[2J.csv: No such file" in printed
     assert CLEAR not in printed
+
+
+def test_a_database_that_fails_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise OperationalError("database or disk is full")
+
+    monkeypatch.setattr("arena.management.commands.prepare._lock_database", fail)
+    with pytest.raises(CommandError, match=r"^The database: .* is full; `manage.py doctor`"):
+        call_command("prepare")
 
 
 class Terminal(StringIO):
