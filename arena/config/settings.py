@@ -150,6 +150,7 @@ REST_FRAMEWORK = {
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
     "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
     "EXCEPTION_HANDLER": "arena.api.errors.answer_error",
+    "UNICODE_JSON": False,  # a refused value is named, and UTF-8 has no lone surrogate
 }
 SPECTACULAR_SETTINGS = {
     "TITLE": "Scenario Arena",

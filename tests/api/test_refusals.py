@@ -29,6 +29,8 @@ pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
         ({"outcome": "skip"}, "reason"),
         ({"outcome": "skip", "reason": "bored"}, "reason"),
         ({"reason": "unclear"}, "reason"),
+        ({"reason": "\ud800"}, "reason"),
+        ({"\ud800": 1}, "\ud800"),
         ({"both_miss": True}, "both_miss"),
         ({"outcome": "E", "both_miss": True}, "both_miss"),
         ({"both_miss": 1}, "both_miss"),
