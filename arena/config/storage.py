@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from datetime import datetime
 from pathlib import Path
 
 from django.core.files.base import File
@@ -24,6 +25,12 @@ class WholeFiles(FileSystemStorage):
 
     def __init__(self, location: str | Path | None = None, base_url: str | None = None) -> None:
         super().__init__(location=location, base_url=base_url, allow_overwrite=True)
+
+    def find_older(self, folder: str, before: datetime) -> list[str]:
+        """Return the files of a folder that were written before that time."""
+        files = Path(self.path(folder)).glob("*")
+        at = before.timestamp()
+        return [f"{folder}/{file.name}" for file in files if file.stat().st_mtime < at]
 
     def _save(self, name: str, content: File[bytes]) -> str:
         path = Path(self.path(name))

@@ -2,10 +2,14 @@
 
 import io
 from collections.abc import Iterator
+from datetime import timedelta
+from typing import Any
 
 import pytest
+from botocore.client import BaseClient
 from django.core.files.storage import default_storage
 from django.urls import reverse
+from django.utils import timezone
 from PIL import Image, UnidentifiedImageError
 from pytest_django import Settings
 
@@ -14,6 +18,7 @@ from augment.render.bev import draw
 from augment.render.camera import Camera, camera_for
 from augment.render.canvas import shrink_png
 from augment.scene.entities import Modification
+from augment.services.judging import compute_once, delete_computed
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.thumbnails import find_box, shrink
 from tests import scenes
@@ -56,6 +61,26 @@ def test_thumbnails_lie_in_the_bucket_with_the_pictures(picture: bytes, there: B
     small = shrink(store(picture), 400)
     assert read(small) == shrink_png(picture, 400)
     assert f"arena/{small}" in there.names()
+
+
+def test_old_charts_of_a_bucket_are_found_by_one_request(
+    there: Bucket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    ask: Any = BaseClient._make_api_call
+
+    def note(client: BaseClient, operation: str, values: object) -> Any:
+        asked.append(operation)
+        return ask(client, operation, values)
+
+    for number in range(3):
+        compute_once("svg", bytes, number)
+    store(png())
+    monkeypatch.setattr(BaseClient, "_make_api_call", note)
+    delete_computed(before=timezone.now() - timedelta(days=1))
+    delete_computed(before=timezone.now() + timedelta(days=1))
+    assert asked == [*2 * ["ListObjects"], *3 * ["DeleteObject"]]
+    assert [name.split("/")[1] for name in there.names()] == ["bev"]
 
 
 @pytest.mark.django_db

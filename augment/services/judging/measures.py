@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import suppress
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -165,7 +164,6 @@ def compute_once(suffix: str, compute: Callable[[], bytes], *parts: object) -> b
 
 def delete_computed(*, before: datetime) -> None:
     """Delete what was computed before that time; whoever asks for it computes it again."""
-    with suppress(FileNotFoundError):  # nothing was computed yet
-        for name in default_storage.listdir(COMPUTED)[1]:
-            if default_storage.get_modified_time(f"{COMPUTED}/{name}") < before:
-                default_storage.delete(f"{COMPUTED}/{name}")
+    media: Any = default_storage
+    for name in media.find_older(COMPUTED, before):
+        media.delete(name)
