@@ -28,6 +28,8 @@ OPTIONAL = ("judge", "item")
 SIMULATED = "simulated"
 """A column that our own files have; a yes in it marks a vote as made up."""
 WINNERS = {"model_a": WIN, "model_b": LOSS, "tie": TIE, "tie (bothbad)": TIE}
+_BOTH_BAD = ("both_bad", "bothbad")
+"""As newer votes of Chatbot Arena call it."""
 SEPARATORS = ",;\t|"
 MOST_UNPACKED = 2**27
 """Bytes that a packed file may hold."""
@@ -48,7 +50,7 @@ _ALIKE = str.maketrans(
 )
 """Cyrillic and Greek letters, hyphens and quotes that look as those of ASCII."""
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
-_NO_VALUES = frozenset({"nan", "<na>", "#n/a", "#ref!", "#value!", "#name?", "#null!", "#num!"})
+_NO_VALUES = frozenset("nan <na> #n/a #ref! #value! #name? #null! #num! #div/0! #spill!".split())
 """What pandas and Excel write where there is no value."""
 NO_VOTES = "there are no votes in it"
 LATIN_1_NOTE = (
@@ -106,6 +108,8 @@ def read_table(path: Path) -> VotesTable:
     if not table.lines:
         raise VotesFileUnreadable(NO_VOTES)
     table.check_filled(NEEDED)
+    winners = table.columns["winner"]
+    winners[:] = ["tie (bothbad)" if cell in _BOTH_BAD else cell for cell in winners]
     votes = zip(*(table.columns[name] for name in NEEDED), strict=True)
     for place, (model_a, model_b, winner) in enumerate(votes):
         if winner not in WINNERS:
@@ -168,11 +172,13 @@ _BROKEN_ARCHIVE = (
 
 def _find_alike(table: VotesTable) -> str:
     """Return a note on two names that are not the same and look nearly so, empty without any."""
-    seen = dict[str, str]()
-    for name in sorted({*table.columns["model_a"], *table.columns["model_b"]}):
-        other = seen.setdefault(unicodedata.normalize("NFKC", name).translate(_ALIKE), name)
-        if other != name:
-            return f"{other!a} and {name!a} look alike and count as two names."
+    models = table.columns["model_a"] + table.columns["model_b"]
+    for names in (models, *(table.columns.get(name, []) for name in OPTIONAL)):
+        seen = dict[str, str]()
+        for name in sorted({*names}):
+            look = unicodedata.normalize("NFKC", name).translate(_ALIKE).casefold()
+            if (other := seen.setdefault(look, name)) != name:
+                return f"{other!a} and {name!a} look alike and count as two names."
     return ""
 
 
@@ -260,7 +266,7 @@ def _read_header(text: str, above: int, separators: str) -> tuple[str, list[str]
 
 def _read_json(text: str) -> VotesTable:
     """Read objects, and arrays of objects, one after the other."""
-    decoder, votes, end = json.JSONDecoder(), list[Any](), 0
+    decoder, votes, end = json.JSONDecoder(object_pairs_hook=_name_columns), list[Any](), 0
     while rest := re.compile(r"\S").search(text, end):
         value, end = decoder.raw_decode(text, rest.start())
         votes += value if isinstance(value, list) else [value]
@@ -269,11 +275,16 @@ def _read_json(text: str) -> VotesTable:
             raise VotesFileUnreadable(
                 f"vote {number}: an object with {', '.join(NEEDED)} is needed, not {vote!r:.40}"
             )
-    named = [{_column_name(name): value for name, value in vote.items()} for vote in votes]
-    there = set[str]().union(*named) if named else {*NEEDED}
+    there = set[str]().union(*votes) if votes else {*NEEDED}
     _find_columns(list(there))
-    columns = {name: [vote.get(name) for vote in named] for name in _KNOWN if name in there}
-    return VotesTable(columns=columns, lines=range(1, len(named) + 1), word="vote")
+    columns = {name: [vote.get(name) for vote in votes] for name in _KNOWN if name in there}
+    return VotesTable(columns=columns, lines=range(1, len(votes) + 1), word="vote")
+
+
+def _name_columns(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    names = [_column_name(name) for name, _ in pairs]
+    _check_once(names, "an object")
+    return dict(zip(names, (value for _, value in pairs), strict=True))
 
 
 def _read_parquet(content: io.BytesIO) -> VotesTable:
@@ -322,9 +333,12 @@ def _read_book(content: io.BytesIO) -> VotesTable:
     names = [[_column_name(str(cell)) for cell in head] for (_, head), _ in heads]
     best = max(range(len(heads)), key=lambda sheet: len({*names[sheet]} & {*_KNOWN}))
     places = _find_columns(names[best])
+    unread = sum({*NEEDED} <= {*head} for head in names) - 1
+    note = f"Only sheet {book.worksheets[best].title!a} is read; {unread} more have votes."
     rows = list(heads[best][1])
     columns = {name: [row[at] for _, row in rows] for name, at in places.items()}
-    return VotesTable(columns=columns, lines=[number for number, _ in rows], word="row")
+    numbers = [number for number, _ in rows]
+    return VotesTable(columns=columns, lines=numbers, word="row", note=note if unread else "")
 
 
 def _sheet_rows(sheet: Any) -> Iterator[tuple[int, tuple[Any, ...]]]:
@@ -349,9 +363,7 @@ _BINARY: dict[bytes, Callable[[io.BytesIO], VotesTable]] = {
 
 def _find_columns(header: Sequence[str]) -> dict[str, int]:
     """Return the places of the known columns."""
-    for name in _KNOWN:
-        if header.count(name) > 1:
-            raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
+    _check_once(header, "line 1")
     for name in NEEDED:
         if name not in header:
             raise VotesFileUnreadable(
@@ -360,8 +372,14 @@ def _find_columns(header: Sequence[str]) -> dict[str, int]:
     return {name: header.index(name) for name in _KNOWN if name in header}
 
 
+def _check_once(header: Sequence[str], place: str) -> None:
+    for name in _KNOWN:
+        if header.count(name) > 1:
+            raise VotesFileUnreadable(f"{place}: the column {name!r} is there twice")
+
+
 def _clean_cells(table: VotesTable) -> VotesTable:
-    """Return the votes as clean text, without those that have no cell filled."""
+    """Return the votes as clean text, without lines and rows that have no cell filled."""
     columns: dict[str, list[str]] = {}
     for name, cells in table.columns.items():
         texts = [cell if type(cell) is str else _as_text(cell) for cell in cells]
@@ -372,7 +390,8 @@ def _clean_cells(table: VotesTable) -> VotesTable:
             raise table.refuse(place, f"{name} is no text: {cells[place]!r:.40}")
         clean = {text: _clean(text or "") for text in set(texts)}
         columns[name] = [clean[text] for text in texts]
-    filled = [place for place, row in enumerate(zip(*columns.values(), strict=True)) if any(row)]
+    rows, is_json = zip(*columns.values(), strict=True), table.word == "vote"
+    filled = [place for place, row in enumerate(rows) if is_json or any(row)]
     return replace(
         table,
         columns={name: [cells[place] for place in filled] for name, cells in columns.items()},

@@ -64,6 +64,23 @@ def test_other_forms_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
     assert document(str(path), rounds=100)["standings"] == plain
 
 
+def test_newer_words_for_both_bad_are_ties(votes: Any) -> None:
+    plain = document(votes(*PLAIN), rounds=100)["standings"]
+    for word in ("both_bad", "bothbad"):
+        file = votes(*(line.replace("tie (bothbad)", word) for line in PLAIN))
+        assert document(file, rounds=100)["standings"] == plain
+
+
+def test_votes_on_a_further_sheet_are_said_to_be_unread(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    for sheet in (book.active, book.create_sheet(), book.create_sheet("about")):
+        sheet.append(["note"] if sheet.title == "about" else HEAD.split(","))
+        sheet.append(["a", "b", "tie"])
+    book.save(tmp_path / "votes")
+    notes = document(str(tmp_path / "votes"), rounds=100)["notes"]
+    assert "Only sheet 'Sheet' is read; 1 more have votes." in notes
+
+
 def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
     path = tmp_path / "votes.jsonl"
     good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
@@ -170,6 +187,8 @@ def _zipped(**entries: bytes) -> bytes:
         (b'[{"model_a": ["a"], "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no text"),
         (b'[{"model_a": "\\u0000", "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no te"),
         (b'{"votes": []}', "there is no column 'model_a'"),
+        (b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]', "'model_a' is there"),
+        (b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]', "vote 2: model_a is emp"),
         (b"[" * 100_000, "it can't be read: "),
         (gzip.compress(b"x" * 3_000_000, mtime=0), "it unpacks to more than 1 MB"),
         (gzip.compress(HEAD.encode(), mtime=0)[:-9], "it can't be read: "),
@@ -196,11 +215,10 @@ def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(
     names = ["R\u00f6ver 1", "Ro\u0308ver 1", " R\u00f6ver\u00a0 1", "R\u00f6\u200bver 1"]
     same = document(votes(*(f"{name},b,tie" for name in names)), rounds=100)
     assert [line["model"] for line in same["standings"]] == ["Röver 1", "b"]
-    for alike in ("\u0410", "\uff21"):
-        (note,) = [
-            one for one in document(votes(f"A,{alike},tie"))["notes"] if "look alike" in one
-        ]
-        assert "count as two names" in note
+    lines = [f"A,{alike},tie,j,i" for alike in ("\u0410", "\uff21", "a")]
+    for line in [*lines, "a,b,tie,Anna,i\na,b,tie,anna,i", "a,b,tie,j,I1\na,b,tie,j,i1"]:
+        notes = document(votes(line, head=WITH_CLUSTERS))["notes"]
+        assert sum("look alike and count as two names" in note for note in notes) == 1, line
     path = tmp_path / "latin1.csv"
     path.write_bytes(f"{HEAD}\nRöver,b,tie\n".encode("latin-1"))
     latin = document(str(path), rounds=100)
