@@ -202,6 +202,19 @@ def read_xml(path: Path, *, what: str) -> ET.Element:
 
 
 class _NoDoctype(ET.TreeBuilder):
+    """Calls what is in the namespace of the root, as ASAM's files are, by its plain name."""
+
+    _own = ""
+
     def doctype(self, *_: object) -> None:
         """Refuse a document type, in which all that is dangerous begins."""
         raise ValueError("declares a document type")
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ET.Element:
+        """Open an element."""
+        self._own = self._own or tag[: tag.rfind("}") + 1] or " "
+        return super().start(tag.removeprefix(self._own), attrs)
+
+    def end(self, tag: str, /) -> ET.Element:
+        """Close an element."""
+        return super().end(tag.removeprefix(self._own))

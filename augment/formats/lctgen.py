@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.foreign import FloatArray, fault_at, read_finite
+from augment.foreign import Doubts, FloatArray, fault_at, read_finite, read_numbers
 from augment.formats.reading import LONGEST_M
 from augment.geometry.frames import wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent
@@ -62,8 +62,10 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
     Raises:
         InvalidDocument: Neither `agent` nor `tracks`, or a row that is no vehicle.
     """
-    rows = _rows(document)
+    doubts = Doubts()
+    rows = _rows(document, doubts)
     notes = ["LCTGen says nothing of other road users than vehicles, nor what stays or goes."]
+    notes += doubts.notes
     away_m = float(np.hypot(*rows[0, :2]))
     if away_m > _ASIDE_M:
         notes.append(f"Its ego, {away_m:.2f} m from the scene's, is left out.")
@@ -96,23 +98,27 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
 # Private
 
 
-def _rows(document: object) -> FloatArray:
+def _rows(document: object, doubts: Doubts) -> FloatArray:
     """The vehicles, the ego first: (N, 7) x, y, vx, vy, heading, length, width."""
     parts = document if isinstance(document, Mapping) else {}
-    if "agent" in parts:
-        return read_finite(parts["agent"], "agent", _COLUMNS)
-    tracks = parts.get("tracks")
-    if not isinstance(tracks, Mapping) or not tracks:
+    values = parts.get("agent", parts.get("tracks"))
+    values = [*values.values()] if isinstance(values, Mapping) else values
+    if not isinstance(values, list | np.ndarray) or not len(values):
         raise fault_at("", "expected LCTGen's `agent` or `tracks`")
-    rows = np.vstack(
-        [_first_state(track, f"tracks[{n}]") for n, track in enumerate(tracks.values())]
-    )
-    if not rows[0, -1]:
-        raise fault_at("tracks", "the first is the ego, and is not there at t0")
+    read = [
+        doubts.read("vehicles", _first_state, value, f"vehicles[{number}]")
+        for number, value in enumerate(values)
+    ]
+    rows = np.vstack([row for row in read if row is not None] or [np.zeros(_COLUMNS + 1)])
+    if read[0] is None or rows[0, -1] <= 0.0:
+        said = "is the ego, and is not there at t0."
+        raise fault_at("vehicles[0]", " ".join([said, *doubts.notes]))
     return np.asarray(rows[rows[:, -1] > 0.0, :_COLUMNS])
 
 
-def _first_state(track: Any, place: str) -> FloatArray:
-    state = track.get("state") if isinstance(track, Mapping) else None
-    states = read_finite(() if state is None else state, f"{place}.state", 10)
-    return np.asarray(states[0, _TRACK_COLUMNS])
+def _first_state(value: Any, place: str) -> FloatArray:
+    """Return a vehicle at t0: a row, or the beginning of a track; last, whether it is there."""
+    if not isinstance(value, Mapping):
+        return np.append(read_finite([value], place, _COLUMNS), 1.0)
+    states = read_numbers(value.get("state"), f"{place}.state", 10)[:1, _TRACK_COLUMNS]
+    return read_finite(states, f"{place}.state", len(_TRACK_COLUMNS)).reshape(-1)

@@ -21,7 +21,8 @@ WHAT = "nuPlan experiment"
 MOST_ROWS, MOST_COLUMNS, MOST_BYTES = 100_000, 200, 64_000_000
 LONGEST_REASON = 300
 _OF_AGGREGATOR = frozenset(
-    ("scenario", "log_name", "scenario_type", "num_scenarios", "planner_name", "aggregator_type")
+    "scenario log_name scenario_type num_scenarios planner_name aggregator_type "
+    "__index_level_0__".split()
 )
 _NEEDED = ("scenario", "log_name", "planner_name", "score")
 _OF_REPORT = ("scenario_name", "planner_name", "succeeded", "error_message")
@@ -92,9 +93,9 @@ def _read_aggregate(file: Path) -> list[NuplanDrive]:
         }
         row_values = {"is_interplan": _OF_INTERPLAN in parts, "score": parts.pop("score")}
         place = f"{file.name}: row {number}"
-        if row_values["score"] is None:
-            raise InvalidDocument(WHAT, [(f"{place}: score", "is missing")])
-        drives.append(_drive(place, row["scenario"], row, reason="", parts=parts, **row_values))
+        reason = "nuPlan gave no score" if row_values["score"] is None else ""
+        row_values |= {"parts": parts if not reason else {}, "reason": reason}
+        drives.append(_drive(place, row["scenario"], row, **row_values))
     return drives
 
 

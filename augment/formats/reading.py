@@ -186,6 +186,8 @@ class Log:
             areas=road.areas,
         )
         notes = [*map_notes, *self.notes, *city.doubts.notes, *doubts.notes]
+        if (apart_s := np.diff(self.times_s).max(initial=0.0)) > LONGEST_GAP_S:
+            notes.append(f"Steps lie up to {apart_s:g} s apart; a drive looks between them.")
         if sizeless := sum(not track.has_size for track in self.tracks):
             sizes = f"{sizeless} of {len(self.tracks)} objects"
             notes.append(f"{sizes} got the usual size of their class.")

@@ -116,6 +116,14 @@ def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     assert "unknown '72'; known: 90, 70, 71" in fault_of(tmp_path, newer(), "72")
 
 
+def test_a_namespace_of_the_root_changes_nothing(tmp_path: Path) -> None:
+    spaced = newer().replace("<commonRoad ", '<commonRoad xmlns="urn:x" xmlns:o="urn:o" ')
+    spaced = spaced.replace("</commonRoad>", "<o:lanelet id='9'/></commonRoad>")
+    reading = read(tmp_path, spaced)
+    assert reading.scene == read(tmp_path, newer()).scene
+    assert "first {urn:o}lanelet 9: unknown" in " ".join(reading.notes)
+
+
 def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
     scene = read(tmp_path, older()).scene
     assert scene.lanes[0].speed_limit_mps == 9.5
@@ -178,14 +186,16 @@ BACK = "<point><x>0</x><y>60</y></point>"
 @pytest.mark.parametrize(
     ("good", "odd", "said", "left"),
     [
-        ("<type>car<", "<type>zeppelin<", "objects (1); first obstacle 70: unknown", (2, 1, 1)),
+        ("<type>car<", "<type>zeppelin<", "objects (1); first dynamicObstacle 70: unk", (2, 1, 1)),
         ("<color>red<", "<color>blue<", "states of lights (1); first trafficLight 50", (2, 1, 2)),
         ("<x>-1.5</x><y>40", "<x>1e999</x><y>40", "lanelets (2); first lanelet 2", (1, 0, 2)),
         ('ref="3"', 'ref="three"', "a whole number, got 'three'", (2, 1, 2)),
-        ("<exact>2</exact>", "<exact>1e7</exact>", "states (1); first obstacle 70", (2, 1, 2)),
+        ("<exact>2</exact>", "<exact>1e7</exact>", "states (1); first dynamicObstacle 70", (2, 1, 2)),
         ("<y>90.0</y>", "<y>40.0</y>", "first lanelet 3: a line needs", (1, 1, 2)),
         (">11.5<", ">fast<", "speed limits (1); first trafficSign 40", (2, 1, 2)),
-        ("<length>4.4</length>", "", "shapes (2); first obstacle 70.length", (2, 1, 2)),
+        ("<length>4.4</length>", "", "shapes (2); first dynamicObstacle 70.le", (2, 1, 2)),
+        ("<exact>5.0<", "<exact>-5.0<", "drives backwards counts as driving forw", (2, 1, 2)),
+        ("</commonRoad>", "<toll id='9'/></commonRoad>", "objects (1); first toll 9", (2, 1, 2)),
         ("sidewalk", "moon", "types of lanelets (1); first lanelet 4: unknown", (3, 1, 2)),
         ("<y>90.0</y></point>", f"<y>90.0</y></point>{BACK}", "lanelet.3: folds back", (1, 1, 2)),
         ('id="3"', 'id="2"', "Of two lanelets with one id the last counts", (1, 1, 2)),
@@ -326,7 +336,7 @@ def test_a_position_that_names_no_lanelet_costs_its_owner_alone(tmp_path: Path) 
     place = "<position><lanelet ref='x&apos;]'/></position>"
     made = re.sub("<position>.*?</position>", place, newer(), count=1)
     reading = read(tmp_path, made)
-    assert "objects (1); first obstacle 70.position" in " ".join(reading.notes)
+    assert "objects (1); first dynamicObstacle 70.position" in " ".join(reading.notes)
     assert len(reading.scene.agents) == 1
 
 

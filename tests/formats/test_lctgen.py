@@ -67,16 +67,24 @@ def test_what_is_not_said_is_noted() -> None:
     )
 
 
+@pytest.mark.parametrize("odd", [[math.nan] * 7, ["x"] * 7, [1e9] * 7, [1.0], "car", {}])
+def test_one_that_is_no_vehicle_costs_no_other(odd: object) -> None:
+    modification, notes = read_vehicles({"agent": [EGO, odd, AHEAD]})
+    assert [vehicle.x_m for vehicle in modification.added] == [20.0]
+    assert "left out: vehicles (1); first vehicles[1]" in notes[1]
+
+
 @pytest.mark.parametrize(
     ("document", "reason"),
     [
         ({}, "expected LCTGen's `agent` or `tracks`"),
         ([], "expected LCTGen's `agent` or `tracks`"),
-        ({"agent": [[1.0, 2.0]]}, "agent: needs 7 numbers a row"),
-        ({"agent": [[float("nan"), *EGO[1:]]]}, r"agent\[0\]: needs finite numbers"),
-        ({"tracks": {0: {"state": STATE}}}, "the first is the ego, and is not there at t0"),
-        ({"tracks": {0: {"state": STATE[:0]}}}, r"tracks\[0\]\.state: needs an array"),
-        ({"tracks": {0: "car"}}, r"tracks\[0\]\.state: needs an array"),
+        ({"agent": [[1.0, 2.0]]}, "the ego, .* needs 7 numbers a row"),
+        ({"agent": [[float("nan"), *EGO[1:]]]}, r"the ego, .* needs finite numbers"),
+        ({"tracks": {0: {"state": STATE}}}, "is the ego, and is not there at t0"),
+        ({"tracks": {0: {"state": STATE[:0]}}}, "is the ego, and is not there at t0"),
+        ({"tracks": {0: {}}}, r"is the ego, .*vehicles\[0\]\.state: needs an array"),
+        ({"tracks": {0: "car"}}, r"is the ego, .*vehicles\[0\]: needs an array"),
     ],
 )
 def test_what_is_no_generated_scene_is_refused(document: object, reason: str) -> None:

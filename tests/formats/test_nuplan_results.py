@@ -17,7 +17,7 @@ from augment.formats.interplan.writer import write
 from augment.formats.nuplan_results import read_results
 from augment.formats.writing import Cell
 from augment.scene.entities import Modification, ScenarioType
-from tests.formats.nuplan_experiment import ran, scored, write_experiment
+from tests.formats.nuplan_experiment import METRICS, ran, scored, write_experiment
 from tests.scenes import scene, vehicle
 
 BASE = "71f182558ee95100"
@@ -104,11 +104,17 @@ def test_scores_and_failures_of_an_experiment_are_read(tmp_path: Path) -> None:
     assert (third.score, third.reason) == (None, "AssertionError: no route")
 
 
+def test_a_scenario_without_a_score_costs_no_other(tmp_path: Path) -> None:
+    rows = [scored("a-s0", math.nan), scored("a-s1", 0.5, __index_level_0__=7)]
+    first, second = read_results(write_experiment(tmp_path / "run", rows))
+    assert (first.score, first.reason) == (None, "nuPlan gave no score")
+    assert (second.score, set(second.parts)) == (0.5, set(METRICS))
+
+
 @pytest.mark.parametrize(
     ("row", "place"),
     [
         ({"score": 1.01}, "row 0: score: .*less than or equal to 1"),
-        ({"score": math.nan}, "row 0: score: is missing"),
         ({"drivable_area_compliance": math.inf}, "row 0: parts.*drivable_area_compliance.*finite"),
         ({"scenario": "a\nb"}, "row 0: scenario: .*match pattern"),
         ({"planner_name": None}, "row 0: planner: .*string"),

@@ -139,6 +139,9 @@ def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) ->
     assert said in fault_of(file)
 
 
+DOUBTED = moving(9.0, 1.0)["state"] | {"valid": np.full(3, np.nan)}
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -152,7 +155,10 @@ def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) ->
             "lanes (1); first map_features.q: a line needs",
         ),
         ({"dynamic_map_states": {"q": {"state": {"object_state": ["BLUE"]}}}}, "'BLUE'"),
-        ({"dynamic_map_states": {"q": {"state": {"object_state": []}}}}, "governs no lane"),
+        ({"dynamic_map_states": {"q": {"state": {"object_state": []}}}}, "lights (1); first dyna"),
+        ({"dynamic_map_states": {"q": {"state": {"object_state": [None] * 3}}}}, "governs no la"),
+        ({"metadata": {"ts": np.array([0.0, 1e5, 2e5])}}, "up to 100000 s apart"),
+        ({"tracks": {"x": moving(9.0, 1.0, state=DOUBTED)}}, "valid and not finite"),
         (
             {"metadata": {"current_time_index": 9, "x": {(1, 2): 3}}},
             "current times (1); first cur",

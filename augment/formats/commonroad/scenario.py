@@ -18,7 +18,7 @@ from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.commonroad.network import read_network
 from augment.formats.commonroad.states import StateReader, read_box
 from augment.formats.documents import read_xml
-from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, LogReader
+from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import note_left_out
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 
@@ -33,6 +33,7 @@ TYPE_OF = foreign.name_all(
         AgentType.GENERIC_OBJECT: "pillar unknown",
     }
 )
+_OTHERS = "location scenarioTags lanelet trafficSign trafficLight intersection planningProblem"
 SCENERY = (
     "building roadBoundary medianStrip median_strip vegetation environmentObstacle phantomObstacle"
 )
@@ -99,9 +100,7 @@ class CommonRoad(LogReader):
         doubts, left_out = Doubts(), Counter[str]()
         states = StateReader(root=root, step_s=step_s, doubts=doubts)
         things = (
-            (element, states, left_out)
-            for element in root
-            if element.tag.lower().endswith("obstacle")
+            (element, states, left_out) for element in root if element.tag not in _OTHERS.split()
         )
         obstacles = doubts.read_all("objects", _obstacle, things)
         starts = ((element, states) for element in root.findall("planningProblem"))
@@ -118,8 +117,6 @@ class CommonRoad(LogReader):
         if item is not None:
             chosen = [foreign.look_up(egos, item, "item")]
         notes = [*note_left_out("objects", left_out), *doubts.notes]
-        if step_s > LONGEST_GAP_S:
-            notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
         steps = 1 + max(max(participant.steps) for participant in (*obstacles, *chosen))
         benchmark = root.get("benchmarkID", path.stem)[:80]
         offer = ", ".join(
@@ -172,7 +169,7 @@ def _problem(element: Element, states: StateReader) -> Obstacle:
 def _obstacle(element: Element, states: StateReader, left_out: Counter[str]) -> Obstacle | None:
     """Return the obstacle, None if it is left out."""
     kind = element.findtext("type", "").strip()
-    place = f"obstacle {element.get('id', '')[:20]}"
+    place = f"{element.tag[:40]} {element.get('id', '')[:20]}"
     if {kind, element.tag} & {*SCENERY.split()}:
         left_out[kind or element.tag] += 1
         return None

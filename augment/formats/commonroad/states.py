@@ -17,7 +17,7 @@ from augment.foreign import Doubts, FloatArray, fault_at, read_number, read_whol
 from augment.formats.commonroad.network import read_points
 from augment.formats.reading import speeds
 
-MOST_STEPS = 100_000
+MOST_STEPS = 10_000
 MOVED_M = 0.05
 """A shorter way tells no heading."""
 State = tuple[float, float, float, float]
@@ -87,6 +87,7 @@ class StateReader:
             if speed_mps or aside_mps:
                 heading_rad = float(np.arctan2(aside_mps, speed_mps))
             speed_mps = float(np.hypot(speed_mps, aside_mps))
+        self.doubts.assume("Who drives backwards counts as driving forward", speed_mps < 0.0)
         return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
 
     def _value(self, element: Element, name: str, place: str) -> float:

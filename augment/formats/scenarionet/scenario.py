@@ -157,8 +157,9 @@ def _track(key: str, track: Any, steps: int, doubts: Doubts) -> LoggedTrack:
     }
     speed_mps = np.hypot(*columns["velocity"].T)
     states = np.column_stack([columns["position"], columns["heading"], speed_mps])
-    seen = columns["valid"][:, 0] > 0.0
-    odd = seen & ~np.isfinite(states).all(axis=1)
+    valid = columns["valid"][:, 0]
+    seen = ~(valid <= 0.0)
+    odd = seen & ~np.isfinite(np.column_stack([states, valid])).all(axis=1)
     doubts.assume("A state that is valid and not finite was left out", int(odd.sum()))
     states[~seen | odd] = np.nan
     finer = doubts.read("finer types", foreign.read_as, track.get("metadata"), dict, place) or {}
@@ -240,7 +241,7 @@ def _light(key: object, light: object, frame: int) -> tuple[str, TrafficLight]:
     fields = foreign.read_as(light, dict, place)
     state = foreign.read_as(fields.get("state"), dict, f"{place}.state")
     steps = _list(state.get("object_state"), f"{place}.state.object_state")
-    shown = steps[frame] if frame < len(steps) else None
+    shown = foreign.look_up(dict(enumerate(steps)), frame, f"{place}.state.object_state")
     word = foreign.read_as("" if shown is None else shown, str, place).rsplit("_", 1)[-1].upper()
     return _name(fields.get("lane", key), f"{place}.lane"), foreign.look_up(LIGHT_OF, word, place)
 

@@ -265,14 +265,14 @@ def _segment(
     place = f"map_features.{key}"
     line = _points(lane.polyline, place)
     foreign.look_up(LANE_TYPES, lane.type, f"{place}.type")
+
+    def read_edge(part: Any) -> tuple[int, int, FloatArray]:
+        edge = foreign.look_up(edges, part.boundary_feature_id, f"{place}.boundary_feature_id")
+        return part.lane_start_index, part.lane_end_index, edge
+
     left, right = (
         edge_distances(
-            line,
-            [
-                (part.lane_start_index, part.lane_end_index, edges[part.boundary_feature_id])
-                for part in boundaries
-                if part.boundary_feature_id in edges
-            ],
+            line, doubts.read_all("edges of lanes", read_edge, ((part,) for part in boundaries))
         )
         for boundaries in (lane.left_boundaries, lane.right_boundaries)
     )
