@@ -190,7 +190,12 @@ BACK = "<point><x>0</x><y>60</y></point>"
         ("<color>red<", "<color>blue<", "states of lights (1); first trafficLight 50", (2, 1, 2)),
         ("<x>-1.5</x><y>40", "<x>1e999</x><y>40", "lanelets (2); first lanelet 2", (1, 0, 2)),
         ('ref="3"', 'ref="three"', "a whole number, got 'three'", (2, 1, 2)),
-        ("<exact>2</exact>", "<exact>1e7</exact>", "states (1); first dynamicObstacle 70", (2, 1, 2)),
+        (
+            "<exact>2</exact>",
+            "<exact>1e7</exact>",
+            "states (1); first dynamicObstacle 70",
+            (2, 1, 2),
+        ),
         ("<y>90.0</y>", "<y>40.0</y>", "first lanelet 3: a line needs", (1, 1, 2)),
         (">11.5<", ">fast<", "speed limits (1); first trafficSign 40", (2, 1, 2)),
         ("<length>4.4</length>", "", "shapes (2); first dynamicObstacle 70.le", (2, 1, 2)),

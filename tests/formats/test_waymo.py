@@ -118,10 +118,7 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
             "Of two lanes with one id the last",
         ),
         (
-            lane(
-                *(4, (2, 2), *points(8, (1060, 500), (1080, 500))),
-                (13, message((1, 0), (2, 1), (3, 77))),
-            ),
+            lane(4, (2, 2), *points(8, (1060, 500), (1080, 500)), (13, message((3, 77)))),
             "edges of lanes (1); first map_features.4.boundary_feature_id: unknown '77'",
         ),
         (

@@ -187,8 +187,14 @@ def _zipped(**entries: bytes) -> bytes:
         (b'[{"model_a": ["a"], "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no text"),
         (b'[{"model_a": "\\u0000", "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no te"),
         (b'{"votes": []}', "there is no column 'model_a'"),
-        (b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]', "'model_a' is there"),
-        (b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]', "vote 2: model_a is emp"),
+        (
+            b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]',
+            "'model_a' is there",
+        ),
+        (
+            b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]',
+            "vote 2: model_a is emp",
+        ),
         (b"[" * 100_000, "it can't be read: "),
         (gzip.compress(b"x" * 3_000_000, mtime=0), "it unpacks to more than 1 MB"),
         (gzip.compress(HEAD.encode(), mtime=0)[:-9], "it can't be read: "),
