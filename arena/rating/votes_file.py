@@ -50,7 +50,9 @@ _ALIKE = str.maketrans(
 )
 """Cyrillic and Greek letters, hyphens and quotes that look as those of ASCII."""
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
-_NO_VALUES = frozenset("nan <na> #n/a #ref! #value! #name? #null! #num! #div/0! #spill!".split())
+_NO_VALUES = frozenset({"nan", "<na>"}) | {
+    *("#n/a", "#ref!", "#value!", "#name?", "#null!", "#num!", "#div/0!", "#spill!")
+}
 """What pandas and Excel write where there is no value."""
 NO_VOTES = "there are no votes in it"
 LATIN_1_NOTE = (

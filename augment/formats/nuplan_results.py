@@ -21,8 +21,7 @@ WHAT = "nuPlan experiment"
 MOST_ROWS, MOST_COLUMNS, MOST_BYTES = 100_000, 200, 64_000_000
 LONGEST_REASON = 300
 _OF_AGGREGATOR = frozenset(
-    "scenario log_name scenario_type num_scenarios planner_name aggregator_type "
-    "__index_level_0__".split()
+    ("scenario", "log_name", "scenario_type", "num_scenarios", "planner_name", "aggregator_type")
 )
 _NEEDED = ("scenario", "log_name", "planner_name", "score")
 _OF_REPORT = ("scenario_name", "planner_name", "succeeded", "error_message")
@@ -89,7 +88,7 @@ def _read_aggregate(file: Path) -> list[NuplanDrive]:
         parts = {
             name: None if value != value else value  # pandas writes NaN for what is missing
             for name, value in row.items()
-            if name not in _OF_AGGREGATOR
+            if name not in _OF_AGGREGATOR and not name.startswith("__")  # an index of pandas
         }
         row_values = {"is_interplan": _OF_INTERPLAN in parts, "score": parts.pop("score")}
         place = f"{file.name}: row {number}"
