@@ -284,9 +284,10 @@ def _read_json(text: str) -> VotesTable:
 
 
 def _name_columns(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    names = [_column_name(name) for name, _ in pairs]
-    _check_once(names, "an object")
-    return dict(zip(names, (value for _, value in pairs), strict=True))
+    named = {_column_name(name): value for name, value in pairs}
+    if len(named) < len(pairs):
+        raise VotesFileUnreadable(f"an object names one of its columns twice: {', '.join(named)}")
+    return named
 
 
 def _read_parquet(content: io.BytesIO) -> VotesTable:
@@ -365,19 +366,15 @@ _BINARY: dict[bytes, Callable[[io.BytesIO], VotesTable]] = {
 
 def _find_columns(header: Sequence[str]) -> dict[str, int]:
     """Return the places of the known columns."""
-    _check_once(header, "line 1")
+    for name in _KNOWN:
+        if header.count(name) > 1:
+            raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
     for name in NEEDED:
         if name not in header:
             raise VotesFileUnreadable(
                 f"line 1: there is no column {name!r}; needed are {', '.join(NEEDED)}"
             )
     return {name: header.index(name) for name in _KNOWN if name in header}
-
-
-def _check_once(header: Sequence[str], place: str) -> None:
-    for name in _KNOWN:
-        if header.count(name) > 1:
-            raise VotesFileUnreadable(f"{place}: the column {name!r} is there twice")
 
 
 def _clean_cells(table: VotesTable) -> VotesTable:

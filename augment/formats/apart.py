@@ -30,7 +30,7 @@ from augment.scene import codec
 WHAT = "zip"
 _DEEPEST = 50
 """Folders in each other; making and removing very deep ones recurses until it breaks."""
-_UNREADABLE = (
+BROKEN_ZIP = (
     *(zipfile.BadZipFile, zlib.error, EOFError, struct.error),
     *(NotImplementedError, UnicodeDecodeError),  # zipfile's faults for odd flags and names
 )
@@ -185,7 +185,7 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
                 with packed.open(entry) as source, file.open("xb") as written:
                     shutil.copyfileobj(source, written)  # no more than the entry says
         return
-    except _UNREADABLE as fault:
+    except BROKEN_ZIP as fault:
         place, problem = "", f"is broken: {fault}"
     except (FileExistsError, NotADirectoryError):
         problem = "is there twice, or lies in a file"

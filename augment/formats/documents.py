@@ -184,15 +184,16 @@ def _not_plain(where: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_xml(path: Path, *, what: str) -> ET.Element:
-    """Return the root of an XML file; names are without a namespace.
+    """Return the root of an XML file; names of the root's namespace are without it.
 
     Raises:
         InvalidDocument: The file is not there, is no XML, or has a document type.
     """
     try:
         root: ET.Element = ET.XML(path.read_bytes(), parser=ET.XMLParser(target=_NoDoctype()))
-        for element in root.iter() if root.tag.startswith("{") else ():
-            element.tag = element.tag.rpartition("}")[2]
+        space = root.tag[: root.tag.rfind("}") + 1]
+        for element in root.iter() if space else ():
+            element.tag = element.tag.removeprefix(space)
         return root
     except OSError as fault:
         problem = fault.strerror or str(fault)
@@ -202,19 +203,6 @@ def read_xml(path: Path, *, what: str) -> ET.Element:
 
 
 class _NoDoctype(ET.TreeBuilder):
-    """Calls what is in the namespace of the root, as ASAM's files are, by its plain name."""
-
-    _own = ""
-
     def doctype(self, *_: object) -> None:
         """Refuse a document type, in which all that is dangerous begins."""
         raise ValueError("declares a document type")
-
-    def start(self, tag: str, attrs: dict[str, str], /) -> ET.Element:
-        """Open an element."""
-        self._own = self._own or tag[: tag.rfind("}") + 1] or " "
-        return super().start(tag.removeprefix(self._own), attrs)
-
-    def end(self, tag: str, /) -> ET.Element:
-        """Close an element."""
-        return super().end(tag.removeprefix(self._own))

@@ -13,9 +13,6 @@ Rows without any size pad a list to 32. The generated ego is left out: a scene h
 """
 
 import lzma
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from augment.foreign import Doubts, FloatArray, fault_at, read_finite, read_numbers
+from augment.formats.apart import BROKEN_ZIP
 from augment.formats.reading import LONGEST_M
 from augment.geometry.frames import wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, TrafficAgent
@@ -31,10 +29,7 @@ NAME = "lctgen"
 _COLUMNS = 7
 _TRACK_COLUMNS = [0, 1, 7, 8, 6, 3, 4, 9]
 """Where x, y, vx, vy, heading, length, width and valid stand in a track's state."""
-_BROKEN = (
-    *(OSError, ValueError, EOFError, RuntimeError, NotImplementedError, struct.error),
-    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError),
-)
+_BROKEN = (*BROKEN_ZIP, OSError, ValueError, RuntimeError, lzma.LZMAError)
 """What zips raise that are broken, encrypted, or packed in ways of their own."""
 _ASIDE_M = 1.0
 """How far its ego may lie from the origin without a note: it is sampled around a lane."""

@@ -241,17 +241,8 @@ def to_utm(degrees: FloatArray, *, zone: int, is_south: bool) -> FloatArray:
 
 
 def _name(fid: Any) -> str:
-    """Return the name from a whole number or its digits as text; empty for none.
-
-    Raises:
-        InvalidDocument: It is something else.
-    """
-    if fid is None or fid == "":
-        return ""
-    text = str(int(fid) if isinstance(fid, float) and fid.is_integer() else fid)
-    if not isinstance(fid, int | float | str) or not text.isdecimal() or len(text) > 18:
-        raise fault_at("map", f"{text[:40]!r} is no feature id")
-    return f"{int(text):09d}"
+    """Return the name from a whole number or its digits as text; empty for none."""
+    return "" if fid in (None, "") else f"{read_whole(fid, 'map', 0):09d}"
 
 
 def _lanes(layers: _Layers) -> tuple[list[Segment], int]:

@@ -189,16 +189,15 @@ class Log:
         if (apart_s := np.diff(self.times_s).max(initial=0.0)) > LONGEST_GAP_S:
             notes.append(f"Steps lie up to {apart_s:g} s apart; a drive looks between them.")
         if sizeless := sum(not track.has_size for track in self.tracks):
-            sizes = f"{sizeless} of {len(self.tracks)} objects"
-            notes.append(f"{sizes} got the usual size of their class.")
+            of = len(self.tracks)
+            notes.append(f"{sizeless} of {of} objects got the usual size of their class.")
         if not _is_size(*self.ego_size_m):
             notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
         places = np.array([track.states[frame, :2] for track in log.tracks]).reshape(-1, 2)
         if far := road.far + int((np.hypot(*(places - log.ego[frame, :2]).T) > reach_m).sum()):
             notes.append(f"{far} things more than {reach_m:g} m from the ego were left out.")
-        if road.side_is_assumed:
-            side = f"{road.traffic_side} is assumed{city.side_reason}"
-            notes.append(f"That people drive on the {side}.")
+        side = f"That people drive on the {road.traffic_side} is assumed{city.side_reason}."
+        notes += [side] * road.side_is_assumed
         if not self.is_free:
             notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(

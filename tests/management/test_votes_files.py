@@ -189,7 +189,7 @@ def _zipped(**entries: bytes) -> bytes:
         (b'{"votes": []}', "there is no column 'model_a'"),
         (
             b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]',
-            "'model_a' is there",
+            "columns twice: model_a, model_b, winner",
         ),
         (
             b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]',
