@@ -188,9 +188,10 @@ class Log:
         notes = [*map_notes, *self.notes, *city.doubts.notes, *doubts.notes]
         if (apart_s := np.diff(self.times_s).max(initial=0.0)) > LONGEST_GAP_S:
             notes.append(f"Steps lie up to {apart_s:g} s apart; a drive looks between them.")
-        if sizeless := sum(not track.has_size for track in self.tracks):
-            of = len(self.tracks)
-            notes.append(f"{sizeless} of {of} objects got the usual size of their class.")
+        if bare := sum(not track.has_size for track in self.tracks):
+            notes.append(
+                f"{bare} of {len(self.tracks)} objects got the usual size of their class."
+            )
         if not _is_size(*self.ego_size_m):
             notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
         places = np.array([track.states[frame, :2] for track in log.tracks]).reshape(-1, 2)
