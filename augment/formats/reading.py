@@ -189,9 +189,8 @@ class Log:
         if (apart_s := np.diff(self.times_s).max(initial=0.0)) > LONGEST_GAP_S:
             notes.append(f"Steps lie up to {apart_s:g} s apart; a drive looks between them.")
         if bare := sum(not track.has_size for track in self.tracks):
-            notes.append(
-                f"{bare} of {len(self.tracks)} objects got the usual size of their class."
-            )
+            of = f"{bare} of {len(self.tracks)}"
+            notes.append(f"{of} objects got the usual size of their class.")
         if not _is_size(*self.ego_size_m):
             notes.append(f"The ego's size is not told; {EGO_LENGTH_M:g} m long is assumed.")
         places = np.array([track.states[frame, :2] for track in log.tracks]).reshape(-1, 2)
@@ -242,8 +241,7 @@ class Log:
             raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
         x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
         if not np.isfinite(self.ego[frame]).all():
-            odd = f"{frame} has no ego in it, or one beyond the earth or 100 m/s"
-            raise fault_at("frame", odd)
+            raise fault_at("frame", f"{frame} has no ego, or one beyond the earth or 100 m/s")
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
