@@ -6,7 +6,6 @@ Whatever the text, nothing but ReplyUnreadable comes out of here, and nothing is
 import json
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -96,6 +95,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     if len(answer) > LONGEST_ANSWER:
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
+    wished = re.compile(rf'"({"|".join(sorted(keys))})"\s*:\s*(?:\[\s*)?(?!null)[^\[\]\s]')
     text = _WRAPPER.sub("", without_thoughts(answer))
     # The last fence may lack its end; without any fences bare objects count.
     blocks = [match.group(1) for match in _FENCE.finditer(text)] or _bare_objects(text)
@@ -111,8 +111,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
                 raise
             value = strict_json(clean)
         if isinstance(value, dict) and keys & value.keys():
-            asked = {key for earlier in blocks[:number] for key in _wishes(earlier)}
-            if asked & keys - value.keys():
+            if {match[1] for match in wished.finditer(" ".join(blocks[:number]))} - value.keys():
                 raise ReplyUnreadable(["there are several blocks: write all of it into one"])
             return value, clean != block
     wanted = ", ".join(f'"{key}"' for key in sorted(keys))
@@ -192,14 +191,6 @@ def _bare_objects(answer: str) -> list[str]:
             if not depth:
                 objects.append(answer[start : index + 1])
     return [*objects, answer[start:]] if depth else objects
-
-
-def _wishes(block: str) -> set[str]:
-    """Return the keys of a block under which something stands."""
-    with suppress(ReplyUnreadable):
-        value = strict_json(_mend(block))
-        return {key for key in value if value[key]} if isinstance(value, dict) else set()
-    return set()
 
 
 def _mend(block: str) -> str:

@@ -7,13 +7,7 @@ from augment.llm.costs import Price, worst_case
 from augment.llm.messages import Request
 from augment.prompts.fill import JudgeQuestion, Shown, judge_messages
 from augment.prompts.reply import JudgeAnswer, read_judge
-from augment.variants.respondents import (
-    ModelRole,
-    RespondentClient,
-    Sampling,
-    Transcript,
-    ask_alone,
-)
+from augment.variants.respondents import ModelRole, RespondentClient, Transcript, ask_alone
 
 JUDGE_TOKENS = 4096
 """The length limit of an answer: room for a model that thinks before it."""
@@ -72,7 +66,7 @@ def ask_judge(
         judge_messages(question, instruction, pictures),
         read_judge,
         transcript=transcript,
-        sampling=Sampling(temperature=0.0),
+        sampling={"temperature": 0.0},
         max_tokens=JUDGE_TOKENS,
         re_asks=0,
     )

@@ -12,7 +12,6 @@ from typing import Any
 from augment.errors import InvalidDocument
 from augment.prompts.calls import Tools
 from augment.variants.recipes import Recipe
-from augment.variants.respondents import Sampling
 from augment.variants.reviews import BlockForm, Limits
 
 EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
@@ -167,13 +166,11 @@ class ContestantOptions:
             if value is not None
         }
 
-    def sampling(self, sample: int = 1) -> Sampling:
+    def sampling(self, sample: int = 1) -> dict[str, Any]:
         """Return the sampling parameters of one sample; sample k has the seed + k - 1."""
-        return Sampling(
-            temperature=self.temperature,
-            seed=None if self.seed is None else self.seed + sample - 1,
-            reasoning_effort=self.reasoning_effort,
-        )
+        seed = None if self.seed is None else self.seed + sample - 1
+        effort = self.reasoning_effort
+        return {"temperature": self.temperature, "seed": seed, "reasoning_effort": effort}
 
     def key(self, sample: int = 1) -> dict[str, Any]:
         """Return the part of the cache key that sets these options and this sample apart.

@@ -1,7 +1,7 @@
 """Roles and their models, repeated requests until an answer can be read, and their record."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 from typing import Any, Protocol, TypeVar
@@ -78,15 +78,6 @@ class Transcript(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sampling:
-    """Sampling parameters of every request of a run; None is not sent."""
-
-    temperature: float | None = None
-    seed: int | None = None
-    reasoning_effort: str | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RespondentClient:
     """Client of a role.
 
@@ -108,7 +99,7 @@ class Respondents:
 
     Attributes:
         clients: By role; a role without one is played by the modifier's.
-        sampling: What every request is sent with.
+        sampling: Temperature, seed and reasoning effort of every request; None is not sent.
         max_tokens: The length limit of one answer; a cut-off one is asked again with twice it.
         re_asks: How often an answer that can't be read is asked for again.
     """
@@ -116,7 +107,7 @@ class Respondents:
     clients: Mapping[ModelRole, RespondentClient]
     transcript: Transcript
     patience: Patience = field(default_factory=Patience)
-    sampling: Sampling = field(default_factory=Sampling)
+    sampling: Mapping[str, Any] = field(default_factory=dict)
     max_tokens: int = DEFAULT_MAX_TOKENS
     re_asks: int = 1
 
@@ -201,7 +192,7 @@ class Respondents:
             tools=tools,
             tool_choice=tool_choice,
             schema=schema,
-            **asdict(self.sampling),
+            **self.sampling,
         )
         reply = self.send(role, request, prompt_version())
         if reply.refusal is not None:
