@@ -5,11 +5,13 @@ the ego's centre, d to the left of it.
 """
 
 import math
+from statistics import fmean
 
 import numpy as np
 
 from augment.baselines.placed_motions import give_motion
 from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.checks.wish_places import find_across
 from augment.checks.wish_shapes import Placement, lay_out, ring_radius_m
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
@@ -86,9 +88,10 @@ def _walker(
 
 def _left_m(lateral: Lateral | None, ground: PlacingGround) -> float | None:
     """Return how far left of the lane's centre an offset leads, None where none is said."""
-    if lateral is None or lateral.offset is None:
+    sign = ground.side_sign(lateral)
+    if lateral is None or (lateral.offset is None and sign):
         return None
-    return ground.side_sign(lateral) * lateral.offset.low_m
+    return sign * lateral.offset.low_m if lateral.offset else 0.0
 
 
 def place_cones(
@@ -138,9 +141,11 @@ def _places(
     if request.shape is Shape.RING and count < 3:
         raise CannotPlace("A ring needs at least three cones.")
     is_oblong = request.shape is Shape.RING and ring_radius_m(count, spacing_m) > edge_m
-    from_m, to = 0.0, 0.0
-    if request.shape is Shape.LINE:
-        from_m = edge_m * (1.0 if request.both_sides else ground.side_sign(request.spot.lateral))
+    lateral, to = request.spot.lateral, 0.0
+    sign = ground.side_sign(lateral, request.spot.lane) or float(request.both_sides)
+    from_m = fmean(find_across(lateral, sign, 2.0 * (edge_m + _EDGE_M), 2.0 * _EDGE_M))
+    if request.shape is Shape.LINE and not (lateral is not None and lateral.is_exact):
+        from_m = edge_m * sign
     elif request.shape is Shape.TAPER:
         from_m = (request.start or ground.kerb).sign * edge_m
         to = 0.0 if request.ends_in_middle else -from_m

@@ -30,7 +30,6 @@ from augment.scene.intent import (
     Side,
     VehicleRequest,
 )
-from augment.scene.lane_graph import LanePosition
 
 _SIZES_M = {Body.VAN: (5.9, 2.0), Body.TRUCK: (8.0, 2.4)}
 _FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
@@ -88,7 +87,7 @@ def place_vehicles(
     apart_m = _size_m(body)[0] + BUMPER_GAP_M
     if request.spacing is not None:
         apart_m = request.spacing.draw(rng)
-    d_m = _offset_m(request, ground, ground.beside(distance_m, lane), rng)
+    d_m = _offset_m(request, ground, distance_m, rng)
     turn_rad = _FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
     added = []
     for index in range(request.count or 1):
@@ -107,13 +106,19 @@ def place_vehicles(
 
 
 def _offset_m(
-    request: VehicleRequest, ground: PlacingGround, place: LanePosition, rng: np.random.Generator
+    request: VehicleRequest | CrashRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    rng: np.random.Generator,
 ) -> float:
     """Return the box's offset to the left of the lane's direction (right is negative), in m."""
-    lateral = request.spot.lateral
+    lateral, lane = request.spot.lateral, request.spot.lane
     if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
         return 0.0
-    side = Side.LEFT if ground.side_sign(lateral) > 0.0 else Side.RIGHT
+    place = ground.beside(distance_m, lane)
+    # Sides are those of the ego's direction of travel, until here.
+    is_left = (ground.side_sign(lateral, lane) > 0.0) is not (lane is LaneChoice.ONCOMING)
+    side = Side.LEFT if is_left else Side.RIGHT
     if lateral.on_shoulder and side is not ground.kerb:
         raise CannotPlace(f"People drive on the {ground.kerb}: no shoulder on the {side}.")
     at_kerb = lateral.target is LateralTarget.KERB and lateral.nearness is Nearness.AT_EDGE
@@ -129,8 +134,7 @@ def _offset_m(
     else:
         low_m, _ = find_across(lateral, 1.0, 2.0 * half_lane_m, 2.0 * half_box_m)
         size_m = max(0.0, low_m) + _INSIDE_M.get(lateral.nearness, 0.0)
-    to_left = (side is Side.LEFT) is not (request.spot.lane is LaneChoice.ONCOMING)
-    return size_m if to_left else -size_m
+    return side.sign * size_m
 
 
 def count_arrangements(request: CrashRequest) -> int:
@@ -151,24 +155,33 @@ def place_crash(
         CannotPlace: The lanes end before the last of them, there is no such lane, or
             at the distance asked for they would stand in each other.
     """
+    d_m = _offset_m(request, ground, distance_m, rng)
     if request.others:
-        poses = _chain_poses(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
+        d_m += 0.0 if request.spot.lateral else _SHIFTS_M[arrangement]
+        poses = _chain_poses(request, ground, distance_m, d_m, rng)
     else:
-        poses = _in_a_row(request, ground, distance_m, _LOOSER[arrangement])
+        poses = _in_a_row(request, ground, distance_m, d_m, _LOOSER[arrangement])
     kind = _agent_type(request.body)
     size_m = _size_m(request.body)
     return tuple(build_agent(kind, pose, ground.lane_at(pose), size_m) for pose in poses)
 
 
 def _in_a_row(
-    request: CrashRequest, ground: PlacingGround, distance_m: float, looseness: float
+    request: CrashRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    offset_m: float,
+    looseness: float,
 ) -> list[Pose]:
     """Put each as near behind the one before as it can stand."""
     poses: list[Pose] = []
+    # The first stands as far from the lane's centre as is said.
+    offset_m -= looseness * _SIDES_M[0] if request.spot.lateral else 0.0
     along_m = distance_m
     for index in range(request.count or 2):
         first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
-        left_m, turn_rad = looseness * _SIDES_M[index], looseness * _TURNS_RAD[index] + first_rad
+        left_m = offset_m + looseness * _SIDES_M[index]
+        turn_rad = looseness * _TURNS_RAD[index] + first_rad
 
         def pose_at(
             gap_m: float, from_m: float = along_m, left_m: float = left_m, rad: float = turn_rad

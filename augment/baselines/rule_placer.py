@@ -19,9 +19,9 @@ from augment.baselines.placed_people import place_cones, place_walkers
 from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_spots
+from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.checks.registry import check_against_intent
-from augment.checks.wish_places import Span, find_off, list_stations
+from augment.checks.wish_places import Span, find_off, list_absent, list_stations
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
 from augment.scene import intent as intents
@@ -116,7 +116,7 @@ def list_open(request: intents.Request) -> list[str]:
     who, field, what = _NEEDS[type(request)]
     comes = isinstance(request, intents.VehicleRequest) and is_on_other_arm(request.motion)
     needs = {
-        "the distance": request.spot.distance or request.spot.settings or comes,
+        "the distance": _says_distance(request.spot) or request.spot.settings or comes,
         what: getattr(request, field),
         "the count": request.count,
     }
@@ -190,11 +190,13 @@ class _Fitting:
         """
         for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
-        wanted = request.spot.distance or intents.Length(low_m=0.0, high_m=0.0)
+        is_said = _says_distance(request.spot)
+        wanted = request.spot.distance if is_said else None
+        wanted = wanted or intents.Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.draw(self._rng)
         asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
         spans_m = list_stations(request.spot, self._place.over(request.spot.via).lanes)
-        is_open = wanted.is_range or (request.spot.distance is None and of is None)
+        is_open = wanted.is_range or not (is_said or of)
         open_m = 0.0
         if is_open and request.spot.settings:
             asked_m, open_m = _find_inside(spans_m, asked_m), _FROM_END_M / 2.0
@@ -219,9 +221,9 @@ class _Fitting:
                 if doubts == 0:
                     break
         if best is None:
-            raise CannotPlace(first_problem)
+            raise CannotPlace(first_problem or "Nothing of what is asked for lies there.")
         _, agents, distance_m = best
-        if of is not None or request.spot.distance is None:
+        if of is not None or not is_said:
             return agents, ""
         who = _NEEDS[type(request)][0]
         return agents, f"{who.capitalize()}: {abs(distance_m):.1f} m {request.spot.relation}."
@@ -302,9 +304,15 @@ def _number_agents(agents: _Agents, scene: Scene) -> _Agents:
     )
 
 
+def _says_distance(spot: intents.Spot) -> bool:
+    """Return whether a number is said; past something, without one, has no end."""
+    return spot.distance is not None and math.isfinite(spot.distance.high_m)
+
+
 def _find_inside(spans_m: Sequence[Span], ahead_m: float) -> float:
     """Return the middle of the range of stations nearest ahead, as far as it is near its end."""
     low_m, high_m = min(spans_m, key=lambda span_m: find_off(max(ahead_m, 0.0), [span_m]))
+    low_m = max(low_m, 0.0) if high_m > 0.0 else low_m
     from_m = low_m if math.isinf(high_m) else max(low_m, high_m - _FROM_END_M)
     to_m = high_m if math.isinf(low_m) else min(high_m, low_m + _FROM_END_M)
     return (from_m + to_m) / 2.0

@@ -81,7 +81,7 @@ def _start(
             off_m = case.route.locate(start.x_m, start.y_m).ahead_m - mark_m
             what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
             yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
-        ends_m = (near.low_m, near.high_m) if near else (planned.REACHED_M, planned.REACHED_M)
+        ends_m = near.span_m if near else (planned.REACHED_M, planned.REACHED_M)
         what, wanted = (
             "The ego's distance at the start of {agents[0]}",
             motion_bounds("within_m", *ends_m),

@@ -106,7 +106,7 @@ def check_across(case: Case) -> Iterator[Finding]:
             continue
         if isinstance(request, wish.VehicleRequest):
             for agent in party.placed:
-                wanted = _bounds(case, request.spot.lateral, band, agent.width_m / 2.0)
+                wanted = _bounds(case, request.spot, band, agent.width_m / 2.0)
                 left_m = case.left_m(agent) - band.left_m
                 yield _across([agent], left_m, wanted)
         elif isinstance(request, wish.ConesRequest):
@@ -118,7 +118,8 @@ def check_across(case: Case) -> Iterator[Finding]:
                 first = in_order(case, party, request)[0]
             others = [agent for agent in party.everyone if agent is not first]
             left_m = case.left_m(first) - band.left_m
-            yield _across([first, *others], left_m, _bounds(case, None, band, 0.0))
+            wanted = _bounds(case, request.spot, band, first.width_m / 2.0)
+            yield _across([first, *others], left_m, wanted)
 
 
 def _check_walk_ends(case: Case, party: Party, request: wish.WalkRequest) -> Iterator[Finding]:
@@ -132,7 +133,8 @@ def _check_walk_ends(case: Case, party: Party, request: wish.WalkRequest) -> Ite
                 place = case.route.locate(*point)
                 band = case.lanes.band(wish.LaneChoice.OWN, place.ahead_m)
                 if band is not None:
-                    yield _across([agent], place.left_m, _bounds(case, lateral, band, 0.0))
+                    wanted = _bounds(case, wish.Spot(lateral=lateral), band, 0.0)
+                    yield _across([agent], place.left_m, wanted)
 
 
 def _across(
@@ -149,9 +151,10 @@ def _across(
     )
 
 
-def _bounds(case: Case, lateral: wish.Lateral | None, band: Band, half_box_m: float) -> Bounds:
+def _bounds(case: Case, spot: wish.Spot, band: Band, half_box_m: float) -> Bounds:
     """Return the requested place across its lane, left positive; anywhere in it by default."""
-    sign, allowed = case.lanes.side_sign(lateral), case.tolerances
+    lateral, allowed = spot.lateral, case.tolerances
+    sign = case.lanes.side_sign(lateral, spot.lane)
     allowed_m = allowed.across_m if sign else allowed.middle_m
     span_m = find_across(lateral, sign, band.width_m, 2.0 * half_box_m)
     return Bounds(*span_m, allowed.edge_m if lateral is None else allowed_m)
@@ -162,10 +165,12 @@ def _cones(case: Case, party: Party, request: wish.ConesRequest, band: Band) -> 
     cones = sorted(party.placed, key=case.ahead_m)
     # Left of the middle of the lane that is asked for, in order along it.
     lefts = [case.left_m(cone) - band.left_m for cone in cones]
-    sign, middle_m = case.lanes.side_sign(request.spot.lateral), sum(lefts) / len(lefts)
+    spot, middle_m = request.spot, sum(lefts) / len(lefts)
+    sign = case.lanes.side_sign(spot.lateral, spot.lane)
     is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
-    wanted = _bounds(case, None, band, 0.0)
-    if is_line:
+    leads_across = request.shape is wish.Shape.TAPER or request.both_sides
+    wanted = _bounds(case, wish.Spot() if leads_across else spot, band, CONE_M / 2.0)
+    if is_line and spot.lateral is not None and not spot.lateral.is_exact:
         edge_m = sign * band.width_m / 2.0
         # A cone at a boundary stands inside of it or outside: half a cone to either side.
         wanted = Bounds(edge_m, edge_m, max(case.tolerances.across_m, CONE_M))
@@ -259,7 +264,7 @@ def _misfit(case: Case, order: Sequence[TrafficAgent], request: wish.CrashReques
         gap_m = apart_m(leader, other)
         misfit += gap_m / 100.0  # the nearest neighbours, where nothing is said
         if car.gap is not None:
-            misfit += Bounds(car.gap.low_m, car.gap.high_m, 0.0).off(gap_m) / USUAL.spacing_m
+            misfit += Bounds(*car.gap.span_m, 0.0).off(gap_m) / USUAL.spacing_m
         if car.turn_deg is not None:
             misfit += abs(_turn_deg(leader, other, car) - car.turn_deg) / USUAL.heading_deg
         here, there = places[leader.id], places[other.id]

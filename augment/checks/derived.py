@@ -243,6 +243,8 @@ def _find_pick(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
 
 def _lateral(place: LanePlace) -> wish.Lateral:
     sides = wish.LateralTarget
+    if abs(place.left_m) < _BESIDE_M:
+        return wish.Lateral(target=sides.LANE_CENTRE)
     return wish.Lateral(
         target=sides.LEFT_BOUNDARY if place.left_m > 0.0 else sides.RIGHT_BOUNDARY,
         nearness=wish.Nearness.OUTSIDE if place.off_m > 0.0 else None,
@@ -302,7 +304,7 @@ def _walk(
 ) -> wish.WalkRequest:
     start, end = _find_ends(agent, lanes)
     return wish.WalkRequest(
-        spot=replace(_spot(start), lane=None),
+        spot=replace(_spot(start), lane=None, lateral=_lateral(start)),
         start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
         count=1,
         speed_mps=agent.speed_mps or None,
@@ -346,7 +348,7 @@ def _sentence(
         way = " The ego is to go straight on."
     lead = "Change the scene" if kind is None else _LEADS[kind]
     if kind is ScenarioType.JAYWALKER and not any(
-        agent.walk_to_m or agent.id in wishes
+        agent.id in wishes or (agent.walk_to_m if lanes is None else _crosses(agent, lanes))
         for agent in others
         if agent.type is AgentType.PEDESTRIAN
     ):
@@ -376,7 +378,8 @@ def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | 
             there = replace(agent, x_m=agent.walk_to_m[0], y_m=agent.walk_to_m[1])
             ends = [here, _where(there, lanes)]
             if lanes is not None:
-                ends = [_name_place(end) for end in _find_ends(agent, lanes)]
+                walk = _find_ends(agent, lanes)
+                ends = [_name_place(end, middle="in the middle of") for end in walk]
             return f"a pedestrian who walks from {ends[0]} to {ends[1]}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
@@ -402,13 +405,16 @@ def _where(agent: TrafficAgent, lanes: LanesAcross | None) -> str:
     return _name_place(_find_place(agent, lanes))
 
 
-def _name_place(place: LanePlace) -> str:
+def _name_place(place: LanePlace, *, middle: str = "in") -> str:
     way = "its lane" if place.via is None else _name_way(place.route, place.via)
     lane = _LANES[place.lane].format(place.via or "the ego's lane")
-    where = f"{_ahead(place.ahead_m)} the ego along {way}, {'beside' if place.off_m else 'in'}"
+    where = f"{_ahead(place.ahead_m)} the ego along {way}"
     if abs(place.left_m) < _BESIDE_M:
-        return f"{where} {lane}"
-    return f"{where} {lane}, {abs(place.left_m):.1f} m {_side(place.left_m)} of its centre"
+        return f"{where}, {middle} {lane}"
+    where = f"{where}, {'beside' if place.off_m else 'in'} {lane}"
+    # Who comes towards the ego has its left where the ego has its right.
+    seen = ", seen as the ego drives" if place.lane is wish.LaneChoice.ONCOMING else ""
+    return f"{where}, {abs(place.left_m):.1f} m {_side(place.left_m)} of its centre{seen}"
 
 
 def _name_way(route: EgoRoute, via: str) -> str:

@@ -143,13 +143,17 @@ class LanesAcross:
         s_m = line.project(own.pose.x_m, own.pose.y_m).s_m
         return self.route.graph.place(band.lane_id, s_m)
 
-    def side_sign(self, lateral: intents.Lateral | None) -> float:
+    def side_sign(
+        self, lateral: intents.Lateral | None, lane: intents.LaneChoice | None = None
+    ) -> float:
         """Return 1 for left of the ego's direction, -1 for right, 0 for the lane's centre."""
+        # The oncoming lane has its kerb where the ego's has the centre line.
+        kerb = -self.kerb if lane is intents.LaneChoice.ONCOMING else self.kerb
         signs = {
             intents.LateralTarget.LEFT_BOUNDARY: 1.0,
             intents.LateralTarget.RIGHT_BOUNDARY: -1.0,
-            intents.LateralTarget.KERB: self.kerb,
-            intents.LateralTarget.CENTRE_LINE: -self.kerb,
+            intents.LateralTarget.KERB: kerb,
+            intents.LateralTarget.CENTRE_LINE: -kerb,
         }
         return signs.get(lateral.target, 0.0) if lateral else 0.0
 
@@ -289,11 +293,10 @@ def resolve_spot(
         lanes: Of the scene.
         named: The spots of earlier requests by name, counted from the ego.
     """
-    own, base, is_approximate = spot.span_m, None, False
+    own, base = spot.span_m, None
     if spot.anchor is not None:
         anchor = named[spot.anchor]
         base = anchor.span_m
-        is_approximate = anchor.distance is not None and anchor.distance.is_approximate
         spot = replace(spot, anchor=None, via=anchor.via)
     elif spot.landmark is not None or spot.mark is not None:
         own = own or (0.0, 0.0)  # without a relation it is level with it
@@ -311,34 +314,18 @@ def resolve_spot(
     else:
         spot = replace(spot, via=None)
     bare = replace(spot, anchor=None, landmark=None, mark=None, distance=None, relation=None)
-    if own is None or base is None or not math.isfinite(sum((*own, *base))):
+    if own is None or base is None:
         return bare
-    # Both ranges are open within themselves: their ends add up.
+    # Both ranges are open within themselves: their ends add up, without a number to no end.
     low_m, high_m = own[0] + base[0], own[1] + base[1]
     is_ahead = low_m + high_m >= 0.0
     # Behind is counted backwards, so the nearer end is the higher one.
     low_m, high_m = (low_m, high_m) if is_ahead else (-high_m, -low_m)
-    is_approximate |= spot.distance is not None and spot.distance.is_approximate
     return replace(
         bare,
         relation=intents.Relation.AHEAD if is_ahead else intents.Relation.BEHIND,
-        distance=intents.Length(low_m=low_m, high_m=high_m, is_approximate=is_approximate),
+        distance=intents.Length(low_m=low_m, high_m=high_m),
     )
-
-
-def list_absent(intent: intents.Intent, lanes: LanesAcross) -> tuple[str, ...]:
-    """Return in words what the intent names and the scene does not have."""
-    requests = (*intent.requests, *intent.moves)
-    spots = [request.spot for request in requests]
-    picks = [spot.landmark for spot in spots if spot.landmark is not None]
-    picks += [*(move.who for move in intent.moves), *intent.removals]
-    ways = dict.fromkeys(spot.via for spot in spots if lanes.over(spot.via) is None)
-    marks = [spot.mark for spot in spots if spot.mark is not None]
-    starts = [wish.start for request in requests if (wish := getattr(request, "motion", None))]
-    marks += [start.mark for start in starts if start is not None and start.mark is not None]
-    absent = [f"a way to {via}" for via in ways]
-    absent += [str(pick) for pick in picks if not find_picked(lanes, pick)]
-    return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
 
 
 def _fits(

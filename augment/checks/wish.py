@@ -224,7 +224,7 @@ class _Fitting:
             onwards = replace(place, stations_m=((begins_m, math.inf),))
             others = [onwards.nearest(point) for point in points]
             return [*others[:first], there, *others[first + 1 :]]
-        gap_m = (request.spacing.low_m, request.spacing.high_m)
+        gap_m = request.spacing.span_m
         count, route = request.count or len(agents), self._lanes.route
 
         # Numbers: the first station and the gap; of each vehicle the two ends across its lane,
@@ -324,7 +324,7 @@ class _Fitting:
         links = [
             Link(
                 base=0,
-                gap_m=(gap.low_m, gap.high_m),
+                gap_m=gap.span_m,
                 # In file they stand further towards the side that they come from.
                 toward_rad=lane_rad + (side.sign if side else 0.0) * math.pi / 2.0,
                 aside_rad=math.pi / 2.0 if side else math.pi,
@@ -345,7 +345,7 @@ class _Fitting:
         links = tuple(
             Link(
                 base=index,
-                gap_m=(other.gap.low_m, other.gap.high_m) if other.gap else (0.0, touching_m),
+                gap_m=other.gap.span_m if other.gap else (0.0, touching_m),
                 toward_rad=lane_rad + BEARINGS_RAD.get(other.bearing, 0.0),
                 aside_rad=_ASIDE_RAD if other.bearing else math.pi,
             )

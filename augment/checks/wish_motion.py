@@ -264,7 +264,7 @@ def _list_starts(case: MotionCase, wish: MotionWish, speeds: Speeds) -> Iterator
         apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
         near = start.ego_distance
         # The ego comes within the farther end first: that is the earliest start.
-        reaches_m = (near.high_m, near.low_m) if near else (planned.REACHED_M,) * 2
+        reaches_m = near.span_m[::-1] if near else (planned.REACHED_M,) * 2
         steps = (np.flatnonzero(apart_m <= reach_m) for reach_m in reaches_m)
         first_s, last_s = (float(times_s[at[0]]) if len(at) else math.inf for at in steps)
         yield first_s, last_s

@@ -18,7 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from augment.checks.ground import VEHICLES
-from augment.checks.lanes_across import LanesAcross, find_mark, list_crosswalks
+from augment.checks.lanes_across import LanesAcross, find_mark, find_picked, list_crosswalks
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
 from augment.scene.entities import Point
@@ -35,8 +35,6 @@ FAR_OUT_M = 3.0
 """How far beside the road something may stand that is to stand beside it."""
 EDGE_GAP_M = 0.1
 """What may be left between a box at the edge of a lane and that edge."""
-_ABOUT_SHARE = 0.05
-""""About 20 m" is 19 to 21 m: a number that is rounded."""
 _AT_JUNCTION_M = 10.0
 _BEND_OVER_M, _BEND_RAD, _BEND_ENDS_M = 20.0, math.radians(8.0), 10.0
 """A bend turns by so much over so far; its ends reach a little into the straight."""
@@ -56,13 +54,7 @@ def list_stations(spot: wish.Spot, lanes: LanesAcross) -> tuple[Span, ...]:
         spot: With its distance counted from the ego, as `resolve_spots` leaves it.
         lanes: Of the scene.
     """
-    spans = [EVERYWHERE]
-    if spot.span_m is not None:
-        low_m, high_m = spot.span_m
-        is_about = spot.distance is not None and spot.distance.is_approximate
-        # The further end sets how much "about" leaves open at both.
-        about_m = _ABOUT_SHARE * max(abs(low_m), abs(high_m)) if is_about else 0.0
-        spans = [(low_m - about_m, high_m + about_m)]
+    spans = [spot.span_m or EVERYWHERE]
     for setting in spot.settings:
         # Several named places hold at once; one that leaves nothing is passed over.
         spans = _intersect(spans, list_named(setting, lanes)) or spans
@@ -98,6 +90,23 @@ def list_named(setting: wish.Setting, lanes: LanesAcross) -> list[Span]:
     }[setting]
 
 
+def list_absent(intent: wish.Intent, lanes: LanesAcross) -> tuple[str, ...]:
+    """Return in words what the intent names and the scene does not have."""
+    requests = (*intent.requests, *intent.moves)
+    spots = [request.spot for request in requests]
+    picks = [spot.landmark for spot in spots if spot.landmark is not None]
+    picks += [*(move.who for move in intent.moves), *intent.removals]
+    ways = dict.fromkeys(spot.via for spot in spots if lanes.over(spot.via) is None)
+    marks = [spot.mark for spot in spots if spot.mark is not None]
+    starts = [motion.start for one in requests if (motion := getattr(one, "motion", None))]
+    marks += [start.mark for start in starts if start is not None and start.mark is not None]
+    places = [setting for spot in spots for setting in spot.settings]
+    absent = [f"a way to {via}" for via in ways]
+    absent += [str(pick) for pick in picks if not find_picked(lanes, pick)]
+    absent += [f"a place {setting}" for setting in places if not list_named(setting, lanes)]
+    return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
+
+
 def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m: float) -> Span:
     """Return from where to where left of its lane's centre an object may stand, in metres.
 
@@ -121,7 +130,7 @@ def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m:
         wish.Nearness.OUTSIDE: (outside_m, outside_m + FAR_OUT_M),
     }[lateral.nearness]
     if lateral.offset is not None:
-        near_m, far_m = lateral.offset.low_m, lateral.offset.high_m
+        near_m, far_m = lateral.offset.span_m
     # On the right near is the higher number, as left is positive.
     low_m, high_m = sorted((sign * near_m, sign * far_m))
     return low_m, high_m
@@ -149,7 +158,7 @@ class Place:
     def of(cls, spot: wish.Spot, lanes: LanesAcross, box_m: float) -> "Place":
         """Return the place that a spot admits for an object of that width."""
         lane = spot.lane or (wish.LaneChoice.OWN if spot.lateral is not None else None)
-        sign = lanes.side_sign(spot.lateral)
+        sign = lanes.side_sign(spot.lateral, spot.lane)
 
         def across(ahead_m: float) -> Span | None:
             if lane is None:

@@ -211,26 +211,24 @@ def _list_readings(
     request: wish.ConesRequest, count: int, lanes: LanesAcross, lane_m: float
 ) -> list[_Reading]:
     half_m, lateral = lane_m / 2.0, request.spot.lateral
-    inside = (-half_m, half_m)
+    sign = lanes.side_sign(lateral, request.spot.lane) or float(request.both_sides)
+    across = find_across(lateral, sign, lane_m, CONE_M)
 
     def at_edge(side: float) -> Span:
         return side * half_m - EDGE_M, side * half_m + EDGE_M
 
     match request.shape:
         case wish.Shape.RING:
-            turned = _Reading(from_m=inside, to=(-math.pi / count, math.pi / count))
-            return [turned, _Reading(from_m=inside, to=(CONE_M, half_m), is_oblong=True)]
+            turned = _Reading(from_m=across, to=(-math.pi / count, math.pi / count))
+            return [turned, _Reading(from_m=across, to=(CONE_M, half_m), is_oblong=True)]
         case wish.Shape.ROW:
-            return [_Reading(from_m=inside)]
+            return [_Reading(from_m=across)]
         case wish.Shape.TAPER:
             sides = (1.0, -1.0) if request.start is None else (request.start.sign,)
             middle = (0.0, 0.0) if request.ends_in_middle else None
             ends = [(at_edge(side), middle or at_edge(-side)) for side in sides]
         case _:
-            sign = lanes.side_sign(lateral) or float(request.both_sides)
-            is_exact = lateral is not None and (lateral.offset or lateral.nearness) is not None
-            is_edge = sign != 0.0 and not is_exact
-            across = find_across(lateral, sign, lane_m, CONE_M)
+            is_edge = sign != 0.0 and not (lateral is not None and lateral.is_exact)
             ends = [(at_edge(sign) if is_edge else across, (0.0, 0.0))]
     return [
         _Reading(from_m=from_m, to=to, is_along=is_along, is_straight=is_straight)
@@ -244,7 +242,7 @@ def _list_patterns(
 ) -> Iterator[Pattern]:
     lane = request.spot.lane or wish.LaneChoice.OWN
     spacing = request.spacing
-    gap_m = _OPEN_GAP_M if spacing is None else (spacing.low_m, spacing.high_m)
+    gap_m = _OPEN_GAP_M if spacing is None else spacing.span_m
     for reading in readings:
 
         def slots(numbers: FloatArray, reading: _Reading = reading) -> FloatArray:

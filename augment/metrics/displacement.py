@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from augment.checks import Ground
+from augment.checks.parties import EVENNESS_PER_M
 from augment.checks.wish import measure_wish
 from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, Modification, TrafficAgent
@@ -39,11 +40,6 @@ class ObjectClass(StrEnum):
 
 _STANDS_FOR = {AgentType.EGO_VEHICLE: ObjectClass.VEHICLE, AgentType.BUS: ObjectClass.VEHICLE}
 CLASS_OF = {kind: _STANDS_FOR.get(kind) or ObjectClass[kind.name] for kind in AgentType}
-
-_EVENNESS_PER_M = 1e-6
-"""Of matchings with the same sum the one with the smallest squares counts: 1 m and 1 m rather
-than 0 m and 2 m. Without it the order of the objects would decide. A distance of d metres weighs
-d (1 + 1e-6 d), which changes nothing else."""
 
 
 MISS_M = 10.0
@@ -239,7 +235,7 @@ def _match(
         np.subtract.outer([agent.y_m for agent in wanted], [agent.y_m for agent in candidates]),
     )  # (R, G)
     # Of an uneven matrix the smaller side is matched as a whole; the rest is missing or surplus.
-    rows, columns = linear_sum_assignment(apart_m * (1.0 + _EVENNESS_PER_M * apart_m))
+    rows, columns = linear_sum_assignment(apart_m * (1.0 + EVENNESS_PER_M * apart_m))
     return [
         Match(
             reference=wanted[row].id,

@@ -195,6 +195,11 @@ class Lateral:
     nearness: Nearness | None = None
     on_shoulder: Yes = False
 
+    @property
+    def is_exact(self) -> bool:
+        """True if it says how far towards its target."""
+        return self.offset is not None or self.nearness is not None
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spot:
@@ -240,7 +245,7 @@ class Spot:
             return None
         low_m, high_m = 0.0, math.inf
         if self.distance is not None:
-            low_m, high_m = self.distance.low_m, self.distance.high_m
+            low_m, high_m = self.distance.span_m
         return (low_m, high_m) if self.relation is Relation.AHEAD else (-high_m, -low_m)
 
 

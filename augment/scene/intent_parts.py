@@ -18,6 +18,8 @@ from augment.scene.schema import Real, Yes
 
 _Metres = Annotated[Real, Field(ge=0.0, le=1000.0)]
 _Value = Annotated[Real, Field(ge=0.0, le=100.0)]
+_ABOUT_SHARE = 0.05
+""""About 20 m" is 19 to 21 m: a number that is rounded."""
 
 
 class Side(StrEnum):
@@ -113,6 +115,12 @@ class Length:
     def is_range(self) -> bool:
         """True if a value has to be drawn from it."""
         return self.high_m > self.low_m
+
+    @property
+    def span_m(self) -> tuple[float, float]:
+        """From where to where it may be; "about" leaves as much open at either end."""
+        about_m = _ABOUT_SHARE * self.high_m if self.is_approximate else 0.0
+        return self.low_m - about_m, self.high_m + about_m
 
     def draw(self, rng: Generator) -> float:
         """Return a length of the range, evenly drawn."""

@@ -75,18 +75,13 @@ class Motion:
     """Everybody over time.
 
     Attributes:
-        times_s: (T,) seconds since t0, evenly spaced, the first is 0.
+        times_s: (T,) seconds since t0, every `STEP_S`, the first is 0.
         others: The scene's agents in its order, then who appears later.
     """
 
     times_s: FloatArray
     ego: Movement
     others: tuple[Movement, ...]
-
-    @property
-    def step_s(self) -> float:
-        """The time between two steps."""
-        return float(self.times_s[1] - self.times_s[0])
 
 
 Expectation = Callable[[Scene, Modification], Recording | None]

@@ -30,7 +30,7 @@ from augment.prompts.blocks import Strict
 from augment.prompts.vectors import LaneCurve
 from augment.scene.density import usual_size_m
 from augment.scene.entities import AgentType, Modification, TrafficAgent
-from augment.scene.motion import LENGTH_S, Motion, Movement
+from augment.scene.motion import LENGTH_S, STEP_S, Motion, Movement
 from augment.scene.planned_motion import PlannedMotion
 from augment.scene.planned_mover import check_motions, run_beside
 from augment.simulation.expected import expect_recording
@@ -263,7 +263,7 @@ class PoseTool(LaneTool):
 
     def _at(self, after_s: float, moved: Movement, motion: Motion) -> dict[str, object]:
         """Return where one is at the step nearest to a moment, and how far from the ego."""
-        step = round(after_s / motion.step_s)
+        step = round(after_s / STEP_S)
         x_m, y_m, heading_rad, speed_mps = moved.states[step].tolist()
         if math.isnan(x_m):
             return {"after_s": after_s, "error": "it has left the lanes of the map"}

@@ -19,6 +19,7 @@ from tests.intents import (
     crash,
     metres,
     parked,
+    spot,
     towards,
     walk,
 )
@@ -29,6 +30,9 @@ MIDDLE = parked(20.0, lateral=CENTRED)
 FACING = parked(20.0, facing=wish.Facing.AGAINST_LANE)
 WALK = walk(20.0, wish.Side.LEFT)
 CRASH = crash(20.0, 2, wish.CrashedCar(turn_deg=40.0))
+ASIDE = wish.Intent(
+    requests=(replace(CRASH.requests[0], spot=spot(20.0, lateral=towards(LEFT_EDGE, 1.2))),)
+)
 LINE = cones(20.0, 3, wish.Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.5))
 BUS = parked(35.0, body=wish.Body.BUS)
 DRIVING = parked(30.0, speed_mps=8.0)
@@ -111,6 +115,7 @@ def test_what_is_as_asked_for_has_no_fault(
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 15.0)),), FindingKind.ASKED_HEADING),
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 3.0)),), FindingKind.ASKED_CROSSING),
         (CRASH, CARS[:1], FindingKind.ASKED_COUNT),
+        (ASIDE, CARS, FindingKind.ASKED_ACROSS),
         (CRASH, (CARS[0], replace(CARS[1], heading_rad=0.0)), FindingKind.ASKED_HEADING),
         (LINE, CONES[:2], FindingKind.ASKED_COUNT),
         (LINE, tuple(replace(one, y_m=1.5) for one in CONES), FindingKind.ASKED_SIDE),

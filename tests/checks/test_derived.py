@@ -180,6 +180,20 @@ def test_what_is_added_moved_and_removed_is_said(
     assert set(statements) <= set(list_statements(intent))
 
 
+def test_a_walk_from_the_middle_of_the_lane_begins_there_again() -> None:
+    person = pedestrian("Added1", 12.0, 0.0, walk_to_m=(12.5, -5.0))
+    sentence, intent = describe_change(None, Modification(added=(person,)), scene())
+    assert "from 12.0 m ahead of the ego along its lane, in the middle of the ego's" in sentence
+    (placed,) = place(scene(), intent).modification.added
+    assert (placed.pose.beside(0.0), placed.walk_to_m) == ((12.0, 0.0), (12.5, -5.0))
+
+
+def test_a_side_of_the_oncoming_lane_is_that_of_the_ego() -> None:
+    change = Modification(added=(vehicle("Added1", 12.0, 4.5, math.pi),))
+    sentence, _ = describe_change(None, change, scene())
+    assert "1.0 m left of its centre, seen as the ego drives" in sentence
+
+
 def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     """The route turns left at x = 20 m, and a barrier stands straight on from there."""
     barrier = replace(vehicle("Added1", 45.0, 0.6), type=AgentType.BARRIER)
@@ -209,7 +223,11 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
 
 @pytest.mark.parametrize(
     ("walk_to_m", "lead"),
-    [((12.0, -4.0), "Let somebody cross the road"), (None, "Change the scene")],
+    [
+        ((12.0, -4.0), "Let somebody cross the road"),
+        ((12.0, 9.0), "Change the scene"),  # away from the road
+        (None, "Change the scene"),
+    ],
 )
 def test_only_who_walks_crosses(walk_to_m: tuple[float, float] | None, lead: str) -> None:
     person = replace(vehicle("Added1", 12.0, 4.0), type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)

@@ -1,17 +1,13 @@
 """Who and what of the scene an intent names, and distances that are counted from it."""
 
+import math
 from dataclasses import replace
 
 import pytest
 
 from augment.checks import Ground
-from augment.checks.lanes_across import (
-    LanesAcross,
-    find_mark,
-    find_picked,
-    list_absent,
-    resolve_spots,
-)
+from augment.checks.lanes_across import LanesAcross, find_mark, find_picked, resolve_spots
+from augment.checks.wish_places import list_absent
 from augment.scene import intent as wish
 from augment.scene.entities import Modification, TurnType
 from tests.checks.worlds import faults_against
@@ -80,16 +76,20 @@ def test_a_distance_from_a_landmark_becomes_one_from_the_ego() -> None:
     three = wish.Length(low_m=3.0, high_m=3.0)
     spot = wish.Spot(distance=three, relation=wish.Relation.BEHIND, landmark=PARKED_LEFT)
     level = wish.Spot(landmark=replace(PARKED_LEFT, relation=wish.Relation.BEHIND))
-    absent = replace(spot, landmark=wish.Pick(kind=wish.Sight.BUS))
+    past = (wish.Setting.AFTER_INTERSECTION,)
+    missing = replace(spot, landmark=wish.Pick(kind=wish.Sight.BUS), settings=past)
     intent = wish.Intent(
-        requests=tuple(wish.VehicleRequest(spot=one) for one in (spot, level, absent))
+        requests=tuple(wish.VehicleRequest(spot=one) for one in (spot, level, missing))
     )
     lanes = lanes_of("terrace-row")
     spans = [one.spot.span_m for one in resolve_spots(intent, lanes).requests]
     assert spans[0] == pytest.approx((-2.0, -2.0), abs=0.05)
     assert spans[1] == pytest.approx((-5.1, -5.1), abs=0.05)
     assert spans[2] is None
-    assert list_absent(intent, lanes) == ("bus 1 ahead of the ego",)
+    assert list_absent(intent, lanes) == (
+        "bus 1 ahead of the ego",
+        "a place past the intersection",
+    )
 
 
 def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
@@ -137,14 +137,14 @@ def test_whatever_is_done_about_a_wish_that_can_t_be_met_is_wrong() -> None:
         (20.0, wish.Relation.AHEAD, metres(6.0), (26.0, 26.0)),
         (20.0, wish.Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
         (20.0, wish.Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
-        (20.0, wish.Relation.AHEAD, None, None),
+        (20.0, wish.Relation.AHEAD, None, (20.0, math.inf)),
     ],
 )
 def test_a_distance_from_another_object_is_added_to_that_ones(
     bus_m: float,
     relation: wish.Relation,
     distance: wish.Length | None,
-    wanted: tuple[float, float] | None,
+    wanted: tuple[float, float],
 ) -> None:
     (bus,) = parked(bus_m).requests
     named = wish.VehicleRequest(spot=bus.spot, name="bus")

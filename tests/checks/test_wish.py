@@ -21,6 +21,7 @@ from tests.intents import (
     crash,
     metres,
     parked,
+    spot,
     towards,
     walk,
 )
@@ -62,10 +63,21 @@ def named(*settings: wish.Setting) -> wish.Intent:
     return standing(wish.Spot(lane=wish.LaneChoice.OWN, settings=settings))
 
 
-def by_zebra(relation: wish.Relation | None) -> wish.Intent:
+def by_zebra(relation: wish.Relation | None, *, about: bool = False) -> wish.Intent:
     """One car 5 m from the zebra, or on it."""
-    five = metres(5.0) if relation else None
+    five = metres(5.0, about=about) if relation else None
     return standing(wish.Spot(distance=five, relation=relation, mark=wish.MapPlace.CROSSWALK))
+
+
+def two(*spots: wish.Spot) -> wish.Intent:
+    """A car at each."""
+    return wish.Intent(requests=tuple(standing(spot).requests[0] for spot in spots))
+
+
+def crash_at(ahead_m: float, lateral: wish.Lateral, *others: wish.CrashedCar) -> wish.Intent:
+    """Two cars, the first of them off the middle of the lane."""
+    (request,) = crash(ahead_m, 2, *others).requests
+    return wish.Intent(requests=(replace(request, spot=spot(ahead_m, lateral=lateral)),))
 
 
 def file_of_cones(*places: tuple[float, float]) -> tuple[TrafficAgent, ...]:
@@ -89,6 +101,17 @@ WORKED = cones(
 PAIR = crash(20.0, 2, wish.CrashedCar(gap=metres(4.0), bearing=wish.Bearing.LEFT))
 WALK = walk(20.0, wish.Side.LEFT)
 QUEUE = parked(20.0, count=3, spacing=metres(6.0, 8.0))
+ABOUT = parked(20.0, count=2, spacing=metres(10.0, about=True), lateral=CENTRED)
+KERB = towards(wish.LateralTarget.KERB, 1.0)
+OTHER_KERB = parked(20.0, lane=wish.LaneChoice.ONCOMING, lateral=KERB)
+CRASHED = crash_at(20.0, towards(LEFT_EDGE, 1.2))
+EDGED = crash_at(20.0, towards(RIGHT_EDGE, 0.8), wish.CrashedCar(gap=metres(5.0)))
+SHIFTED = cones(20.0, 4, wish.Shape.LINE, spacing=metres(2.0), lateral=towards(LEFT_EDGE, 0.6))
+ASIDE = cones(20.0, 3, wish.Shape.ROW, spacing=metres(0.8), lateral=towards(RIGHT_EDGE, 0.5))
+PAST_ZEBRA = standing(
+    wish.Spot(relation=wish.Relation.AHEAD, mark=wish.MapPlace.CROSSWALK, lane=wish.LaneChoice.OWN)
+)
+BOTH = two(spot(32.0), wish.Spot(distance=metres(10.0, 50.0), relation=wish.Relation.AHEAD))
 FILE = walk(20.0, wish.Side.LEFT, count=2, is_file=True, behind=(metres(3.0),), on_road=True)
 
 HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[float]]] = [
@@ -112,7 +135,21 @@ HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[flo
     (BEND, parked(40.0), (vehicle("Agent2", *bent(40.0, 1.0)),), [0.0]),
     (BEND, parked(40.0, lateral=CENTRED), (vehicle("Agent2", *bent(40.0, 0.8)),), [0.8]),
     (BEND, parked(40.0, lateral=CENTRED), (vehicle("Agent2", 40.0, 0.0),), [11.07]),
+    # About: 5 % of what is said, also of a gap and of what is counted from elsewhere.
+    (STREET, ABOUT, (car(20.0, 0.0), car(30.5, 0.0, 3)), [0.0, 0.0]),
+    (ZEBRA, by_zebra(wish.Relation.AHEAD, about=True), (car(39.75, 0.0),), [0.5]),
+    # The kerb of the oncoming lane, whose centre is 3.5 m left, is on the ego's left.
+    (STREET, OTHER_KERB, (car(20.0, 4.5),), [0.0]),
+    (STREET, OTHER_KERB, (car(20.0, 2.5),), [2.0]),
+    # Without a number past it is anywhere past it.
+    (ZEBRA, PAST_ZEBRA, (car(50.0, 0.0),), [0.0]),
+    (ZEBRA, PAST_ZEBRA, (car(20.0, 0.0),), [14.0]),
+    # Of two requests each object answers the one that it is nearer to, all in all.
+    (STREET, BOTH, (car(14.0, 0.0), car(31.0, 0.0, 3)), [1.0, 0.0]),
+    (STREET, two(spot(20.0), spot(24.0)), (car(22.1, 0.0), car(27.0, 0.0, 3)), [2.1, 3.0]),
     # Objects of one request together.
+    (STREET, SHIFTED, file_of_cones((20, 0.6), (22, 0.6), (24, 0.6), (26, 0.6)), [0.0] * 4),
+    (STREET, ASIDE, file_of_cones((20, 0.8), (20, 0.0), (20, -0.8)), [0.5] * 3),
     (STREET, LINE, file_of_cones((20, -1.75), (22.5, -1.75), (25, -1.75)), [0.0, 0.0, 0.0]),
     (STREET, LINE, file_of_cones((20, -1.75), (23, -1.75), (27, -1.75)), [0.0, 0.0, 1.0]),
     (STREET, LINE, file_of_cones((20, 1.75), (22, 1.75), (24, 1.75)), [3.2, 3.2, 3.2]),
@@ -185,7 +222,8 @@ def test_the_distance_is_the_way_to_the_nearest_admitted_placement(
 INTENTS = {
     **{"side": SIDE, "range": RANGE, "oncoming": ONCOMING, "walk": WALK},
     **{"line": LINE, "row": ROW, "taper": TAPER, "ring": RING, "worked": WORKED},
-    **{"pair": PAIR, "file": FILE, "queue": QUEUE},
+    **{"pair": PAIR, "file": FILE, "queue": QUEUE, "about": ABOUT, "kerb": OTHER_KERB},
+    **{"crash": CRASHED, "gap": EDGED, "shifted": SHIFTED, "aside": ASIDE},
 }
 PLACED = {
     name: place(STREET, intent, seed=7).modification.added for name, intent in INTENTS.items()
@@ -221,6 +259,7 @@ def test_what_the_rule_placer_places_is_what_was_asked_for(name: str) -> None:
         (junction(), wish.Setting.AFTER_INTERSECTION),
         (ZEBRA, wish.Setting.ON_CROSSWALK),
         (ZEBRA, wish.Setting.BY_PARKED_RIGHT),
+        (STREET, wish.Setting.OFF_CROSSWALK),
     ],
 )
 def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: wish.Setting) -> None:

@@ -17,7 +17,7 @@ from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import AgentType, Lane, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph
-from augment.scene.motion import MotionSource, Movement
+from augment.scene.motion import STEP_S, MotionSource, Movement
 
 VERSION: Final = "2020a"
 GOAL_RADIUS_M: Final = 2.0
@@ -119,7 +119,7 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
         *_map(cell, ids, report),
         *_obstacles(cell, ids, report),
         _problem(cell, ids),
-        timeStepSize=_number(cell.motion.step_s),
+        timeStepSize=_number(STEP_S),
         commonRoadVersion=VERSION,
         author="Scenario Arena",
         affiliation="",

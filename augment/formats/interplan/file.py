@@ -36,6 +36,7 @@ from augment.scene.entities import (
     TrafficDensity,
     TurnType,
 )
+from augment.scene.planned_mover import WALK_S
 from augment.scene.schema import Size, Speed, list_problems, path
 
 WHAT = "interPlan file"
@@ -43,8 +44,6 @@ OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
 """The keys of a special scenario whose rows a change writes anew."""
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""
-WALK_S: Final = 15.0
-"""How long a walk takes after its activation, whatever its length."""
 MOST_ENTRIES: Final = 100
 """The index of a special scenario has at most two digits."""
 FURTHEST_FROM_EGO_M = 1_000.0

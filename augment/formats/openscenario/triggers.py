@@ -16,7 +16,7 @@ from augment.formats.writing import Cell
 from augment.geometry.polyline import FloatArray
 from augment.scene.entities import Point, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.motion import MotionSource, Movement, find_motion
+from augment.scene.motion import STEP_S, MotionSource, Movement, find_motion
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion
 from augment.scene.planned_mover import carry_out, walk_as_motion
 
@@ -102,7 +102,7 @@ def distance_condition(
         goals = marks = np.tile((start.x_m, start.y_m), (len(centres), 1))
         off_m = back_m
     within_m = start.within_m
-    step = None if started_s is None else round(started_s / cell.motion.step_s)
+    step = None if started_s is None else round(started_s / STEP_S)
     if step is not None:
         way = goals[step] - centres[step]
         gap_m = float(np.hypot(*way))
@@ -119,7 +119,7 @@ def distance_condition(
         within_m=within_m + _MARGIN_M,
         place_m=None if waits_for_ego else (float(marks[0, 0]), float(marks[0, 1])),
         off_m=off_m,
-        early_s=early * cell.motion.step_s,
+        early_s=early * STEP_S,
     )
 
 
