@@ -14,6 +14,7 @@ import numpy as np
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
+from augment.checks.wish_patterns import match_nearest
 from augment.checks.wish_places import Place
 from augment.scene import intent as wish
 from augment.scene.ego_route import EgoRoute
@@ -106,10 +107,6 @@ _TYPES = {
     Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
     Role.DOOR: (AgentType.GENERIC_OBJECT,),
 }
-EVENNESS_PER_M = 1e-6
-"""Of matchings with the same sum the one with the smallest squares counts: 1 m and 1 m rather
-than 0 m and 2 m. Without it the order of the objects would decide. A distance of d metres weighs
-d (1 + 1e-6 d), which changes nothing else."""
 _MISTYPED_M = 1e6
 """More than any distance."""
 _ROLES = {wish.Body.VAN: Role.CAR, wish.Body.TRUCK: Role.CAR}
@@ -206,8 +203,6 @@ def _assign_places(
     lanes: LanesAcross,
 ) -> dict[int, int]:
     """Return by the index of a place, of a request's number and a role, that of its agent."""
-    from scipy.optimize import linear_sum_assignment
-
     spots = (request.spot for request in intent.requests)
     admitted = [Place.of(spot, lanes.over(spot.via) or lanes, 0.0) for spot in spots]
     points = [(agent.x_m, agent.y_m) for agent in added]
@@ -215,10 +210,7 @@ def _assign_places(
     off_m = np.array([[math.dist(at, place.nearest(at)) for at in points] for place in admitted])
     off_m = off_m[[number for number, _ in places]]
     misfits = np.array([[not role.suits(agent) for agent in added] for _, role in places])
-    rows, columns = linear_sum_assignment(
-        off_m + EVENNESS_PER_M * off_m**2 + _MISTYPED_M * misfits
-    )
-    return dict(zip(rows.tolist(), columns.tolist(), strict=True))
+    return dict(match_nearest(off_m + _MISTYPED_M * misfits))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

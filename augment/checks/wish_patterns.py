@@ -74,8 +74,6 @@ class Pattern:
 
     def _assign(self, points: FloatArray, numbers: FloatArray) -> FloatArray:
         """Return where in its slot each point belongs, (M, 2), the sum of all ways the least."""
-        from scipy.optimize import linear_sum_assignment
-
         ends = self.slots(numbers)
         begin, along = ends[:, 0], ends[:, 1] - ends[:, 0]
         # Foot of each point on each slot's line: (M, N) shares of its length, clipped to it.
@@ -83,8 +81,22 @@ class Pattern:
         length2 = np.maximum((along**2).sum(axis=1), 1e-12)
         shares = ((points[:, None] - begin) * along).sum(axis=2) / length2
         feet = begin + np.clip(shares, 0.0, 1.0)[..., None] * along
-        _, columns = linear_sum_assignment(np.hypot(*(feet - points[:, None]).transpose(2, 0, 1)))
-        return np.asarray(feet[np.arange(len(points)), columns])
+        pairs = match_nearest(np.hypot(*(feet - points[:, None]).transpose(2, 0, 1)))
+        return np.array([feet[pair] for pair in pairs])
+
+
+def match_nearest(apart_m: FloatArray) -> list[tuple[int, int]]:
+    """Return pairs of a row and a column of which the sum of the distances is the smallest.
+
+    Of an uneven matrix the smaller side is matched as a whole. Of matchings with the same sum the
+    one with the smallest squares counts: 1 m and 1 m rather than 0 m and 2 m. Without it the
+    order of the objects would decide.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    # A distance of d metres weighs d (1 + 1e-6 d), which changes nothing else.
+    rows, columns = linear_sum_assignment(apart_m * (1.0 + 1e-6 * apart_m))
+    return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
 def find_step_m(at: Callable[[float], Point], begin: Point, from_m: float, gap_m: float) -> float:

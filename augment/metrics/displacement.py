@@ -18,8 +18,8 @@ import numpy as np
 from pydantic import Field
 
 from augment.checks import Ground
-from augment.checks.parties import EVENNESS_PER_M
 from augment.checks.wish import measure_wish
+from augment.checks.wish_patterns import match_nearest
 from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.scene.intent import Intent
@@ -228,14 +228,10 @@ def displacement_from_wish(
 def _match(
     wanted: list[TrafficAgent], candidates: list[TrafficAgent], object_class: ObjectClass
 ) -> list[Match]:
-    from scipy.optimize import linear_sum_assignment
-
     apart_m = np.hypot(
         np.subtract.outer([agent.x_m for agent in wanted], [agent.x_m for agent in candidates]),
         np.subtract.outer([agent.y_m for agent in wanted], [agent.y_m for agent in candidates]),
     )  # (R, G)
-    # Of an uneven matrix the smaller side is matched as a whole; the rest is missing or surplus.
-    rows, columns = linear_sum_assignment(apart_m * (1.0 + EVENNESS_PER_M * apart_m))
     return [
         Match(
             reference=wanted[row].id,
@@ -243,7 +239,7 @@ def _match(
             object_class=object_class,
             distance_m=float(apart_m[row, column]),
         )
-        for row, column in zip(rows, columns, strict=True)
+        for row, column in match_nearest(apart_m)
     ]
 
 
@@ -387,8 +383,6 @@ class Shift:
 
 def find_shifts(first: Modification, other: Modification) -> tuple[Shift, ...] | None:
     """Return the objects of two changes, matched; None where one has no counterpart."""
-    from scipy.optimize import linear_sum_assignment
-
     moved = [{agent.id: agent for agent in change.moved} for change in (first, other)]
     is_other = moved[0].keys() != moved[1].keys() or len(first.added) != len(other.added)
     if is_other or set(first.removed) != set(other.removed):
@@ -397,8 +391,8 @@ def find_shifts(first: Modification, other: Modification) -> tuple[Shift, ...] |
     table = [[_find_shift(a, b) for b in other.added] for a in first.added]
     # (A, B) metres; what can't stand for each other costs more than any sum of distances.
     costs = np.array([[1e9 if cell is None else cell.metres for cell in row] for row in table])
-    rows, columns = linear_sum_assignment(costs.reshape(len(table), len(table)))
-    found += [table[row][column] for row, column in zip(rows, columns, strict=True)]
+    pairs = match_nearest(costs.reshape(len(table), len(table)))
+    found += [table[row][column] for row, column in pairs]
     shifts = tuple(shift for shift in found if shift is not None)
     return shifts if len(shifts) == len(found) else None
 

@@ -243,9 +243,7 @@ class Spot:
         """From where to where along the lane, behind the anchor negative; None where open."""
         if self.relation is None:
             return None
-        low_m, high_m = 0.0, math.inf
-        if self.distance is not None:
-            low_m, high_m = self.distance.span_m
+        low_m, high_m = self.distance.span_m if self.distance else (0.0, math.inf)
         return (low_m, high_m) if self.relation is Relation.AHEAD else (-high_m, -low_m)
 
 
@@ -257,7 +255,6 @@ def _check_motion(motion: MotionWish | None, who: str, *presets: MotionPreset) -
 
 _ON_FOOT = (MotionPreset.LATE_PEDESTRIAN,)
 _OF_DOORS = (MotionPreset.DOOR_OPENING,)
-_OPENS = MotionWish(preset=MotionPreset.DOOR_OPENING)
 _DRIVEN = tuple(preset for preset in MotionPreset if preset not in (*_ON_FOOT, *_OF_DOORS))
 
 _Turned = TypeVar("_Turned", "VehicleRequest", "Move")
@@ -407,7 +404,7 @@ class DoorRequest:
     spot: Spot
     name: _Name = ""
     count: Literal[1] | None = 1
-    motion: MotionWish = _OPENS
+    motion: MotionWish = MotionWish(preset=MotionPreset.DOOR_OPENING)
 
     @model_validator(mode="after")
     def _is_of_a_car(self) -> Self:
