@@ -136,6 +136,11 @@ def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m:
     return low_m, high_m
 
 
+def says_how_far(lateral: wish.Lateral | None) -> bool:
+    """Return whether it is said how far towards its target something stands."""
+    return lateral is not None and (lateral.offset or lateral.nearness) is not None
+
+
 def find_off(value: float, spans: Iterable[Span]) -> float:
     """Return how far a value is outside the nearest of some ranges, 0 within one."""
     return min(max(low - value, value - high, 0.0) for low, high in spans)

@@ -195,11 +195,6 @@ class Lateral:
     nearness: Nearness | None = None
     on_shoulder: Yes = False
 
-    @property
-    def is_exact(self) -> bool:
-        """True if it says how far towards its target."""
-        return self.offset is not None or self.nearness is not None
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spot:
@@ -255,6 +250,7 @@ def _check_motion(motion: MotionWish | None, who: str, *presets: MotionPreset) -
 
 _ON_FOOT = (MotionPreset.LATE_PEDESTRIAN,)
 _OF_DOORS = (MotionPreset.DOOR_OPENING,)
+_OPENS = MotionWish(preset=MotionPreset.DOOR_OPENING)
 _DRIVEN = tuple(preset for preset in MotionPreset if preset not in (*_ON_FOOT, *_OF_DOORS))
 
 _Turned = TypeVar("_Turned", "VehicleRequest", "Move")
@@ -404,7 +400,7 @@ class DoorRequest:
     spot: Spot
     name: _Name = ""
     count: Literal[1] | None = 1
-    motion: MotionWish = MotionWish(preset=MotionPreset.DOOR_OPENING)
+    motion: MotionWish = _OPENS
 
     @model_validator(mode="after")
     def _is_of_a_car(self) -> Self:
