@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
 from augment.geometry.frames import wrap
@@ -171,11 +171,19 @@ class EngineerVerdict(Strict):
     remarks: _Remarks = []
 
 
-class JudgeAnswer(Strict):
-    """Picture that a judge found better, and the reason."""
+def _read_choice(word: object) -> object:
+    """Return a judge's word as it was asked for, also of "Picture A" or "Equal"."""
+    plain = word.strip(" .").lower().removeprefix("picture ") if isinstance(word, str) else word
+    return {"a": "A", "b": "B"}.get(plain, plain) if isinstance(plain, str) else plain
 
-    better: Literal["A", "B", "equal"]
-    reason: Annotated[str, Field(max_length=LONGEST_ENTRY)] = ""
+
+class JudgeAnswer(Strict):
+    """Picture that a judge found better, and the reason; nobody asks again for a better form."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    better: Annotated[Literal["A", "B", "equal"], BeforeValidator(_read_choice)]
+    reason: str | None = None
 
 
 def read_reply(
@@ -333,11 +341,13 @@ def read_sight(answer: str, count: int) -> dict[int, str]:
     if len(answer) > LONGEST_ANSWER:
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     seen: dict[int, str] = {}
-    for line in without_thoughts(answer).splitlines():
-        numbered = re.match(r"[ \t*#_]*([0-9]{1,2})[ \t]*[.):][ \t*]*(\S.*)", line)
-        if numbered is None:
-            continue
-        number, words = int(numbered.group(1)), numbered.group(2).strip(" *")
+    parts = re.split(
+        r"^[ \t*#_(]*([0-9]{1,2})[ \t]*\\?[.):](?![0-9])",
+        without_thoughts(answer),
+        flags=re.MULTILINE,
+    )
+    for number, text in zip(map(int, parts[1::2]), parts[2::2], strict=True):
+        words = " ".join(text.split()).strip(" *")
         if 1 <= number <= count and number not in seen and words:
             seen[number] = words[:LONGEST_ENTRY]
     if not seen:

@@ -11,6 +11,7 @@ from augment.errors import ReplyUnreadable
 from augment.metrics.displacement import displacement
 from augment.prompts.reply import (
     block_schema,
+    read_judge,
     read_questions,
     read_ratings,
     read_reply,
@@ -288,10 +289,30 @@ def test_sections_are_kept_and_the_block_counts() -> None:
         ("**1.** Lane1\n 2) no\n3: yes", {1: "Lane1", 2: "no", 3: "yes"}),
         ("1. first\n1. second\n9. far", {1: "first"}),
         ("<think>1. wrong</think>\n1. right", {1: "right"}),
+        ("1. In which lane?\n   - Lane1\n2\\. no", {1: "In which lane? - Lane1", 2: "no"}),
+        ("(1) yes, at\n1.5 m\n2.\nno", {1: "yes, at 1.5 m", 2: "no"}),
     ],
 )
 def test_a_viewers_lines_are_read_by_their_numbers(said: str, read: dict[int, str]) -> None:
     assert read_sight(said, 3) == read
+
+
+@pytest.mark.parametrize(
+    ("said", "better"),
+    [
+        *(("A", "A"), ("b ", "B"), ("Picture A", "A"), ("picture B.", "B"), ("Equal", "equal")),
+        *((word, None) for word in ("left", "A or B", "", 1, None, ["A"])),
+    ],
+)
+def test_a_judges_word_is_understood_in_other_spellings_and_guessed_in_none(
+    said: object, better: str | None
+) -> None:
+    text = json.dumps({"better": said, "reason": "x" * 3000, "confidence": 0.8})
+    if better:
+        assert read_judge(text).better == better
+    else:
+        with pytest.raises(ReplyUnreadable, match="better: Input should be"):
+            read_judge(text)
 
 
 @pytest.mark.parametrize("reader", READERS)

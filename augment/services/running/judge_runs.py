@@ -272,4 +272,5 @@ def _ask(
         )
     except (errors.ReplyUnreadable, errors.ModelRefused) as fault:
         return UNREADABLE, shorten(make_storable(str(fault)), LONGEST_WHY)
-    return answer.better, " ".join(make_storable(answer.reason).split())
+    reason = " ".join(make_storable(answer.reason or "").split())
+    return answer.better, shorten(reason, LONGEST_WHY)
