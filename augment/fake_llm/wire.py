@@ -62,22 +62,6 @@ class SpokenMessage(Strict):
         return [base64.b64decode(url.removeprefix(_PNG_URL)) for url in urls]
 
 
-class _Named(Strict):
-    name: Annotated[str, Field(min_length=1)]
-    strict: Literal[True]
-    schema_: Annotated[dict[str, Any], Field(alias="schema")]
-
-
-class _NamedSchema(Strict):
-    type: Literal["json_schema"]
-    json_schema: _Named
-
-
-class _ObjectSchema(Strict):
-    type: Literal["json_object"]
-    schema_: Annotated[dict[str, Any], Field(alias="schema")]
-
-
 class ChatRequest(Strict):
     """The body of a POST to /v1/chat/completions."""
 
@@ -89,7 +73,7 @@ class ChatRequest(Strict):
     seed: int | None = None
     tools: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_choice: Literal["auto", "none"] | None = None
-    response_format: _NamedSchema | _ObjectSchema | None = None
+    response_format: dict[Literal["type", "json_schema", "schema"], Any] | None = None
     stream: Literal[False] = False
 
     @property
