@@ -210,6 +210,7 @@ def test_a_place_on_a_route_lies_past_a_junction(tmp_path: Path) -> None:
         ("${$on and $v > 7}", "true"),
         ("${not $on}", "false"),
         ("${sqrt(16) / 8}", "0.5"),
+        ("${round(2.5) + round(-0.5)}", "2"),
     ],
 )
 def test_an_expression_has_the_value_of_the_standard(text: str, value: str) -> None:
@@ -268,6 +269,27 @@ def test_a_catalogs_entry_has_the_box_that_was_assigned(tmp_path: Path) -> None:
         assert not reading.scene.agents
 
 
+def test_an_entry_of_a_catalog_may_name_another(tmp_path: Path) -> None:
+    refers = '<CatalogReference catalogName="{}" entryName="{}"/>'
+    inner = f"<TrajectoryRef>{refers.format('Ways', 'way')}</TrajectoryRef>"
+    follow = FOLLOW.format("", TIMING.format("relative"))
+    action = f"{follow[: follow.index('<Trajectory ')]}{inner}{follow[follow.index('<TimeRef') :]}"
+    maneuver = f'<Maneuver name="goes">{event(action, by_time(1))}</Maneuver>'
+    shape = f"<Shape><Polyline>{TWO}</Polyline></Shape>"
+    files = {
+        "ways.xosc": catalog(f'<Trajectory name="way">{shape}</Trajectory>', "Ways"),
+        "moves.xosc": catalog(maneuver, "Moves"),
+    }
+    text = scenario().replace('<Maneuver name="m"></Maneuver>', refers.format("Moves", "goes"))
+    reading = read(write(tmp_path, text, **files))
+    assert reading.recording is not None
+    assert reading.recording.tracks[0].states[-1, 0] == pytest.approx(68 + 1.4 - 21.4, abs=0.01)
+    circle = f'<Trajectory name="way">{inner}</Trajectory>'
+    files["ways.xosc"] = catalog(circle, "Ways")
+    notes = read(write(tmp_path, text, **files)).notes
+    assert any("catalog entry way: lies too deep" in note for note in notes)
+
+
 @pytest.mark.parametrize(
     ("body", "kind"),
     [
@@ -313,15 +335,19 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
          "AcquirePositionAction was left out"),
         (scenario(event("<RoutingAction><AssignRouteAction/></RoutingAction>")),
          "needs a Route of two waypoints"),
-        (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>'))),
-         "event acts: unknown 'StandStillCondition'"),
+        (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>', "Ego"))),
+         "its conditions never hold"),
+        (scenario(event(BRAKES, by_entity("<OffroadCondition duration='1'/>"))),
+         "event acts: unknown 'OffroadCondition'"),
+        (scenario(other=CAR.replace('"car">', '"hovercraft">')),
+         "The category hovercraft is not known"),
         (scenario(event(BRAKES, by_entity('<SpeedCondition value="99" rule="greaterThan"/>'))),
          "its conditions never hold"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "1")))),
          "there is no lane in its direction to change to"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "-3")))),
          "road 1.lane: unknown '-4'; known: 1, -1, -2"),
-        (scenario(event(FOLLOW.format("", "<None/>"))), "or a Polyline of two vertices"),
+        (scenario(event(FOLLOW.format("", "<None/>"))), "Polyline: needs two vertices at least"),
         (scenario(event(FOLLOW.format(TWO, TIMING.format("relative").replace('"1"', '"-1"')))),
          "needs times that ascend"),
         (scenario(event(FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", SHARP))),

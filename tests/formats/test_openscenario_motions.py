@@ -81,6 +81,11 @@ def test_a_route_that_no_road_leads_along_is_lost_with_its_place(tmp_path: Path)
         (by_entity('<TraveledDistanceCondition value="19.9"/>'), 5.0),
         (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
                    'y="-1.75"/></Position></ReachPositionCondition>', "Ego"), 3.0),
+        (by_entity('<RelativeSpeedCondition entityRef="Other" value="5" rule="greaterThan"/>',
+                   "Ego") + by_time(2), 2.0),
+        (by_entity('<AccelerationCondition value="1" rule="lessThan"/>') + by_time(2), 2.0),
+        (AFTER.replace('"acts"', '"s"').replace("completeState", "runningState").replace(
+            'delay="0"', 'delay="2"'), 2.0),
         (by_entity('<ReachPositionCondition tolerance="2.1"><Position><WorldPosition x="52" '
                    'y="-1.75"/></Position></ReachPositionCondition>', "Ego") + by_time(3.35), 3.4),
     ],
@@ -94,6 +99,38 @@ def test_a_condition_starts_a_motion_when_a_formula_says(
     # Over 2 s from 4 m/s to a stop.
     x_m = other.states[:, 0] - other.states[0, 0]
     assert x_m[-1] == pytest.approx(4.0 * started_s + 4.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("act", "condition", "started_s"),
+    [
+        (by_time(5), by_time(3), 5.0),
+        (by_time(3), by_time(5), 5.0),
+        (by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego"), by_time(2), 3.5),
+        (by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego"),
+         AFTER.replace('"acts"', '"a"').replace("completeState", "runningState").replace(
+             'delay="0"', 'delay="1"'), 4.5),
+    ],
+)  # fmt: skip
+def test_an_event_begins_once_its_act_has(
+    act: str, condition: str, started_s: float, tmp_path: Path
+) -> None:
+    text = scenario(event(BRAKES, condition), other_does=(speed(4),))
+    file = write(tmp_path, text.replace(f"{by_time(0)}</Cond", f"{act}</Cond"))
+    (other,) = moves(read(file)).others
+    assert other.started_s == pytest.approx(started_s, abs=0.01)
+
+
+def test_who_stood_for_so_long_goes_on_faster_than_then(tmp_path: Path) -> None:
+    stood = by_entity('<StandStillCondition duration="1"/>')
+    goes = event(speed(6), stood, name="goes")
+    target = '<RelativeTargetSpeed entityRef="Other" value="2" speedTargetValueType="delta"/>'
+    more = speed(0).replace('<AbsoluteTargetSpeed value="0"/>', target)
+    later = event(more, by_time(6), name="more")
+    text = scenario(event(BRAKES, by_time(1)), goes, later, other_does=(speed(4),))
+    (other,) = moves(read(write(tmp_path, text))).others
+    # It stops after 3 s, and goes on at 6 m/s after 4 s, at 8 m/s after 6 s.
+    assert other.states[[39, 59, 69], 3] == pytest.approx([0.0, 6.0, 8.0])
 
 
 @pytest.mark.parametrize(
@@ -203,17 +240,27 @@ def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None
     first = event(follow.format(0.01), by_time(2))
     second = event(follow.format(-0.01), AFTER, name="then")
     (other,) = moves(read(write(tmp_path, scenario(first, second, other_does=(speed(8),))))).others
-    # Two bends of 0.4 rad in a radius of 100 m, the other way round.
+    # Two bends of 0.4 rad in a radius of 100 m, the other way round. Paths have no headings: the
+    # second begins along the way of the middle, 0.014 rad more.
     x_m, y_m = 200.0 * math.sin(0.4), 200.0 * (1.0 - math.cos(0.4))
-    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.5)
+    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.6)
 
 
-@pytest.mark.parametrize("start_s", [0.0, 2.0])
+CLOTHOID = (
+    '<Clothoid curvature="0.02" curvaturePrime="0" length="40"><Position>{}</Position></Clothoid>'
+)
+SEGMENT = '<Segment curvatureStart="0.02" curvatureEnd="0.02" length="20" hOffset="0">{}</Segment>'
+SPLINE = (
+    f"<ClothoidSpline>{SEGMENT.format('<PositionStart>{}</PositionStart>')}"
+    f"{SEGMENT.format('')}</ClothoidSpline>"
+)
+
+
+@pytest.mark.parametrize(("start_s", "made"), [(0.0, CLOTHOID), (2.0, CLOTHOID), (2.0, SPLINE)])
 def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
-    start_s: float, tmp_path: Path
+    start_s: float, made: str, tmp_path: Path
 ) -> None:
-    place = '<Position><RelativeObjectPosition entityRef="Other" dx="0" dy="0"/></Position>'
-    shape = f'<Clothoid curvature="0.02" curvaturePrime="0" length="40">{place}</Clothoid>'
+    shape = made.format('<RelativeObjectPosition entityRef="Other" dx="0" dy="0"/>')
     action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
     file = write(tmp_path, scenario(event(action, by_time(start_s)), other_does=(speed(8),)))
     (other,) = moves(read(file)).others
@@ -224,6 +271,23 @@ def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
     reached = other.states[int(10 * start_s) + 40, :2]
     assert reached == pytest.approx([middle, y_m], abs=0.03)
     assert other.states[-1, 3] == 8.0
+
+
+def test_a_nurbs_that_is_a_circle_is_followed_as_one(tmp_path: Path) -> None:
+    # A quarter of 40 m radius round (88, 38.25); its middle is 1.4 m ahead of the point on it.
+    places = ((88, -1.75, 1), (128, -1.75, math.sqrt(0.5)), (128, 38.25, 1))
+    points = "".join(
+        f'<ControlPoint weight="{w}"><Position><WorldPosition x="{x}" y="{y}"/></Position>'
+        "</ControlPoint>"
+        for x, y, w in places
+    )
+    knots = "".join(f'<Knot value="{n}"/>' for n in (0, 0, 0, 1, 1, 1))
+    shape = f'<Nurbs order="3">{points}{knots}</Nurbs>'
+    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
+    reading = read(write(tmp_path, scenario(event(action, by_time(1)), other_does=(speed(8),))))
+    (other,) = moves(reading).others
+    away_m = np.hypot(*(other.states[11:80, :2] - [66.6, 40.0]).T)
+    assert away_m == pytest.approx(math.hypot(40.0, 1.4), abs=0.02)
 
 
 def test_who_waits_for_another_is_read_after_them(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ import numpy as np
 from augment import foreign
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
-from augment.formats.openscenario.events import BEGUN, ENDED, WAIT, StoryEvent
+from augment.formats.openscenario.events import BEGUN, ENDED, WAIT, Groups, StoryEvent, has_begun
+from augment.formats.openscenario.trajectories import place_beside
 from augment.geometry.frames import Pose
 from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, Trigger
 
@@ -30,8 +31,15 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "risingOrFalling": lambda now, before: now != before,
 }
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
+_USUAL = {
+    "ReachPositionCondition": ("tolerance", "lessOrEqual"),
+    "StandStillCondition": ("duration", "greaterOrEqual"),
+    "TraveledDistanceCondition": ("value", "greaterOrEqual"),
+}
+"""The attribute of a condition's value and its rule, where they are not written or others."""
 _MARGIN_M = 1e-3
 _AHEAD_M = 2.0
+_STANDING_MPS = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +92,7 @@ class Expectation:
     def references(self, name: str, place: str) -> FloatArray:
         """Return where somebody's point of reference is (T, 2)."""
         states, (ahead_m, left_m) = self.find_states(name, place), self.centres_m[name]
-        return _place_beside(states, -ahead_m, -left_m)
+        return place_beside(states, -ahead_m, -left_m)
 
     def find_states(self, name: str, place: str) -> FloatArray:
         """Return where somebody's middle is (T, 4)."""
@@ -103,8 +111,10 @@ def find_trigger(
         step = round(time_s / float(expected.times_s[1]))
         return AtTime(after_s=time_s), min(step, len(expected.times_s) - 1)
     step, watched = find_step(event, expected)
-    positions = [e for group in event.groups for c in group for e in c.iter("Position")]
-    goals = [position for position in positions if not _list_refs(position)]
+    tried = [e for group in (*event.begins, *event.groups) for c in group for e in c.iter()]
+    along = [e for e in tried if e.get("coordinateSystem", "entity") != "entity"]
+    doubts.assume("A distance along roads is taken as the one between places", len(along))
+    goals = [e for e in tried if e.tag == "Position" and not _list_refs(e)]
     ego = next(name for name, agent_id in expected.ids.items() if agent_id == EGO_ID)
     others = [name for name in watched if name != actor]
     if step == 0 or not others:
@@ -133,42 +143,52 @@ def find_step(event: StoryEvent, expected: Expectation) -> tuple[int, list[str]]
     Raises:
         InvalidDocument: A condition is none that is read, or never holds.
     """
-    holds, watched = np.zeros(len(expected.times_s), dtype=bool), list[str]()
-    for group in event.groups:
-        all_hold = np.ones(len(holds), dtype=bool)
-        for condition in group:
-            met, names = _watch(condition, expected, event.place)
-            edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
-            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
-            delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
-            steps = min(round(delay_s / float(expected.times_s[1])), len(met))
-            all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
-            watched += names
-        holds |= all_hold
-    if not holds.any():
-        raise fault_at(event.place, "its conditions never hold while everybody goes on as at t0")
-    return int(holds.argmax()), watched
+    step, watched = 0, list[str]()
+    for groups in (event.begins, event.groups):
+        if groups:
+            holds, names = _find_holding(groups, event, step, expected)
+            if not holds.any():
+                text = "its conditions never hold while everybody goes on as at t0"
+                raise fault_at(event.place, text)
+            step, watched = int(holds.argmax()), watched + names
+    return step, watched
 
 
 # Private
 
 
-def _place_beside(states: FloatArray, ahead_m: float, left_m: float) -> FloatArray:
-    """Places (T, 2) so far ahead and to the left of states (T, 4)."""
-    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-    away = np.column_stack([ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos])
-    return np.asarray(states[:, :2] + away)
+def _find_holding(
+    groups: Groups, event: StoryEvent, since: int, expected: Expectation
+) -> tuple[np.ndarray, list[str]]:
+    """When groups of conditions hold (T,) from a step on, and whose motion they watch."""
+    times_s, watched = expected.times_s, list[str]()
+    holds = np.zeros(len(times_s), dtype=bool)
+    for group in groups:
+        all_hold = np.arange(len(times_s)) >= since
+        for condition in group:
+            met, names = _watch(condition, expected, event, float(times_s[since]))
+            edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
+            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
+            delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
+            steps = min(round(delay_s / float(times_s[1])), len(met))
+            all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
+            watched += names
+        holds |= all_hold
+    return holds, watched
 
 
 def _watch(
-    condition: Element, expected: Expectation, place: str
+    condition: Element, expected: Expectation, event: StoryEvent, begun_s: float
 ) -> tuple[np.ndarray, Sequence[str]]:
     """When a condition holds (T,), and whose motion it depends on."""
+    place = event.place
     element = next(
         (e for path in ("ByValueCondition/*", "ByEntityCondition/EntityCondition/*")
          for e in condition.findall(path)), None)  # fmt: skip
     kind = "nothing" if element is None else element.tag
     if (wait := condition.find(WAIT)) is not None:
+        if has_begun(wait, event.around):
+            return expected.times_s >= begun_s - 1e-9, []
         done = expected.find_done(wait, place)
         return expected.times_s >= done.started_s + done.since_s(wait) - 1e-9, []
     measures: dict[str, Callable[[str, Element, Expectation, str], FloatArray]] = {
@@ -178,16 +198,22 @@ def _watch(
         "TimeHeadwayCondition": _measure_headway,
         "TimeToCollisionCondition": _measure_collision,
         "TraveledDistanceCondition": _measure_way,
-        "SpeedCondition": _measure_speed,
-        "SimulationTimeCondition": _measure_time,
+        "SpeedCondition": lambda name, _, e, p: e.find_states(name, p)[:, 3],
+        "RelativeSpeedCondition": _measure_speed_over,
+        "AccelerationCondition": lambda name, _, e, p: np.gradient(
+            e.find_states(name, p)[:, 3], e.times_s
+        ),
+        "StandStillCondition": _measure_standing,
+        "SimulationTimeCondition": lambda _, __, e, ___: e.times_s,
     }
     measure = foreign.look_up(measures, kind, place)
     assert element is not None
     place = f"{place}.{kind}"
-    is_reach = kind == "ReachPositionCondition"
-    value = read_float(element, "tolerance" if is_reach else "value", place)
-    least = "greaterOrEqual" if kind == "TraveledDistanceCondition" else "lessOrEqual"
-    rule = foreign.look_up(_RULES, element.get("rule", least), place)
+    attribute, usual = _USUAL.get(kind, ("value", None))
+    value = read_float(element, attribute, place)
+    rule = foreign.look_up(_RULES, element.get("rule", usual), place)
+    # Of other directions nobody knows how fast anything goes.
+    foreign.look_up({"longitudinal": ""}, element.get("direction", "longitudinal"), place)
     triggering = condition.find("ByEntityCondition/TriggeringEntities")
     names = [] if triggering is None else [e.get("entityRef", "") for e in triggering]
     if kind == "SimulationTimeCondition":
@@ -221,7 +247,7 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
             states = expected.find_states(other, place)
             x_m, y_m, heading_rad, _ = states[0].tolist()
             first = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
-            goals = _place_beside(states, *first.to_local(goals)[0].tolist())
+            goals = place_beside(states, *first.to_local(goals)[0].tolist())
         way = goals - own
     else:
         way = expected.references(other, place) - own
@@ -256,9 +282,18 @@ def _measure_way(name: str, element: Element, expected: Expectation, place: str)
     return np.asarray(np.cumsum(steps_m) + 1e-9)
 
 
-def _measure_speed(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
-    return np.asarray(expected.find_states(name, place)[:, 3])
+def _measure_speed_over(
+    name: str, element: Element, expected: Expectation, place: str
+) -> FloatArray:
+    others = [name, *_list_refs(element)[:1]]
+    own_mps, mps = (expected.find_states(n, place)[:, 3] for n in (others[0], others[-1]))
+    return np.asarray(own_mps - mps)
 
 
-def _measure_time(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
-    return expected.times_s
+def _measure_standing(
+    name: str, element: Element, expected: Expectation, place: str
+) -> FloatArray:
+    """Seconds since it moved last."""
+    moves = ~(expected.find_states(name, place)[:, 3] <= _STANDING_MPS)
+    last_s = np.maximum.accumulate(np.where(moves, expected.times_s, 0.0))
+    return np.asarray(expected.times_s - last_s + 1e-9)

@@ -1,8 +1,8 @@
 """Events of a storyboard, by who acts in them, with their triggers and actions still as XML."""
 
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from augment import foreign
@@ -33,31 +33,33 @@ class StoryEvent:
 
     Attributes:
         names: Of itself and its actions, by which others wait for it.
-        groups: Conditions (and) in groups (or) by which it begins; empty for at once.
+        groups: Conditions (and) in groups (or) by which it begins once its act has; empty for
+            at once.
         actions: Those that are read, by their kinds.
+        begins: Conditions by which the act begins, likewise.
+        around: Names of the story, act, group and maneuver that it is in.
     """
 
     place: str
     names: tuple[str, ...]
     groups: Groups
-    actions: tuple[tuple[str, Element], ...] = field(default=())
+    actions: tuple[tuple[str, Element], ...]
+    begins: Groups = ()
+    around: tuple[str, ...] = ()
 
     @property
     def time_s(self) -> float | None:
-        """When it begins if a time alone says that, None otherwise."""
-        if not self.groups:
-            return 0.0
-        times = [condition.find(_TIME) for group in self.groups for condition in group]
-        if len(times) != 1 or times[0] is None or times[0].get("rule", _SINCE[0]) not in _SINCE:
-            return None
-        delay_s = foreign.read_number(self.groups[0][0].get("delay") or "0", self.place)
-        return max(read_float(times[0], "value", self.place) + delay_s, 0.0)
+        """When it begins if times alone say that, None otherwise."""
+        moments_s = [_find_time(groups, self.place) for groups in (self.begins, self.groups)]
+        known_s = [moment_s for moment_s in moments_s if moment_s is not None]
+        return max(known_s) if len(known_s) == 2 else None
 
     @property
     def waits_for(self) -> Element | None:
         """What it waits for if one element of the storyboard alone says when, None otherwise."""
         conditions = [condition for group in self.groups for condition in group]
-        return conditions[0].find(WAIT) if len(conditions) == 1 else None
+        wait = conditions[0].find(WAIT) if len(conditions) == 1 else None
+        return None if wait is None or has_begun(wait, self.around) else wait
 
 
 def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
@@ -72,9 +74,16 @@ def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
                     around = tuple(e.get("name", "") for e in (story, act, group, maneuver))
                     for event in maneuver.findall("Event"):
                         groups = _list_conditions(event, around)
-                        for actor, made in _split(event, actors, begins, groups, doubts):
+                        for actor, made in _split(event, actors, doubts):
+                            made = replace(made, groups=groups, begins=begins, around=around)
                             events[actor].append(made)
     return events
+
+
+def has_begun(wait: Element, around: Collection[str]) -> bool:
+    """Return whether a condition waits for what it is in, which has begun before."""
+    name = wait.get("storyboardElementRef", "").split("::")[-1]
+    return name in around and wait.get("state") in BEGUN
 
 
 def describe_action(action: Element) -> str:
@@ -100,19 +109,27 @@ def _holds_at_once(condition: Element, around: tuple[str, ...]) -> bool:
         return False
     time, state = condition.find(_TIME), condition.find(WAIT)
     if state is not None:
-        name = state.get("storyboardElementRef", "").split("::")[-1]
-        return state.get("state") in BEGUN and name in around
+        return has_begun(state, around)
     is_since = time is not None and time.get("rule", _SINCE[0]) in _SINCE
     return time is not None and is_since and (time.get("value") or "").strip("0.") == ""
 
 
-def _split(
-    event: Element, actors: list[str], begins: Groups, groups: Groups, doubts: Doubts
-) -> Iterator[tuple[str, StoryEvent]]:
+def _find_time(groups: Groups, place: str) -> float | None:
+    """When conditions hold if they are a time alone, None otherwise."""
+    conditions = [condition for group in groups for condition in group]
+    if not conditions:
+        return 0.0
+    time, edge = conditions[0].find(_TIME), conditions[0].get("conditionEdge", "none")
+    is_since = time is not None and time.get("rule", _SINCE[0]) in _SINCE
+    if time is None or not is_since or len(conditions) > 1 or edge not in ("none", "rising"):
+        return None
+    delay_s = foreign.read_number(conditions[0].get("delay") or "0", place)
+    return max(read_float(time, "value", place) + delay_s, 0.0)
+
+
+def _split(event: Element, actors: list[str], doubts: Doubts) -> Iterator[tuple[str, StoryEvent]]:
     """Yield an event for each of those who act in it."""
     place = f"event {event.get('name', '')[:60]}"
-    if begins and groups and begins != groups:
-        doubts.assume("An act's own start was left out: its events have theirs")
     actions, owners = [], set(actors)
     for action in event.findall("Action"):
         entity = action.find("GlobalAction/EntityAction")
@@ -127,6 +144,6 @@ def _split(
         else:
             actions.append((kind, found))
     names = (event.get("name", ""), *(a.get("name", "") for a in event.findall("Action")))
-    made = StoryEvent(place=place, names=names, groups=groups or begins, actions=tuple(actions))
+    made = StoryEvent(place=place, names=names, groups=(), actions=tuple(actions))
     for actor in sorted(owners) if actions else ():
         yield actor, made

@@ -34,7 +34,7 @@ _BESIDE_ROUTE_M = 15.0
 """Lanes of a route end no further from its roads' middles."""
 _STEP_S = 0.01
 """A step in speed takes so long."""
-_LANE_M, _ON_M = 3.5, 1_000.0
+_LANE_M, _ON_M, _THIN_M = 3.5, 1_000.0, 0.0005
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
     "step": lambda share: share,
@@ -145,7 +145,12 @@ class _Draft:
     def _change_speed(self, action: Element, at_s: float, place: str) -> float:
         own_mps = self._agent.speed_mps
         now_mps = way_and_speed(tuple(self.speeds), own_mps, at_s)[1]
-        goal_mps = read_speed_target(action, self._mps_of, f"{place}.SpeedAction")
+        step, expected = self._step_since(at_s), self._stage.expected
+        goal_mps = read_speed_target(
+            action, lambda name: expected.find_states(name, place)[step, 3], f"{place}.SpeedAction"
+        )
+        is_kept = action.find(".//RelativeTargetSpeed[@continuous='true']") is not None
+        self._doubts.assume("A speed that is kept relative to somebody is taken once", is_kept)
         dynamics = _find(action, "SpeedActionDynamics", place)
         by, value = (
             dynamics.get("dynamicsDimension"),
@@ -167,10 +172,6 @@ class _Draft:
             for s in shares
         ]
         return lasts_s
-
-    def _mps_of(self, name: str) -> float:
-        states = foreign.look_up(self._stage.expected.states, name, "entityRef")
-        return float(states[0, 3])
 
     def _change_lane(self, action: Element, at_s: float, place: str) -> float:
         gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)
@@ -220,8 +221,7 @@ class _Draft:
         rows = np.array([*((pose.x_m, pose.y_m) for pose in before), *points]).reshape(-1, 2)
         apart = np.append(np.hypot(*np.diff(rows, axis=0).T) > 0.005, True)
         kept = rows[apart]
-        every = math.ceil(len(kept) / _MOST_POINTS)
-        thinned = np.round([*kept[::every][: _MOST_POINTS - 1], kept[-1]], 4)
+        thinned = np.round(_simplify(kept, _THIN_M, _MOST_POINTS), 4)
         self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
         begin = self._find_begin(place)
         here = np.array([[begin.x_m, begin.y_m]])
@@ -315,13 +315,8 @@ def fit_speeds(times_s: FloatArray, ways_m: FloatArray) -> list[tuple[float, flo
             np.maximum([ends[0], *mps, ends[1]], 0.0),
         ]
     )
-    within_mps = 0.001
-    while True:
-        line = shapely.LineString(knots).simplify(within_mps, preserve_topology=False)
-        rows = shapely.get_coordinates(line)
-        if len(rows) <= _MOST_SPEEDS:
-            return [(round(time_s, 4), round(speed_mps, 4)) for time_s, speed_mps in rows.tolist()]
-        within_mps *= 2.0
+    rows = _simplify(knots, 0.001, _MOST_SPEEDS).tolist()
+    return [(round(time_s, 4), round(speed_mps, 4)) for time_s, speed_mps in rows]
 
 
 def read_speed_target(action: Element, mps_of: Callable[[str], float], place: str) -> float:
@@ -335,6 +330,16 @@ def read_speed_target(action: Element, mps_of: Callable[[str], float], place: st
     if value < 0.0:
         raise fault_at(place, f"a speed of {value:g} m/s, backwards, is not read")
     return value
+
+
+def _simplify(rows: FloatArray, within: float, most: int) -> FloatArray:
+    """Return the rows (R, 2) that a line needs to lie so near; of more than so many, fewer."""
+    while len(rows) > 2:
+        line = shapely.LineString(rows).simplify(within, preserve_topology=False)
+        if len(line.coords) <= most:
+            return shapely.get_coordinates(line)
+        within *= 2.0
+    return rows
 
 
 def _find(action: Element, path: str, place: str) -> Any:

@@ -28,7 +28,8 @@ _OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(math, name) for name in ("floor", "ceil", "sqrt", "sin", "cos", "tan")},
     **{name: getattr(math, name) for name in ("asin", "acos", "atan", "pow")},
-    **{"round": round, "abs": abs, "min": min, "max": max},
+    **{"abs": abs, "min": min, "max": max},
+    "round": lambda value: math.copysign(math.floor(abs(value) + 0.5), value),
     "sign": lambda value: math.copysign(1.0, value) if value else 0.0,
 }
 

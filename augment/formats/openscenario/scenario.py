@@ -28,7 +28,7 @@ from augment.formats.openscenario.motions import read_motion, read_speed_target
 from augment.formats.openscenario.positions import PositionReader
 from augment.formats.openscenario.sources import EGO_NAMES, ScenarioSource, is_catalog
 from augment.formats.openscenario.stage import Stage
-from augment.formats.openscenario.trajectories import find_middle, trace
+from augment.formats.openscenario.trajectories import trace
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
@@ -105,9 +105,9 @@ class _Scenario:
         self._middles = dict[str, FloatArray]()
         for name in self._entities.keys() & self._positions.keys():
             with self._doubts.about("entities"):
-                self._middles[name] = find_middle(
-                    self._placer.entity_pose(name), self._entities[name].centre_m
-                )
+                pose = self._placer.entity_pose(name)
+                (middle,) = pose.to_parent(np.array([self._entities[name].centre_m]))
+                self._middles[name] = np.array([*middle, pose.heading_rad])
         cars = (AgentType.VEHICLE, AgentType.BUS)
         self.drivers = [
             n for n, e in self._entities.items() if n in self._middles and e.type in cars
@@ -186,7 +186,9 @@ class _Scenario:
         }
 
         def count(name: str) -> int:
-            conditions = [c for e in self._events[name] for group in e.groups for c in group]
+            conditions = [
+                c for e in self._events[name] for group in (*e.begins, *e.groups) for c in group
+            ]
             parts = [part for condition in conditions for part in condition.iter()]
             elements = (part.get("storyboardElementRef", "").split("::")[-1] for part in parts)
             watched = {part.get("entityRef") for part in parts} | set(map(owners.get, elements))

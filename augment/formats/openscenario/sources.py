@@ -19,8 +19,12 @@ from augment.scene.entities import AgentType
 from augment.scene.planned_motion import EGO_ID
 
 _CATALOG = b"<Catalog "
-_REFERRING = ("ManeuverGroup", "RouteRef", "AssignRouteAction", "TrajectoryRef")
+_REFERRING = (
+    *("ManeuverGroup", "RouteRef", "AssignRouteAction", "TrajectoryRef", "FollowTrajectoryAction"),
+)
 """What may name an entry of a catalog in place of its content, but for entities."""
+_DEEPEST = 3
+"""Entries in each other, as of a route in a maneuver."""
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
@@ -31,9 +35,10 @@ _CLASSES = foreign.name_all(
         AgentType.BUS: "bus",
         AgentType.BARRIER: "barrier guardRail",
         AgentType.PEDESTRIAN: "pedestrian wheelchair",
+        AgentType.GENERIC_OBJECT: "animal obstacle pole railing soundBarrier streetLamp other",
     }
 )
-"""By the category; whatever else is an object."""
+"""By the category; whatever else is an object too, with a note."""
 SCENERY = ("building", "roadMark", "none", "wind", "patch", "gantry", "etc", "vegetation", "tree")
 _KINDS = {
     "Vehicle": "vehicleCategory",
@@ -88,10 +93,7 @@ class ScenarioSource:
         if root.find("Storyboard") is None:
             raise fault_at(path.name, "has no Storyboard: it is a catalog or a distribution")
         self.root = resolve(root, {}, self.doubts)
-        for holder in [part for part in self.root.iter() if part.tag in _REFERRING]:
-            for reference in holder.findall("CatalogReference"):
-                with self.doubts.about("references to catalogs"):
-                    holder.append(self.resolve_reference(reference))
+        self._fill_references(self.root)
         # Also those of catalogs.
         if header is not None and header.get("description", "").startswith("CARLA:"):
             self._mirror_places()
@@ -102,6 +104,16 @@ class ScenarioSource:
         counts = [element.get("maximumExecutionCount", "1") for element in self.root.iter()]
         repeated = sum(count.strip() != "1" for count in counts)
         self.doubts.assume("What may happen several times happens once", repeated)
+
+    def _fill_references(self, root: Element, depth: int = 0) -> None:
+        for holder in [part for part in root.iter() if part.tag in _REFERRING]:
+            for reference in holder.findall("CatalogReference"):
+                with self.doubts.about("references to catalogs"):
+                    entry = self.resolve_reference(reference)
+                    if depth == _DEEPEST:
+                        raise fault_at(f"catalog entry {entry.get('name')}", "lies too deep")
+                    self._fill_references(entry, depth + 1)
+                    holder.append(entry)
 
     def _mirror_places(self) -> None:
         """Turn world positions of CARLA's own frame, which counts y to the right, into ours."""
@@ -196,6 +208,8 @@ class ScenarioSource:
         if category in SCENERY:
             self.doubts.assume(f"A {category} was left out: it is scenery")
             return None
+        text = f"The category {category[:40]} is not known: an object"
+        self.doubts.assume(text, category not in _CLASSES)
         self.doubts.assume("A trailer was left out", body.find("Trailer") is not None)
         centre, size = body.find("BoundingBox/Center"), body.find("BoundingBox/Dimensions")
         ahead_m, left_m, length_m, width_m = (

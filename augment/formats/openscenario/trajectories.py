@@ -1,7 +1,7 @@
 """Trajectories of OpenSCENARIO as the middles of who follows them. V points."""
 
 import math
-from dataclasses import replace
+from collections.abc import Callable
 from itertools import pairwise
 from xml.etree.ElementTree import Element
 
@@ -11,14 +11,19 @@ from augment import foreign
 from augment.foreign import FloatArray, fault_at
 from augment.formats.opendrive.geometry import LONGEST_M, SHARPEST_PM, LinePiece, read_float
 from augment.formats.openscenario.positions import PositionReader
-from augment.geometry.frames import Pose, wrap
+from augment.geometry.frames import Pose
 
+_ENDS = ("curvatureStart", "curvatureEnd")
 _TIMING = {"scale": 1.0, "offset": 0.0}
+_HIGHEST_ORDER = 10
+_PER_POINT = 50
+"""Places on a NURBS for each of its control points."""
+Traced = tuple[FloatArray, FloatArray | None]
 
 
 def trace(
     action: Element, centre_m: tuple[float, float], placer: PositionReader, place: str
-) -> tuple[FloatArray, FloatArray | None]:
+) -> Traced:
     """Return x, y, heading of middles (V, 3) along a trajectory, and times unless none count.
 
     Args:
@@ -28,15 +33,21 @@ def trace(
         place: Where it stands.
 
     Raises:
-        InvalidDocument: It is neither of vertices nor a clothoid, or leads off the map.
+        InvalidDocument: It has no shape that is read, or leads off the map.
     """
-    spiral = next(action.iter("Clothoid"), None)
-    poses, times_s = (
-        _follow_vertices(action, placer, place)
-        if spiral is None
-        else _follow_clothoid(spiral, placer, f"{place}.Clothoid")
-    )
-    timing = action.find("TimeReference/Timing")
+    shape, timing = action.find(".//Shape/*"), action.find("TimeReference/Timing")
+    if float(action.get("initialDistanceOffset") or 0.0):
+        raise fault_at(place, "begins inside its trajectory, by initialDistanceOffset")
+    shapes: dict[str, Callable[[Element, Element, PositionReader, str], Traced]] = {
+        "Polyline": _follow_vertices,
+        "Clothoid": _follow_spirals,
+        "ClothoidSpline": _follow_spirals,
+        "Nurbs": _follow_nurbs,
+    }
+    kind = "no Shape" if shape is None else shape.tag
+    follow = foreign.look_up(shapes, kind, place)
+    assert shape is not None
+    rows, times_s = follow(shape, action, placer, f"{place}.{kind}")
     if timing is None:
         times_s = None
     elif times_s is not None:
@@ -46,23 +57,30 @@ def trace(
         times_s = times_s * scale + offset_s
         if (np.diff(times_s) < 0.0).any() or times_s[0] == times_s[-1]:
             raise fault_at(place, "needs times that ascend")
-    return np.array([find_middle(pose, centre_m) for pose in poses]), times_s
+    return np.column_stack([place_beside(rows, *centre_m), rows[:, 2]]), times_s
 
 
-def find_middle(pose: Pose, centre_m: tuple[float, float]) -> FloatArray:
-    """Return x, y, heading (3,) of the middle of a box whose point of reference is there."""
-    x_m, y_m = pose.to_parent(np.array([centre_m]))[0].tolist()
-    return np.array([x_m, y_m, pose.heading_rad])
+def place_beside(states: FloatArray, ahead_m: float, left_m: float) -> FloatArray:
+    """Return places (V, 2) so far ahead and to the left of states (V, 3 or more)."""
+    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
+    away = np.column_stack([ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos])
+    return np.asarray(states[:, :2] + away)
 
 
 # Private
 
 
+def _list_poses(placer: PositionReader, positions: list[Element], place: str) -> FloatArray:
+    """Poses (V, 3)."""
+    poses = [placer.find_pose(position, place) for position in positions]
+    return np.array([(pose.x_m, pose.y_m, pose.heading_rad) for pose in poses]).reshape(-1, 3)
+
+
 def _follow_vertices(
-    action: Element, placer: PositionReader, place: str
-) -> tuple[list[Pose], FloatArray | None]:
-    """Poses at vertices; without a heading, that of the way on."""
-    vertices = list(action.iter("Vertex"))
+    shape: Element, action: Element, placer: PositionReader, place: str
+) -> Traced:
+    """Rows at vertices; without a heading, that of the way on."""
+    vertices = shape.findall("Vertex")
     has_times = action.find("TimeReference/Timing") is not None and all(
         "time" in vertex.attrib for vertex in vertices
     )
@@ -71,42 +89,73 @@ def _follow_vertices(
         vertices += vertices[:1]
     positions = [position for vertex in vertices for position in vertex.findall("Position")]
     if len(vertices) < 2 or len(positions) != len(vertices):
-        raise fault_at(place, "a trajectory needs a Clothoid, or a Polyline of two vertices")
-    poses = [placer.find_pose(position, place) for position in positions]
+        raise fault_at(place, "needs two vertices at least, each with a Position")
+    rows = _list_poses(placer, positions, place)
     worlds = [position.find("WorldPosition") for position in positions]
-    bare = [world is not None and "h" not in world.attrib for world in worlds]
-    for row, (here, following) in enumerate(pairwise(poses)):
-        way = following.x_m - here.x_m, following.y_m - here.y_m
-        if bare[row] and math.hypot(*way) > 1e-6:
-            poses[row] = replace(here, heading_rad=math.atan2(way[1], way[0]))
+    bare = np.array([world is not None and "h" not in world.attrib for world in worlds])
+    ways = np.diff(rows[:, :2], axis=0)
+    turned = bare[:-1] & (np.hypot(*ways.T) > 1e-6)
+    rows[:-1][turned, 2] = np.arctan2(*ways[turned, ::-1].T)
     if bare[-1]:
-        poses[-1] = replace(poses[-1], heading_rad=poses[-2].heading_rad)
+        rows[-1, 2] = rows[-2, 2]
     if not has_times:
-        return poses, None
+        return rows, None
     times = [vertex.get("time") for vertex in vertices]
-    return poses, foreign.read_finite(times, f"{place}.Vertex", 1)[:, 0]
+    return rows, foreign.read_finite(times, place, 1)[:, 0]
 
 
-def _follow_clothoid(
-    spiral: Element, placer: PositionReader, place: str
-) -> tuple[list[Pose], FloatArray | None]:
-    position = spiral.find("Position")
-    if position is None:
-        raise fault_at(place, "needs a Position")
-    length_m = read_float(spiral, "length", place, 0.01, LONGEST_M)
-    first_pm = read_float(spiral, "curvature", place, -SHARPEST_PM, SHARPEST_PM)
-    rate = "curvatureDot" if "curvatureDot" in spiral.attrib else "curvaturePrime"
-    last_pm = foreign.read_number(
-        first_pm + length_m * read_float(spiral, rate, place, default=0.0),
-        f"{place}: curvature at its end",
-        -SHARPEST_PM,
-        SHARPEST_PM,
-    )
-    start = placer.find_pose(position, place)
-    piece = LinePiece(start=start, length_m=length_m, curvatures_pm=(first_pm, last_pm))
-    rows = piece.poses_at(np.linspace(0.0, length_m, math.ceil(length_m) + 1)).tolist()
-    poses = [Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(rad)) for x_m, y_m, rad in rows]
-    if not {"startTime", "stopTime"} <= spiral.attrib.keys():
-        return poses, None
-    start_s, stop_s = (read_float(spiral, n, place, 0.0) for n in ("startTime", "stopTime"))
-    return poses, np.linspace(start_s, stop_s, len(poses))
+def _follow_spirals(shape: Element, action: Element, placer: PositionReader, place: str) -> Traced:
+    """Rows a metre apart along a clothoid, or several that go on from each other."""
+    parts, pose, names = list[FloatArray](), None, ("startTime", "stopTime")
+    segments, bounds = shape.findall("Segment") or [shape], (-SHARPEST_PM, SHARPEST_PM)
+    if shape.tag == "ClothoidSpline":
+        names = "timeStart", "timeEnd"
+    for segment in segments:
+        length_m = read_float(segment, "length", place, 0.01, LONGEST_M)
+        if shape.tag == "ClothoidSpline":
+            first_pm, last_pm = (read_float(segment, n, place, *bounds) for n in _ENDS)
+        else:
+            first_pm = read_float(segment, "curvature", place, *bounds)
+            rate = "curvatureDot" if "curvatureDot" in segment.attrib else "curvaturePrime"
+            last_pm = first_pm + length_m * read_float(segment, rate, place, default=0.0)
+            last_pm = foreign.read_number(last_pm, f"{place}: curvature at its end", *bounds)
+        for position in (*segment.findall("Position"), *segment.findall("PositionStart")):
+            pose = placer.find_pose(position, place)
+        if pose is None:
+            raise fault_at(place, "needs a Position")
+        pose = pose.turn(read_float(segment, "hOffset", place, default=0.0))
+        piece = LinePiece(start=pose, length_m=length_m, curvatures_pm=(first_pm, last_pm))
+        parts.append(piece.poses_at(np.linspace(0.0, length_m, math.ceil(length_m) + 1)))
+        x_m, y_m, heading_rad = parts[-1][-1].tolist()
+        pose = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+    moments = [*(segment.get(names[0]) for segment in segments), shape.get(names[1])]
+    if all(moment is None for moment in moments):
+        return np.vstack(parts), None
+    times_s = [foreign.read_number(moment, f"{place}: times", 0.0) for moment in moments]
+    spans = zip(pairwise(times_s), parts, strict=True)
+    return np.vstack(parts), np.concatenate([np.linspace(*s, len(part)) for s, part in spans])
+
+
+def _follow_nurbs(shape: Element, action: Element, placer: PositionReader, place: str) -> Traced:
+    """Rows along the curve, with its headings."""
+    from scipy.interpolate import BSpline
+
+    order = foreign.read_whole(shape.get("order"), f"{place}.order", 2, _HIGHEST_ORDER)
+    points, knots = (shape.findall(name) for name in ("ControlPoint", "Knot"))
+    knot_values = [read_float(knot, "value", f"{place}.Knot") for knot in knots]
+    positions = [position for point in points for position in point.findall("Position")]
+    if not len(points) == len(positions) == len(knots) - order >= order:
+        raise fault_at(place, f"needs {order} control points at least, and {order} knots more")
+    if sorted(knot_values) != knot_values or knot_values[order - 1] >= knot_values[-order]:
+        raise fault_at(place, "needs knots that ascend")
+    weights = [read_float(point, "weight", place, 1e-3, 1e3, default=1.0) for point in points]
+    values = _list_poses(placer, positions, place)[:, :2]
+    has_times = all("time" in point.attrib for point in points)
+    if has_times:
+        values = np.column_stack([values, [read_float(p, "time", place) for p in points]])
+    weighted = np.column_stack([values, np.ones(len(points))]) * np.array(weights)[:, None]
+    at = np.linspace(knot_values[order - 1], knot_values[-order], _PER_POINT * len(points))
+    made = BSpline(np.array(knot_values), weighted, order - 1)(at)
+    made = made[:, :-1] / made[:, -1:]
+    turn_rad = np.arctan2(*np.gradient(made[:, 1::-1], axis=0).T)
+    return np.column_stack([made[:, :2], turn_rad]), made[:, 2] if has_times else None
