@@ -24,7 +24,7 @@ HEAVY = {
     "matplotlib": tuple(
         f"arena.{room}exports" for room in ("", "jobs.", "results.", "scenarios.")
     ),
-    "scipy.interpolate": ("augment.scene",),
+    "scipy.interpolate": ("augment.formats", "augment.scene"),
     "scipy.optimize": (
         *("augment.benchmark", "augment.metrics", "arena.pairing"),
         "augment.checks.wish_patterns",
