@@ -176,7 +176,11 @@ def test_a_broken_log_or_map_says_what_is_wrong(
         ("map.gpkg", "UPDATE boundaries SET geom = substr(geom, 1, 30) WHERE fid = 6", "geometry"),
         ("map.gpkg", "UPDATE walkways SET geom = substr(geom, 1, 30)", "walkways (1); first"),
         ("map.gpkg", "UPDATE lanes_polygons SET speed_limit_mps = 'fast'", "speed limits (3)"),
-        ("map.gpkg", "UPDATE baseline_paths SET lane_fid = -1.5 WHERE lane_fid = 3", "whole number"),
+        (
+            "map.gpkg",
+            "UPDATE baseline_paths SET lane_fid = -1.5 WHERE lane_fid = 3",
+            "whole number",
+        ),
     ],
 )
 def test_one_bad_part_is_left_out_with_a_note(
