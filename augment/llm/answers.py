@@ -71,6 +71,7 @@ class ForeignError:
         parameter: What of the request it names.
         is_withheld: Whether a filter withheld the answer.
         is_spent: Whether a quota or a balance is exhausted, which does not pass by waiting.
+        waits: All that may ask to wait, by name.
     """
 
     message: str
@@ -78,6 +79,7 @@ class ForeignError:
     parameter: str
     is_withheld: bool
     is_spent: bool
+    waits: Mapping[str, str]
 
     def __str__(self) -> str:
         code = f" ({shorten(self.code, LONGEST_CODE)})" if self.code else ""
@@ -150,6 +152,7 @@ def read_error(body: object) -> ForeignError:
     order = names_of("codes")
     codes = [text for key in order for name, text in leaves if name == key and " " not in text]
     codes = [text for text in codes if len(text) <= LONGEST_NAME]
+    asked = _ASKS_TO_WAIT.search(message)
     return ForeignError(
         message=message,
         code=next((text for name, text in leaves if name in order[:3] and text != "0"), ""),
@@ -157,6 +160,7 @@ def read_error(body: object) -> ForeignError:
         is_withheld=any(says("withheld", code) for code in codes)
         or (says("withheld_sentence", message) and not says("about_account", message)),
         is_spent=any(says("spent", text) for text in (*codes, message)),
+        waits=dict(leaves) | ({"asks": asked[1]} if asked else {}),
     )
 
 
@@ -190,9 +194,7 @@ def fault_of_status(
         return ParameterRefused(refused, text, status=status)
     passing = status in _PASSING or (status >= 500 and not says("lacks", error.message))
     passing = passing and not error.is_spent
-    asks = {"asks": asked[1]} if (asked := _ASKS_TO_WAIT.search(error.message)) else {}
-    fields = {**dict(islice(_leaves(body), MOST_LEAVES)), **asks, **headers} if passing else {}
-    wait_s, remark = _read_wait(fields)
+    wait_s, remark = _read_wait({**error.waits, **headers}) if passing else (None, "")
     return ModelFault(text + remark, retryable=passing, status=status, retry_after_s=wait_s)
 
 
@@ -326,7 +328,9 @@ def _insist_on_answer(
     else:
         return
     is_lasting = error.is_spent or says("lasting", error.code)
-    raise ModelFault(f"the endpoint {problem}", retryable=not is_lasting, status=200)
+    wait_s, remark = _read_wait(error.waits)
+    text = f"the endpoint {problem}{remark}"
+    raise ModelFault(text, retryable=not is_lasting, status=200, retry_after_s=wait_s)
 
 
 def _read_usage(

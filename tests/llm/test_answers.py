@@ -214,6 +214,12 @@ def test_an_error_in_a_200_that_stays_is_not_asked_for_again(code: object) -> No
     assert not fault.retryable
 
 
+def test_an_error_in_a_200_may_ask_to_wait() -> None:
+    fault = outcome({"error": {"message": "Slow down, try again in 8s.", "code": 429}})
+    assert isinstance(fault, ModelFault)
+    assert (fault.retryable, fault.retry_after_s) == (True, 8.0)
+
+
 def test_thoughts_that_nobody_may_read_are_thoughts() -> None:
     """OpenRouter hands out those of several vendors sealed; all tokens may have gone into them."""
     sealed = {
