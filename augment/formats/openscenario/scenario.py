@@ -24,10 +24,9 @@ from augment.formats.openscenario.events import (
     describe_action,
     list_events,
 )
-from augment.formats.openscenario.motions import read_motion, read_speed_target
+from augment.formats.openscenario.motions import Stage, read_motion, read_speed_target
 from augment.formats.openscenario.positions import PositionReader
 from augment.formats.openscenario.sources import EGO_NAMES, ScenarioSource, is_catalog
-from augment.formats.openscenario.stage import Stage
 from augment.formats.openscenario.trajectories import trace
 from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, Reading
 from augment.geometry.frames import Pose, wrap

@@ -1,12 +1,16 @@
 """Scenarios as OpenSCENARIO XML 1.2, each with its map as OpenDRIVE.
 
 Everybody that moves follows a trajectory with times; who has a motion or a walk of its own sets
-out once its trigger fires (triggers.py). Frame: the ego frame of t0. The files are made by
+out once its trigger fires. Positions are rear axles' while our distances run between centres, and
+our triggers fire at steps: what is written is what holds between the axles at the step at which a
+trigger fires. With our ego the moment is exact, and with another one it is as far off as the axles
+are from the centres. Frame: the ego frame of t0. T steps. The files are made by
 scenariogeneration. Source: ASAM OpenSCENARIO XML 1.2.
 """
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, time
 from typing import Any, Final
 from xml.etree import ElementTree as ET
@@ -14,12 +18,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from augment.formats import writing
-from augment.formats.openscenario import triggers
 from augment.formats.openscenario.roads import write_map
+from augment.formats.openscenario.trajectories import place_beside
 from augment.formats.writing import Cell, LossReport
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.motion import FloatArray, Movement
-from augment.scene.planned_motion import EGO_ID, AtTime
+from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.motion import STEP_S, FloatArray, MotionSource, Movement, find_motion
+from augment.scene.planned_motion import EGO_ID, AtPlace, AtTime, NearEgo, PlannedMotion
+from augment.scene.planned_mover import carry_out, walk_as_motion
 
 MINOR_VERSION: Final = 2
 REAR_AXLE_SHARE: Final = 1.461 / 5.176
@@ -38,6 +44,8 @@ _THINGS = {
     AgentType.GENERIC_OBJECT: "obstacle",
 }
 _HEIGHT_M = {AgentType.BUS: 3.0, AgentType.TRAFFIC_CONE: 0.5, AgentType.BARRIER: 1.0}
+_MARGIN_M = 1e-4
+"""So that a comparison at the very step does not hang on the last digit."""
 _USUAL_HEIGHT_M, _MASS_KG, _FASTEST_MPS = 1.8, 1000.0, 70.0
 
 
@@ -135,7 +143,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
     """Yield an agent's events: come, follow a trajectory, go. Nothing if it stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
-    if (mover := triggers.with_motion(movement)) is not None:
+    if (mover := _with_motion(movement)) is not None:
         yield from _own_events(xosc, cell, movement, mover)
         return
     if movement.stands:
@@ -157,15 +165,15 @@ def _own_events(xosc: Any, cell: Cell, movement: Movement, agent: TrafficAgent) 
     """Yield the events before and after its motion starts; past the map it is gone."""
     started_s, times_s = movement.started_s, cell.motion.times_s
     if agent.speed_mps > 0.0 and started_s != 0.0:
-        states = triggers.list_unstarted_states(cell, agent)
+        states = _list_unstarted_states(cell, agent)
         follow = _follow(xosc, agent, times_s, states, is_relative=False)
         yield from _until_gone(
             xosc, agent, states, _event(xosc, f"{agent.id} goes on", follow, 0.0)
         )
-    by_clock = isinstance(triggers.motion_in(agent).start, AtTime)
+    by_clock = isinstance(_motion_in(agent).start, AtTime)
     if started_s is None and (by_clock or agent.speed_mps > 0.0):
         return  # after the end; or where its path begins would depend on the ego
-    states = triggers.states_since_start(cell, agent, started_s or 0.0)
+    states = _states_since_start(cell, agent, started_s or 0.0)
     if np.isnan(states).all():
         return  # it has left the map by then
     since_s = times_s + (started_s or 0.0) if by_clock else times_s
@@ -189,10 +197,10 @@ def _until_gone(xosc: Any, agent: TrafficAgent, states: FloatArray, event: Any) 
 
 def _trigger(xosc: Any, cell: Cell, agent: TrafficAgent, started_s: float | None) -> Any:
     """The moment at which a motion starts."""
-    start, name = triggers.motion_in(agent).start, f"{agent.id} sets out"
+    start, name = _motion_in(agent).start, f"{agent.id} sets out"
     if isinstance(start, AtTime):
         return _at(xosc, name, start.after_s)
-    apart = triggers.distance_condition(cell, agent, start, started_s, _ahead_m)
+    apart = _measure_distance(cell, agent, start, started_s)
     arguments = apart.within_m, xosc.Rule.lessOrEqual
     kind = xosc.RelativeDistanceType.euclidianDistance
     condition = xosc.RelativeDistanceCondition(*arguments, kind, EGO_ID, freespace=False)
@@ -236,7 +244,7 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
 
 def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: TrafficAgent) -> None:
     """Say what of a motion's start holds with our ego alone."""
-    start, started_s = triggers.motion_in(agent).start, movement.started_s
+    start, started_s = _motion_in(agent).start, movement.started_s
     if agent.type in _THINGS:
         report.lose(f"{agent.id}: moves, and players may leave obstacles standing")
     if isinstance(start, AtTime):
@@ -245,7 +253,7 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
         text = "the motion is left out: where it begins hangs on when it starts, and it never does"
         report.lose(f"{agent.id}: {text}", changes_scene=True)
         return
-    apart = triggers.distance_condition(cell, agent, start, started_s, _ahead_m)
+    apart = _measure_distance(cell, agent, start, started_s)
     text = "its distance is told between rear axles: the same moment with our ego, else up to"
     report.lose(f"{agent.id}: {text} {apart.off_m:.1f} m off")
     if apart.early_s > 0.0:
@@ -257,10 +265,100 @@ def _report_start(cell: Cell, report: LossReport, movement: Movement, agent: Tra
 def _report(cell: Cell, report: LossReport) -> None:
     writing.report_motion(cell, report, can_trigger=True)
     for participant in cell.motion.others:
-        if (agent := triggers.with_motion(participant)) is not None:
+        if (agent := _with_motion(participant)) is not None:
             _report_start(cell, report, participant, agent)
     names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
     obstacles = [kind for kind, name in _THINGS.items() if name == "obstacle"]
     report.lose_types({kind: f"a {kind} becomes an obstacle" for kind in obstacles})
     report.lose("heights, masses and axles are not known; usual ones are written")
+
+
+# When a motion starts, and where it leads from then on
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _WrittenDistance:
+    """A condition on a distance between points of reference.
+
+    Attributes:
+        who: Whose distance is looked at.
+        place_m: To where, None for to the ego.
+        off_m: How far it may be off where the ego, or who is watched, comes another way.
+        early_s: So much earlier than ours it holds already with our ego; 0 as a rule.
+    """
+
+    who: str
+    within_m: float
+    place_m: Point | None
+    off_m: float
+    early_s: float
+
+
+def _with_motion(movement: Movement) -> TrafficAgent | None:
+    """Return the agent with its motion, None without; a walk starts once the ego is near."""
+    agent = movement.agent
+    if movement.source is MotionSource.RECORDED:
+        return None
+    goes_nowhere = agent.walk_to_m and math.dist((agent.x_m, agent.y_m), agent.walk_to_m) < 1e-6
+    moving = walk_as_motion(agent)
+    return None if goes_nowhere or moving.motion is None else moving
+
+
+def _motion_in(agent: TrafficAgent) -> PlannedMotion:
+    """Return the motion of an agent that has one."""
+    assert agent.motion is not None
+    return agent.motion
+
+
+def _list_unstarted_states(cell: Cell, agent: TrafficAgent) -> FloatArray:
+    """Return states (T, 4) of an agent whose motion never starts; NaN past the map."""
+    alone = replace(cell.after, agents=(replace(agent, motion=None),))
+    recording = cell.recording and cell.recording.without({agent.id})
+    return find_motion(alone, recording=recording).others[0].states
+
+
+def _states_since_start(cell: Cell, agent: TrafficAgent, started_s: float) -> FloatArray:
+    """Return states (T, 4) from the start of its motion on; NaN past the map."""
+    motion = replace(_motion_in(agent), start=AtTime(after_s=started_s))
+    times_s = (started_s + cell.motion.times_s).tolist()
+    return carry_out(replace(agent, motion=motion), LaneGraph(cell.after), times_s)
+
+
+def _measure_distance(
+    cell: Cell, agent: TrafficAgent, start: NearEgo | AtPlace, started_s: float | None
+) -> _WrittenDistance:
+    """Return the distance by which a motion starts, which in the cell it does then or never."""
+    moves = {move.agent.id: move for move in (cell.motion.ego, *cell.motion.others)}
+    waits_for_ego = isinstance(start, NearEgo)
+    watched = moves[EGO_ID if isinstance(start, NearEgo) else start.agent_id]
+    back_m = _ahead_m(watched.agent)
+    centres, axles = watched.states[:, :2], place_beside(watched.states, -back_m, 0.0)
+    if isinstance(start, NearEgo):
+        # Once it starts it looks along its path, so what counts is how it stood before.
+        own = _list_unstarted_states(cell, agent)
+        goals, marks = own[:, :2], place_beside(own, -_ahead_m(agent), 0.0)
+        off_m = back_m + _ahead_m(agent)
+    else:
+        goals = marks = np.tile((start.x_m, start.y_m), (len(centres), 1))
+        off_m = back_m
+    within_m = start.within_m
+    step = None if started_s is None else round(started_s / STEP_S)
+    if step is not None:
+        way = goals[step] - centres[step]
+        gap_m = float(np.hypot(*way))
+        passed_m = within_m - gap_m if step else 0.0
+        if waits_for_ego:
+            within_m += float(np.hypot(*(marks[step] - axles[step]))) - gap_m - passed_m
+        else:
+            ahead = way / gap_m if gap_m > 1e-6 else np.zeros(2)
+            marks = marks - goals + axles[step] + (gap_m + passed_m) * ahead
+    holds = np.hypot(*(marks - axles).T) <= within_m + _MARGIN_M
+    early = 0 if step is None else step - int(holds.argmax())
+    return _WrittenDistance(
+        who=agent.id if waits_for_ego else watched.agent.id,
+        within_m=within_m + _MARGIN_M,
+        place_m=None if waits_for_ego else (float(marks[0, 0]), float(marks[0, 1])),
+        off_m=off_m,
+        early_s=early * STEP_S,
+    )
