@@ -14,8 +14,9 @@ from django.utils.http import url_has_allowed_host_and_scheme
 
 from arena.config import faults
 from arena.errors import DatabaseBusy, NotYours
-from arena.voting.services.turns import is_transient, limit_waiting
+from arena.voting.services.turns import limit_waiting
 from augment.errors import MediaFault
+from augment.services import is_passing
 
 logger = logging.getLogger(__name__)
 
@@ -38,7 +39,7 @@ class FaultMiddleware:
         """Return the answer, or None for any other exception."""
         if isinstance(exception, NotYours):
             return faults.answer_missing(request, exception)
-        if isinstance(exception, DatabaseBusy) or is_transient(exception):
+        if isinstance(exception, DatabaseBusy) or is_passing(exception):
             logger.warning("%s", exception.__cause__ or exception)
             return faults.answer_busy(request)
         if isinstance(exception, MediaFault):

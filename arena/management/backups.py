@@ -50,6 +50,7 @@ from arena.results.services.stored_rows import (
     is_unfinished,
 )
 from arena.serving.readiness import find_unapplied_migrations
+from arena.shell.access import EXPERT
 from augment.models import Endpoint, Simulation
 from augment.services import is_stored_name
 from augment.services.driving import list_allowed_planners
@@ -77,8 +78,6 @@ EARLIER: dict[str, tuple[str, frozenset[str]]] = {
 their default."""
 SMALL = 1 << 24
 """A manifest is far below this; a longer one is none of ours."""
-EXPERTS = "expert"
-"""The role of every account of a study's folder."""
 
 Say = Callable[[str], None]
 Members = Mapping[str, Callable[[], IO[bytes]]]
@@ -325,7 +324,7 @@ def import_study(folder: Path, *, say: Say) -> Manifest:
         User.objects.update(
             is_staff=False, is_superuser=False, password=make_password(None), last_login=None
         )
-        group, _ = Group.objects.get_or_create(name=EXPERTS)
+        group, _ = Group.objects.get_or_create(name=EXPERT)
         group.user_set.set(User.objects.all())
         Endpoint.objects.update(key_variable="")
 

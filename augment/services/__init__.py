@@ -24,4 +24,4 @@ from augment.services.texts import (
     motion_in_words,
     one_line,
 )
-from augment.services.work import KINDS, Lease, Settlement, WorkKind, register
+from augment.services.work import KINDS, Lease, Settlement, WorkKind, is_passing, register

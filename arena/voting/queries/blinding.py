@@ -8,9 +8,8 @@ from django.db.models import QuerySet
 
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import EarlyLook, Study
+from arena.shell.access import STAFF
 from arena.shell.accounts import top_role
-
-STAFF = ("admin", "researcher")
 
 
 class ResultsAccess(StrEnum):

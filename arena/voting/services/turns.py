@@ -12,17 +12,13 @@ from django.db import OperationalError, connection
 from django.db.backends.base.base import BaseDatabaseWrapper
 
 from arena.errors import DatabaseBusy
+from augment.services import is_passing
 
 SUFFIX = "-turn"
 """What the file that writers queue at adds to the database's name."""
 
 LOOK_EVERY_S = 0.001
 """How often a thread looks whether another process has left; one thread a process does."""
-
-_SQLITE_TRANSIENT = {5, 6, 13}
-"""Busy, locked, full: the primary result codes."""
-_POSTGRESQL_TRANSIENT = {"55P03", "40P01", "40001", "53100"}
-"""Lock not available, deadlock detected, not serializable, disk full."""
 
 
 @contextmanager
@@ -51,18 +47,9 @@ def in_turn(*, within_s: float | None = None) -> Iterator[None]:
         else:
             yield  # web servers limit the waiting of their connections: arena.config.wsgi
     except OperationalError as error:
-        if limit is not None and is_transient(error):
+        if limit is not None and is_passing(error):
             raise DatabaseBusy from error
         raise
-
-
-def is_transient(error: BaseException) -> bool:
-    """Return whether a database error may pass: a lock was not to be had, or the disk is full."""
-    cause = error.__cause__
-    code = getattr(cause, "sqlite_errorcode", None)
-    if code is not None:
-        return (code & 0xFF) in _SQLITE_TRANSIENT
-    return getattr(cause, "sqlstate", None) in _POSTGRESQL_TRANSIENT
 
 
 def limit_waiting(connection: BaseDatabaseWrapper, within_s: float) -> None:
