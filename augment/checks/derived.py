@@ -75,24 +75,21 @@ def describe_change(
         scene: Before the change, with the scenario's goal.
 
     Returns:
-        The intent is None where the ego is on no lane, or where nothing or too much can be said
-        as requests; else without offsets and lanes where the change meets it better so.
+        The intent is None where the ego is on no lane, where somebody who is changed has no name,
+        or where nothing or too much can be said as requests.
     """
     ground = Ground.of(scene)
     lanes = LanesAcross.of(ground, scene.options.goal or TurnType.STRAIGHT)
     touched = {*change.removed, *(agent.id for agent in change.moved)}
-    picks = {
-        agent.id: None if lanes is None else _find_pick(agent, lanes)
-        for agent in scene.agents
-        if agent.id in touched
-    }
+    agents = [agent for agent in scene.agents if lanes is not None and agent.id in touched]
+    picks = {agent.id: pick for agent in agents if (pick := _find_pick(agent, lanes))}
     wishes = _wishes(change, scene)
     sentence = _sentence(kind, change, lanes, scene, picks, wishes)
-    if lanes is None:
+    if lanes is None or len(picks) < len(touched):
         return sentence, None
     requests = tuple(_requests(change, lanes, wishes))
     moves = tuple(_moves(change, lanes, picks, wishes))
-    removals = tuple(pick for name in change.removed if (pick := picks[name]))
+    removals = tuple(picks[name] for name in change.removed)
     counts = [len(part) for part in (requests, moves, removals)]
     if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
@@ -191,18 +188,15 @@ def _requests(change: Modification, lanes: LanesAcross, wishes: _Wishes) -> Iter
 
 
 def _moves(
-    change: Modification,
-    lanes: LanesAcross,
-    picks: Mapping[str, wish.Pick | None],
-    wishes: _Wishes,
+    change: Modification, lanes: LanesAcross, picks: Mapping[str, wish.Pick], wishes: _Wishes
 ) -> Iterator[wish.Move]:
     before = {agent.id: agent for agent in lanes.route.scene.agents}
     for agent in change.moved:
         who = picks[agent.id]
         motion = _find_motion(agent, wishes)
-        if who is not None and motion is not None and _stays(agent, before[agent.id]):
+        if motion is not None and _stays(agent, before[agent.id]):
             yield wish.Move(who=who, motion=motion)
-        elif who is not None:
+        else:
             there = _vehicle(agent, lanes)
             yield wish.Move(
                 who=who,
@@ -323,16 +317,15 @@ def _sentence(
     change: Modification,
     lanes: LanesAcross | None,
     scene: Scene,
-    picks: Mapping[str, wish.Pick | None],
+    picks: Mapping[str, wish.Pick],
     wishes: _Wishes,
 ) -> str:
     """The sentences from which a reader could put the same objects to the same places."""
     added = sorted(change.added, key=lambda agent: (agent.x_m, agent.y_m))
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
     spots = ", ".join(_where(cone, lanes) for cone in cones)
-    parts = [f"{len(cones)} traffic cones: {spots}"] if len(cones) > 1 else []
-    if len(cones) == 1:
-        parts = [f"a traffic cone {spots}"]
+    what = "a traffic cone " if len(cones) == 1 else f"{len(cones)} traffic cones: "
+    parts = [what + spots] if cones else []
     others = [agent for agent in added if agent.type is not AgentType.TRAFFIC_CONE]
     parts += [_thing(other, kind, lanes) + _then(other, wishes) for other in others]
     before = {agent.id: agent for agent in scene.agents}
@@ -361,8 +354,8 @@ def _then(agent: TrafficAgent, wishes: _Wishes) -> str:
     return f", {', '.join(list_motion_facts(motion))}" if motion else ""
 
 
-def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:
-    pick = picks[name]
+def _who(name: str, picks: Mapping[str, wish.Pick]) -> str:
+    pick = picks.get(name)
     if pick is None:
         return name
     place = f"{pick.relation.words} the ego"

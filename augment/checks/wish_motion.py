@@ -222,7 +222,8 @@ class _Search:
 def _shift(value: float, share: float, span: Span) -> float:
     """Return a number moved by a share of its range, within that."""
     low, high = span
-    return min(max(value + (share * (high - low) if share else 0.0), low), high)
+    # What never begins has no range: from infinity to infinity.
+    return min(max(value + (share * (high - low) if share and high > low else 0.0), low), high)
 
 
 def _is_admissible(

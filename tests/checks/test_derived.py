@@ -188,6 +188,15 @@ def test_a_walk_from_the_middle_of_the_lane_begins_there_again() -> None:
     assert (placed.pose.beside(0.0), placed.walk_to_m) == ((12.0, 0.0), (12.5, -5.0))
 
 
+def test_who_has_no_name_leaves_words_alone() -> None:
+    """An intent without him would call the drawing itself wrong."""
+    here = scene(agents=(PARKED, vehicle("Agent3", 40.0, 30.0)))
+    change = Modification(added=(vehicle("Added1", 12.0, 0.0),), removed=("Agent3",))
+    sentence, intent = describe_change(None, change, here)
+    assert "remove Agent3" in sentence
+    assert intent is None
+
+
 def test_a_side_of_the_oncoming_lane_is_that_of_the_ego() -> None:
     change = Modification(added=(vehicle("Added1", 12.0, 4.5, math.pi),))
     sentence, _ = describe_change(None, change, scene())
