@@ -11,7 +11,7 @@ import numpy as np
 
 from augment.baselines.placed_motions import give_motion
 from augment.baselines.placing_ground import PlacingGround, build_agent
-from augment.checks.wish_places import find_across, says_how_far
+from augment.checks.wish_places import find_across, is_exact
 from augment.checks.wish_shapes import Placement, lay_out, ring_radius_m
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
@@ -144,7 +144,7 @@ def _places(
     lateral, to = request.spot.lateral, 0.0
     sign = ground.side_sign(lateral, request.spot.lane) or float(request.both_sides)
     from_m = fmean(find_across(lateral, sign, 2.0 * (edge_m + _EDGE_M), 2.0 * _EDGE_M))
-    if request.shape is Shape.LINE and not says_how_far(lateral):
+    if request.shape is Shape.LINE and not is_exact(lateral):
         from_m = edge_m * sign
     elif request.shape is Shape.TAPER:
         from_m = (request.start or ground.kerb).sign * edge_m

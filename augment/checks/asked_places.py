@@ -10,13 +10,7 @@ from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
 from augment.checks.parties import CRASH_M, USUAL, Bounds, Case, Party, apart_m, hold, meets_route
 from augment.checks.wish_patterns import MOST_ORDERED
-from augment.checks.wish_places import (
-    EVERYWHERE,
-    find_across,
-    find_off,
-    list_stations,
-    says_how_far,
-)
+from augment.checks.wish_places import EVERYWHERE, find_across, find_off, list_stations, is_exact
 from augment.checks.wish_shapes import CONE_M, WORKER_M
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
@@ -176,7 +170,7 @@ def _cones(case: Case, party: Party, request: wish.ConesRequest, band: Band) -> 
     is_line = request.shape is wish.Shape.LINE and sign != 0.0 and not request.both_sides
     leads_across = request.shape is wish.Shape.TAPER or request.both_sides
     wanted = _bounds(case, wish.Spot() if leads_across else spot, band, CONE_M / 2.0)
-    if is_line and not says_how_far(spot.lateral):
+    if is_line and not is_exact(spot.lateral):
         edge_m = sign * band.width_m / 2.0
         # A cone at a boundary stands inside of it or outside: half a cone to either side.
         wanted = Bounds(edge_m, edge_m, max(case.tolerances.across_m, CONE_M))

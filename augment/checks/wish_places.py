@@ -136,7 +136,7 @@ def find_across(lateral: wish.Lateral | None, sign: float, lane_m: float, box_m:
     return low_m, high_m
 
 
-def says_how_far(lateral: wish.Lateral | None) -> bool:
+def is_exact(lateral: wish.Lateral | None) -> bool:
     """Return whether it is said how far towards its target something stands."""
     return lateral is not None and (lateral.offset or lateral.nearness) is not None
 

@@ -17,7 +17,7 @@ import shapely
 
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.wish_patterns import THERE_M, Pattern, find_step_m
-from augment.checks.wish_places import Place, Span, find_across, list_stations, says_how_far
+from augment.checks.wish_places import Place, Span, find_across, list_stations, is_exact
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene import intent as wish
@@ -228,7 +228,7 @@ def _list_readings(
             middle = (0.0, 0.0) if request.ends_in_middle else None
             ends = [(at_edge(side), middle or at_edge(-side)) for side in sides]
         case _:
-            is_edge = sign != 0.0 and not says_how_far(lateral)
+            is_edge = sign != 0.0 and not is_exact(lateral)
             ends = [(at_edge(sign) if is_edge else across, (0.0, 0.0))]
     return [
         _Reading(from_m=from_m, to=to, is_along=is_along, is_straight=is_straight)

@@ -251,3 +251,18 @@ def test_by_interplans_rules_a_bus_without_a_motion_runs_no_red_light() -> None:
     measured = measure_wish(ground, change, authored.intent)
     assert measured is not None
     assert measured.matches[0].distance_m > 1.0
+
+
+def test_who_never_begins_is_off_by_a_number_where_any_moment_is_right() -> None:
+    asked = entry(CUT_IN).intent
+    assert asked is not None
+    (request,) = asked.requests
+    assert isinstance(request, VehicleRequest)
+    assert request.motion is not None
+    at_any_time = replace(request, motion=replace(request.motion, start=None))
+    never = PlannedMotion(path=LanePath(lane_ids=("Lane2",)), start=NearEgo(within_m=0.1))
+    change = Modification(added=(replace(cutting_in(22.0), motion=never),))
+    intent = replace(asked, requests=(at_any_time,))
+    found = measure_wish(Ground.of(shown_scene(CUT_IN)), change, intent)
+    assert found is not None
+    assert math.isfinite(found.distances_m[0])
