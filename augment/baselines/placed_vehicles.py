@@ -167,21 +167,19 @@ def place_crash(
 
 
 def _in_a_row(
-    request: CrashRequest,
-    ground: PlacingGround,
-    distance_m: float,
-    offset_m: float,
-    looseness: float,
+    request: CrashRequest, ground: PlacingGround, distance_m: float, offset_m: float, loose: float
 ) -> list[Pose]:
     """Put each as near behind the one before as it can stand."""
     poses: list[Pose] = []
     # The first stands as far from the lane's centre as is said.
-    offset_m -= looseness * _SIDES_M[0] if request.spot.lateral else 0.0
+    offset_m -= loose * _SIDES_M[0] if request.spot.lateral else 0.0
     along_m = distance_m
     for index in range(request.count or 2):
         first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
-        left_m = offset_m + looseness * _SIDES_M[index]
-        turn_rad = looseness * _TURNS_RAD[index] + first_rad
+        left_m, turn_rad = (
+            offset_m + loose * _SIDES_M[index],
+            loose * _TURNS_RAD[index] + first_rad,
+        )
 
         def pose_at(
             gap_m: float, from_m: float = along_m, left_m: float = left_m, rad: float = turn_rad

@@ -190,9 +190,9 @@ class _Fitting:
         """
         for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
-        is_said = _says_distance(request.spot)
-        wanted = request.spot.distance if is_said else None
-        wanted = wanted or intents.Length(low_m=0.0, high_m=0.0)
+        is_said, wanted = _says_distance(request.spot), request.spot.distance
+        if wanted is None or not is_said:
+            wanted = intents.Length(low_m=0.0, high_m=0.0)
         asked_m = wanted.draw(self._rng)
         asked_m *= 1.0 if request.spot.relation is intents.Relation.AHEAD else -1.0
         spans_m = list_stations(request.spot, self._place.over(request.spot.via).lanes)

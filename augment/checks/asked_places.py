@@ -10,7 +10,7 @@ from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import Band
 from augment.checks.parties import CRASH_M, USUAL, Bounds, Case, Party, apart_m, hold, meets_route
 from augment.checks.wish_patterns import MOST_ORDERED
-from augment.checks.wish_places import EVERYWHERE, find_across, find_off, list_stations, is_exact
+from augment.checks.wish_places import EVERYWHERE, find_across, find_off, is_exact, list_stations
 from augment.checks.wish_shapes import CONE_M, WORKER_M
 from augment.geometry.frames import difference
 from augment.scene import intent as wish

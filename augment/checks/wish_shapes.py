@@ -17,7 +17,7 @@ import shapely
 
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.wish_patterns import THERE_M, Pattern, find_step_m
-from augment.checks.wish_places import Place, Span, find_across, list_stations, is_exact
+from augment.checks.wish_places import Place, Span, find_across, is_exact, list_stations
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene import intent as wish
