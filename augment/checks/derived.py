@@ -81,8 +81,8 @@ def describe_change(
     ground = Ground.of(scene)
     lanes = LanesAcross.of(ground, scene.options.goal or TurnType.STRAIGHT)
     touched = {*change.removed, *(agent.id for agent in change.moved)}
-    agents = [agent for agent in scene.agents if lanes is not None and agent.id in touched]
-    picks = {agent.id: pick for agent in agents if (pick := _find_pick(agent, lanes))}
+    changed = [agent for agent in scene.agents if agent.id in touched]
+    picks = {agent.id: pick for agent in changed if lanes and (pick := _find_pick(agent, lanes))}
     wishes = _wishes(change, scene)
     sentence = _sentence(kind, change, lanes, scene, picks, wishes)
     if lanes is None or len(picks) < len(touched):
