@@ -121,13 +121,14 @@ _SMALLEST = Decimal("0.0001")
 
 
 @register.filter
-def usd(amount: Decimal | None) -> str:
+def usd(amount: Decimal | str | None) -> str:
     """An amount in dollars: in cents where it is whole ones, else to a hundredth of a cent.
 
     Unknown is said in words and never shown as zero.
     """
     if amount is None:
         return "unknown"
+    amount = Decimal(amount)
     if amount == amount.quantize(Decimal("0.01")):
         return f"${amount:,.2f}"
     if amount < _SMALLEST:
