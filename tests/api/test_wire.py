@@ -10,7 +10,7 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.models import Report, Study, Vote
+from arena.models import Matchup, Report, Study, Vote
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes
 from arena.voting.queries.keys import voting_switches
@@ -233,6 +233,19 @@ def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
     assert (kept.matchup, kept.reason, kept.comment) == (matchup, body["reason"], body["comment"])
     assert kept.side == "right"
     assert not Vote.objects.exists()
+
+
+def test_a_pair_takes_so_many_reports_and_no_more(study: Study) -> None:
+    """None is ever deleted, and staff get all of them on one page."""
+    client, pairs = signed_in("eva"), matchups_of(study, "eva")
+
+    def report(pair: Matchup, key: uuid.UUID) -> int:
+        body = {"key": str(key), "matchup": str(pair.code), "reason": "other"}
+        return client.post("/api/v1/reports", body, content_type="application/json").status_code
+
+    keys = [uuid.uuid4() for _ in range(11)]
+    assert [report(pairs[0], key) for key in keys] == [200] * 10 + [409]
+    assert [report(pairs[0], keys[0]), report(pairs[1], keys[10])] == [200, 200]
 
 
 @pytest.mark.parametrize(

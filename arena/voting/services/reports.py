@@ -6,13 +6,14 @@ from uuid import UUID
 from django.contrib.auth.models import User
 from django.db import IntegrityError
 
-from arena.errors import InvalidVote, NotYours, StudyNotOpen
-from arena.models import Matchup, Report, Study
-from arena.voting.queries.ballots import own_matchup
+from arena.errors import InvalidVote, NotYours
+from arena.models import Matchup, Report
+from arena.voting.queries.ballots import own_matchup, require_open
 from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
 from augment.services import make_storable
 
+MOST_REPORTS = 10
 SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
 """What a browser says of a side: the left picture is A."""
 
@@ -53,13 +54,14 @@ def report(*, expert: User, complaint: Complaint) -> Report:
     Raises:
         NotYours: The matchup is somebody else's or does not exist.
         StudyNotOpen: The study is over.
-        Conflict: The key belongs to another report.
+        Conflict: The key belongs to another report, or the pair has MOST_REPORTS.
     """
     matchup = own_matchup(expert=expert, code=complaint.matchup)
     stored = Report.objects.filter(key=complaint.key).first()
     if stored is None:
-        if matchup.study.state != Study.State.OPEN:
-            raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
+        require_open(matchup.study)
+        if matchup.reports.count() >= MOST_REPORTS:
+            raise Conflict(f"This pair has {MOST_REPORTS} reports already.")
         stored = _insert(matchup, expert, complaint)
     content = (matchup.pk, complaint.reason, complaint.side)
     if (stored.matchup_id, stored.reason, stored.side) != content:
