@@ -40,8 +40,8 @@ _MIDDLE_M = 0.1
 _HINGED_M = 0.15
 """A closed door's edge is so near to its car's side."""
 _OPENS_S = 0.3, 3.0
-_WIDER = 1.05
-"""Bends are measured by chords, so a little more than what is needed."""
+_WIDER = 1.0, 1.005, 1.01, 1.02, 1.05
+"""Bends are measured by chords, so as little more as helps than what is needed."""
 _SLOWS = planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP
 
 Speeds = tuple[tuple[float, float], ...]
@@ -340,7 +340,8 @@ def _list_paths(
         began_s = min(case.own_start_s, HORIZON_S)
         # (P, 2) from its beginning, moved there and widened where they turn too narrowly.
         ways_m = own.points_m - case.answer.states[round(began_s / STEP_S), :2]
-        for scale in (1.0, _find_scale(case)):
+        needed = _find_scale(case)
+        for scale in (1.0, *(wider * needed for wider in _WIDER if needed > 1.0)):
             points = here + scale * ways_m
             if not np.isnan(points).any():
                 yield replace(own, points_m=tuple((x_m, y_m) for x_m, y_m in points.tolist()))
@@ -361,7 +362,7 @@ def _find_scale(case: MotionCase) -> float:
     if limits is None:
         return 1.0
     sideways, curvature = measure_bends(case.answer.states)
-    return max(1.0, _WIDER * sideways / limits.sideways, _WIDER * curvature * limits.radius_m)
+    return max(1.0, sideways / limits.sideways, curvature * limits.radius_m)
 
 
 def _list_doors(case: MotionCase, car: TrafficAgent, wish: MotionWish) -> Iterator[TrafficAgent]:
