@@ -22,9 +22,11 @@ from augment.errors import InvalidDocument
 from augment.formats.readers import find_reader
 from augment.formats.waymo.scenario import Scenario
 from augment.scene.codec import scene_to_document
-from tests.formats import nuplan_files, waymo_files
-from tests.formats.test_commonroad import newer
+from tests.formats import nuplan_files, openscenario_files, waymo_files
+from tests.formats.opendrive_maps import by_hand
+from tests.formats.openscenario_files import BRAKES, CHANGE, GAP, OF_EGO, by_entity, by_time, event
 from tests.formats.test_damaged import GOOD
+from tests.formats.test_opendrive import JUNCTION, SIGNAL
 from tests.formats.test_scenarionet import description, store
 from tests.scenes import junction
 
@@ -43,6 +45,15 @@ UNUSED = {
     "av2": f"{_AV2} height_m num_interior_pts",
     "av2-motion": f"{_AV2} city end_timestamp focal_track_id num_timestamps object_category "
     "scenario_id start_timestamp",
+    "opendrive": "connection@id header@revMinor junction@id lane@id laneSection/center "
+    "predecessor@elementId road/link road/objects road@junction road@length signal@dynamic "
+    "signal@id signal@orientation signal@s signal@t successor@elementId",
+    "openscenario": "Act/ManeuverGroup Act/StartTrigger Act@name Action@name Center@z "
+    "Dimensions@height Event/StartTrigger Event@name Maneuver/Event Maneuver@name "
+    "ManeuverGroup/Actors ManeuverGroup/Maneuver ManeuverGroup@name "
+    "SpeedActionDynamics@dynamicsDimension SpeedActionDynamics@dynamicsShape "
+    "SpeedActionDynamics@value StartTrigger/ConditionGroup Story/Act Story@name "
+    "Storyboard/Story Vehicle@name header@revMinor lane@id laneSection/center road@length",
     "nuplan": "boundaries.boundary_type_fid category.description ego_pose.log_token "
     "ego_pose.timestamp ego_pose.vz ego_pose.z intersections.boundary_type_fid "
     "lane_connectors.intersection_fid "
@@ -57,8 +68,23 @@ UNUSED = {
     "scene.name scene.roadblock_ids track.height track.length track.width "
     "walkways.boundary_type_fid ",
 }
-"""What a scene does not use."""
+"""What a scene does not use, and parts of roads and stories that may as well be empty."""
 
+ROADS = by_hand(
+    type='<type s="0"><speed max="50" unit="km/h"/></type>',
+    offset='<laneOffset s="0" a="0.5" b="0" c="0" d="0"/>',
+    link='<link><successor elementType="junction" elementId="9"/></link>',
+    end='<objects><object type="crosswalk" s="61.5" t="0" hdg="1.5" length="8" width="3"/>'
+    f"</objects>{SIGNAL}",
+    rest=JUNCTION,
+)
+LAST = '<LanePosition roadId="1" laneId="-1" s="120" offset="0.1"/>'
+STORY = openscenario_files.scenario(
+    event(BRAKES, by_time(1)),
+    event(CHANGE.format("time", 3, OF_EGO), by_entity(GAP.format(30, "true"), "Other"), "goes"),
+    other_does=(openscenario_files.speed(8),),
+    other_at=LAST,
+)
 Variants = Iterator[str]
 """Writes a variant, then yields the name of its field."""
 
@@ -84,19 +110,21 @@ def tree_variants(document: Any, write: Callable[[Any], object], *more: Any) -> 
 
 
 def xml_variants(file: Path) -> Variants:
-    root = ET.fromstring(newer())
+    whole = file.read_bytes()
+    root = ET.fromstring(whole)
     for element in root.iter():
         for key, good in element.attrib.items():
-            element.set(key, "odd")
+            element.set(key, "nan")
             file.write_bytes(ET.tostring(root))
             yield f"{element.tag}@{key}"
             element.set(key, good)
         for child in (child for child in element if len(child) or child.text):
             children, text = [*child], child.text
-            child[:], child.text = [], "odd"
+            child[:], child.text = [], "nan"
             file.write_bytes(ET.tostring(root))
             yield f"{element.tag}/{child.tag}"
             child[:], child.text = children, text
+    file.write_bytes(whole)
 
 
 def message_variants(file: Path) -> Variants:
@@ -165,14 +193,13 @@ def write_json(file: Path, document: Any) -> None:
 
 
 def variants(name: str, path: Path) -> Variants:
-    if name == "commonroad":
-        yield from xml_variants(path)
-    elif name == "scenarionet":
+    if name == "scenarionet":
         yield from tree_variants(description(), partial(store, path.parent), np.ones(3))
     elif name == "waymo":
         yield from message_variants(path)
     files = [path] if path.is_file() else sorted(path.rglob("*"))
-    for file in [*files, *path.parent.rglob("*.gpkg")]:
+    beside = path.parent.glob("*.xodr") if path.suffix == ".xosc" else ()
+    for file in [*files, *path.parent.rglob("*.gpkg"), *beside]:
         if file.suffix == ".json":
             yield from tree_variants(json.loads(file.read_text()), partial(write_json, file))
         elif file.suffix == ".feather":
@@ -181,6 +208,8 @@ def variants(name: str, path: Path) -> Variants:
             yield from table_variants(file, parquet.read_table, parquet.write_table)
         elif file.suffix in (".db", ".gpkg"):
             yield from database_variants(file)
+        elif file.suffix in (".xml", ".xosc", ".xodr"):
+            yield from xml_variants(file)
 
 
 @pytest.mark.slow
@@ -189,6 +218,10 @@ def test_no_field_of_a_wrong_type_is_passed_over_in_silence(name: str, tmp_path:
     path, item = GOOD[name](tmp_path), nuplan_files.token(100).hex() if name == "nuplan" else None
     if name == "json":
         write_json(path, scene_to_document(junction()))
+    elif name == "opendrive":
+        path.write_text(ROADS)
+    elif name == "openscenario":
+        openscenario_files.write(tmp_path, STORY)
 
     def read_notes() -> set[str]:
         reading = find_reader(name).read(path, item=item, frame=None, name="made")

@@ -99,11 +99,12 @@ def read_network(root: Element, step: int) -> RoadMap:
     doubts, left_out = Doubts(), Counter[str]()
 
     def read_by_id(tag: str, read: Callable[..., Value], *more: Any) -> dict[int, Value]:
-        rows = (
-            (element, f"{tag} {element.get('id')}", doubts, *more) for element in root.findall(tag)
-        )
-        parts = doubts.read_all(f"{tag}s", _with_id, ((row[0], read, row) for row in rows))
-        return doubts.index_last(f"{tag}s", parts)
+        def read_pair(element: Element) -> tuple[int, Value]:
+            number = foreign.read_whole(element.get("id"), f"{tag}.id")
+            return number, read(element, f"{tag} {number}", doubts, *more)
+
+        pairs = doubts.read_all(f"{tag}s", read_pair, ((part,) for part in root.findall(tag)))
+        return doubts.index_last(f"{tag}s", pairs)
 
     limits = read_by_id("trafficSign", _limit, left_out)
     lights = read_by_id("trafficLight", _light, step)
@@ -135,12 +136,6 @@ def read_network(root: Element, step: int) -> RoadMap:
         left_out=left_out,
         doubts=doubts,
     )
-
-
-def _with_id(
-    element: Element, read: Callable[..., Value], arguments: tuple[Any, ...]
-) -> tuple[int, Value]:
-    return foreign.read_whole(element.get("id"), f"{element.tag}.id"), read(*arguments)
 
 
 # Signs and lights

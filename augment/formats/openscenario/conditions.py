@@ -30,6 +30,7 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "falling": lambda now, before: ~now & before,
     "risingOrFalling": lambda now, before: now != before,
 }
+_STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
 _USUAL = {
     "ReachPositionCondition": ("tolerance", "lessOrEqual"),
@@ -255,8 +256,9 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
     heading_rad = expected.states[name][:, 2]
     ahead = way[:, 0] * np.cos(heading_rad) + way[:, 1] * np.sin(heading_rad)
     left = way[:, 1] * np.cos(heading_rad) - way[:, 0] * np.sin(heading_rad)
-    gap_m = np.hypot(ahead, left)
-    gap_m = {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}.get(kind, gap_m)
+    gaps_m = dict.fromkeys(_STRAIGHT, np.hypot(ahead, left))
+    gaps_m |= {"longitudinal": np.abs(ahead), "lateral": np.abs(left)}
+    gap_m = foreign.look_up(gaps_m, kind, place)
     if foreign.look_up(_SWITCH, element.get("freespace", "false").lower(), place):
         sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
         gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
