@@ -66,9 +66,9 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
         notes.append(f"Its ego, {away_m:.2f} m from the scene's, is left out.")
     others = rows[1:]
     others = others[np.abs(others).any(axis=1)]
-    is_sized = ((others[:, 5:] > 0.0005) & (others[:, 5:] <= LONGEST_M)).all(axis=1)
-    if not is_sized.all():
-        notes.append(f"{(~is_sized).sum()} vehicles without a size got the usual one.")
+    is_sized = ((others[:, 5:] > 0.0005) & (others[:, 5:] <= LONGEST_M)).all(axis=1).tolist()
+    if not all(is_sized):
+        notes.append(f"{is_sized.count(False)} vehicles without a size got the usual one.")
     vehicles = []
     usual_m = LENGTH_WIDTH_M[AgentType.VEHICLE]
     for number, (row, has_size) in enumerate(zip(others.tolist(), is_sized, strict=True), start=1):
