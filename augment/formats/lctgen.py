@@ -66,7 +66,8 @@ def read_vehicles(document: object) -> tuple[Modification, tuple[str, ...]]:
         notes.append(f"Its ego, {away_m:.2f} m from the scene's, is left out.")
     others = rows[1:]
     others = others[np.abs(others).any(axis=1)]
-    is_sized = ((others[:, 5:] > 0.0005) & (others[:, 5:] <= LONGEST_M)).all(axis=1).tolist()
+    fits = (others[:, 5:] > 0.0005) & (others[:, 5:] <= LONGEST_M)
+    is_sized = [all(both) for both in fits.tolist()]
     if not all(is_sized):
         notes.append(f"{is_sized.count(False)} vehicles without a size got the usual one.")
     vehicles = []
