@@ -195,6 +195,9 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
          "there is no lane in its direction to change to"),
         (scenario(event(CHANGE.format("time", 2, RIGHT.replace("-1", "-3")))),
          "road 1.lane: unknown '-4'; known: 1, -1, -2"),
+        (scenario(event(FOLLOW.format(TWO, "<None/>").replace(
+            "<FollowTrajectoryAction", '<FollowTrajectoryAction initialDistanceOffset="far"'))),
+         "event acts.initialDistanceOffset: expected a finite number"),
         (scenario(event(FOLLOW.format("", "<None/>"))), "Polyline: needs two vertices at least"),
         (scenario(event(FOLLOW.format(TWO, TIMING.format("relative").replace('"1"', '"-1"')))),
          "needs times that ascend"),

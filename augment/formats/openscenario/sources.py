@@ -23,8 +23,8 @@ _REFERRING = (
     *("ManeuverGroup", "RouteRef", "AssignRouteAction", "TrajectoryRef", "FollowTrajectoryAction"),
 )
 """What may name an entry of a catalog in place of its content, but for entities."""
-_DEEPEST = 3
-"""Entries in each other, as of a route in a maneuver."""
+_DEEPEST, _MOST_ENTRIES = 3, 1_000
+"""Entries in each other, as of a route in a maneuver, and in all."""
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
 _MOST_FILES = 500
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
@@ -81,7 +81,7 @@ class ScenarioSource:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path, self.doubts = path, Doubts()
+        self._path, self.doubts, self._entries = path, Doubts(), 0
         # In the sandbox the path is relative to the folder that holds what was sent.
         self._folder = (path.parent if path.is_absolute() else Path()).resolve()
         root = read_xml(path, what=foreign.WHAT)
@@ -109,9 +109,11 @@ class ScenarioSource:
         for holder in [part for part in root.iter() if part.tag in _REFERRING]:
             for reference in holder.findall("CatalogReference"):
                 with self.doubts.about("references to catalogs"):
+                    self._entries += 1
+                    name = reference.get("entryName", "")
+                    if depth == _DEEPEST or self._entries > _MOST_ENTRIES:
+                        raise fault_at(f"catalog entry {name[:40]}", "lies too deep")
                     entry = self.resolve_reference(reference)
-                    if depth == _DEEPEST:
-                        raise fault_at(f"catalog entry {entry.get('name')}", "lies too deep")
                     self._fill_references(entry, depth + 1)
                     holder.append(entry)
 

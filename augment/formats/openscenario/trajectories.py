@@ -16,8 +16,8 @@ from augment.geometry.frames import Pose
 _ENDS = ("curvatureStart", "curvatureEnd")
 _TIMING = {"scale": 1.0, "offset": 0.0}
 _HIGHEST_ORDER = 10
-_PER_POINT = 50
-"""Places on a NURBS for each of its control points."""
+_PER_POINT, _MOST_PLACES = 50, 5_000
+"""Places on a NURBS for each of its control points, and in all."""
 Traced = tuple[FloatArray, FloatArray | None]
 
 
@@ -36,7 +36,7 @@ def trace(
         InvalidDocument: It has no shape that is read, or leads off the map.
     """
     shape, timing = action.find(".//Shape/*"), action.find("TimeReference/Timing")
-    if float(action.get("initialDistanceOffset") or 0.0):
+    if read_float(action, "initialDistanceOffset", place, default=0.0) > 0.0:
         raise fault_at(place, "begins inside its trajectory, by initialDistanceOffset")
     shapes: dict[str, Callable[[Element, Element, PositionReader, str], Traced]] = {
         "Polyline": _follow_vertices,
@@ -154,7 +154,8 @@ def _follow_nurbs(shape: Element, action: Element, placer: PositionReader, place
     if has_times:
         values = np.column_stack([values, [read_float(p, "time", place) for p in points]])
     weighted = np.column_stack([values, np.ones(len(points))]) * np.array(weights)[:, None]
-    at = np.linspace(knot_values[order - 1], knot_values[-order], _PER_POINT * len(points))
+    places = min(_PER_POINT * len(points), _MOST_PLACES)
+    at = np.linspace(knot_values[order - 1], knot_values[-order], places)
     made = BSpline(np.array(knot_values), weighted, order - 1)(at)
     made = made[:, :-1] / made[:, -1:]
     turn_rad = np.arctan2(*np.gradient(made[:, 1::-1], axis=0).T)
