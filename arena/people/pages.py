@@ -107,11 +107,7 @@ class FirstForm(forms.Form):
 class TokenForm(forms.Form):
     """A new token."""
 
-    name = forms.CharField(
-        max_length=80,
-        label=gettext_lazy("What it is for"),
-        widget=forms.TextInput({"autocomplete": "off"}),
-    )
+    name = forms.CharField(max_length=80, label=gettext_lazy("What it is for"))
     role = forms.ChoiceField(label=gettext_lazy("Role"))
     days = forms.TypedChoiceField(
         coerce=int, initial=str(USUAL_DAYS), label=gettext_lazy("Works for")

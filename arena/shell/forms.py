@@ -37,9 +37,7 @@ class Offer:
 class InputField(forms.BoundField):
     """A field in the look of the pages; what is typed there is no prose to correct."""
 
-    def build_widget_attrs(
-        self, attrs: dict[str, Any], widget: forms.Widget | None = None
-    ) -> dict[str, Any]:
+    def build_widget_attrs(self, attrs: Any, widget: forms.Widget | None = None) -> Any:
         """Add what all fields have that hold a text, a number or a choice of one."""
         built = super().build_widget_attrs(attrs, widget)
         typed = (forms.TextInput, forms.NumberInput, forms.PasswordInput, forms.Textarea)
