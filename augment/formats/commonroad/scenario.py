@@ -105,23 +105,15 @@ class CommonRoad(LogReader):
         obstacles = doubts.read_all("objects", _obstacle, things)
         starts = ((element, states) for element in root.findall("planningProblem"))
         problems = doubts.read_all("planning problems", _problem, starts)
-        vehicles = [
-            obstacle
-            for obstacle in obstacles
-            if obstacle.type is AgentType.VEHICLE and not obstacle.stands
-        ]
-        egos = {
-            str(driver.id): driver for driver in (*problems, *obstacles) if driver.kind in DRIVERS
-        }
+        vehicles = [who for who in obstacles if who.type is AgentType.VEHICLE and not who.stands]
+        egos = {str(who.id): who for who in (*problems, *obstacles) if who.kind in DRIVERS}
         chosen = problems or vehicles or [_NOBODY]
         if item is not None:
             chosen = [foreign.look_up(egos, item, "item")]
         notes = [*note_left_out("objects", left_out), *doubts.notes]
         steps = 1 + max(max(participant.steps) for participant in (*obstacles, *chosen))
         benchmark = root.get("benchmarkID", path.stem)[:80]
-        offer = ", ".join(
-            f"{driver.id} ({driver.kind})" for driver in [*egos.values()][:MOST_OFFERED]
-        )
+        offer = ", ".join(f"{who.id} ({who.kind})" for who in [*egos.values()][:MOST_OFFERED])
         for ego in chosen:
             yield Log(
                 times_s=np.arange(steps, dtype=np.float64) * step_s,
