@@ -13,6 +13,7 @@ from hashlib import sha256, shake_256
 from typing import TypeVar
 
 from django.core.files.uploadedfile import UploadedFile
+from django.db import IntegrityError
 from django.db.models import Q
 from django.utils.crypto import salted_hmac
 from django.utils.datastructures import MultiValueDict
@@ -69,7 +70,10 @@ def answer_once(
     first = {"body_hash": body, "received_at": DATABASE_TIME}
     give_up_at, is_late = time.monotonic() + WAIT_S, True
     while True:
-        receipt, is_new = Receipt.objects.get_or_create(key_hash=_digest(key), defaults=first)
+        try:
+            receipt, is_new = Receipt.objects.get_or_create(key_hash=_digest(key), defaults=first)
+        except IntegrityError:  # the first was refused at this moment
+            continue
         if is_new:
             break
         if receipt.body_hash != body:

@@ -13,7 +13,7 @@ import pytest
 from django.apps import apps
 from django.core.files.base import ContentFile
 from django.core.files.uploadedfile import SimpleUploadedFile
-from django.db import connection
+from django.db import IntegrityError, connection
 from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
@@ -342,6 +342,18 @@ def test_a_form_sent_again_shows_what_it_made_and_can_be_sent_once_more(
     assert GenerationJob.objects.filter(name="Twice").count() == 2
     changed = form | {"name": "Another"}
     assert admin.post(reverse("job-new"), changed).status_code == 302, "it is another form"
+
+
+def test_who_waits_while_the_first_is_refused_comes_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusals, ask = iter([IntegrityError("it is there")]), Receipt.objects.get_or_create
+
+    def refuse_once(**columns: Any) -> Any:
+        for refusal in refusals:
+            raise refusal
+        return ask(**columns)
+
+    monkeypatch.setattr(Receipt.objects, "get_or_create", refuse_once)
+    assert receipts.answer_once("key", "body", lambda: "made", lambda _: (201, b"")) == "made"
 
 
 def test_a_key_is_kept_a_day_and_its_answer_sealed(cast: Cast) -> None:
