@@ -110,6 +110,7 @@ def test_looking_closely_by_keys_moves_both_pictures_and_is_kept_with_the_vote(
 def test_single_keys_can_be_switched_off_for_good(booth: Booth) -> None:
     page = booth.enter()
     page.keyboard.press("?")
+    expect(page.get_by_label("Single keys work")).to_be_checked()  # the panel is there
     page.get_by_label("Single keys work").uncheck()
     expect(page.locator("#preferences-told")).to_have_text("Saved.")
     page.reload()

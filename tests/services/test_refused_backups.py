@@ -195,7 +195,10 @@ def test_no_work_of_a_backup_goes_on_by_itself(
     (tmp_path / "evil_planner.py").write_text("raise SystemExit('imported')")
     monkeypatch.syspath_prepend(tmp_path)
     a_full_house()
-    first, second = GenerationJob.objects.order_by("pk")[:2]
+    first = GenerationJob.objects.earliest("pk")
+    second = GenerationJob.objects.create(name="another")
+    moved = first.augmentations.latest("pk")
+    first.augmentations.filter(pk=moved.pk).update(job=second)
     first.augmentations.update(state="running", claim=uuid.uuid4(), heartbeat_at=NOW)
     GenerationJob.objects.exclude(pk=first.pk).update(state="finished")
     second.augmentations.update(state="queued")
