@@ -139,7 +139,7 @@ def read_completion(document: object, *, least_prompt: int) -> Reply:
         cached_tokens=cached,
         tool_calls=tuple(calls),
         reasoning=shorten("\n".join(thoughts), LONGEST_EXTRA),
-        extra=_bounded(thoughts_back, "reasoning", doubts),
+        extra=_cap(thoughts_back, "reasoning", doubts),
         remarks=tuple(shorten(note, LONGEST_MESSAGE) for note in notes[:MOST_REMARKS]),
     )
 
@@ -255,13 +255,13 @@ def _read_message(
                 id=shorten(call_id, LONGEST_NAME),
                 name=shorten(name, LONGEST_NAME),
                 arguments=shorten(arguments, LONGEST_ARGUMENTS),
-                extra=_bounded(extra_of(fields, _OF_A_CALL), path, doubts),
+                extra=_cap(extra_of(fields, _OF_A_CALL), path, doubts),
             )
         )
     return pieces, made
 
 
-def _bounded(extra: str, path: str, doubts: Doubts) -> str:
+def _cap(extra: str, path: str, doubts: Doubts) -> str:
     """Return what is to go back as it came, or nothing and a remark where it is too long."""
     if len(extra) <= LONGEST_EXTRA:
         return extra
