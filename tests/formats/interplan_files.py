@@ -165,7 +165,7 @@ def write_folder(root: Path, city: str = CITY) -> Path:
 
 def entries_of(text: str, scenes: Mapping[str, Scene]) -> list[tuple[Modification, list[str]]]:
     """The special scenarios of the tokens that have a scene, as changes with what they lose."""
-    by_token = parse_file(read_yaml(text, what=WHAT)).modification_details_dictionary
+    by_token = parse_file(read_yaml(text, what=WHAT))[0].modification_details_dictionary
     return [
         read_entry(token, index, entry, scenes[token])
         for token, one in by_token.items()

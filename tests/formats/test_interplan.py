@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.interplan.file import scene_token
+from augment.formats.interplan.file import TOKENS, parse_file, scene_token
 from augment.formats.interplan.runs import MODIFICATIONS
 from augment.formats.interplan.writer import write as write_files
 from augment.formats.writing import Cell, Loss
@@ -190,3 +190,26 @@ def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: Scenari
     ]
     assert changed == {text.split()[0] for text in told}
     assert any(loss.changes_scene for loss in losses) == bool(changed and odd not in STILL_THERE)
+
+
+def test_a_fault_costs_its_special_scenario_or_its_base_token_and_no_more() -> None:
+    sound = {"type": "nudge_around_parked_vehicle", "cones": [[1.0, 2.0]]}
+    short = sound | {"cones": [[1.0]]}
+    document = {
+        TOKENS: {
+            "0123456789abcdef": {"special_scenario": {"0": sound, "1": short}},
+            "fedcba9876543210": {"goal": {"l": "here"}, "special_scenario": {"0": sound}},
+            "no token": {"special_scenario": {"0": sound}},
+        }
+    }
+    file, problems = parse_file(document)
+    (details,) = file.modification_details_dictionary.values()
+    assert details.special_scenario is not None
+    assert [*details.special_scenario] == ["0"]
+    places = [place.removeprefix(f"{TOKENS}.") for place, _ in problems]
+    assert [place.partition(".")[0] for place in places] == [
+        "0123456789abcdef",
+        "fedcba9876543210",
+        "no token",
+    ]
+    assert places[0].startswith("0123456789abcdef.special_scenario.1.cones[0]")

@@ -40,6 +40,7 @@ from augment.scene.planned_mover import WALK_S
 from augment.scene.schema import Size, Speed, list_problems, path
 
 WHAT = "interPlan file"
+TOKENS = "modification_details_dictionary"
 OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
 """The keys of a special scenario whose rows a change writes anew."""
 STANDING_WALK_M: Final = 1.5
@@ -142,8 +143,10 @@ class InterplanSource:
 # Reading
 
 
-def parse_file(document: object) -> File:
-    """Return the document in its typed shape.
+def parse_file(document: object) -> tuple[File, list[tuple[str, str]]]:
+    """Return the document in its typed shape, and the faults of the parts that it then lacks.
+
+    A fault costs the special scenario that it is in, else its base token.
 
     Raises:
         InvalidDocument: It is not interPlan's, with the path and the reason of every fault, or
@@ -153,21 +156,40 @@ def parse_file(document: object) -> File:
         kind = type(document).__name__
         problem = f"expected a mapping with interPlan's keys, got {kind}"
         raise InvalidDocument(WHAT, [("", problem)])
+    problems = list[tuple[str, str]]()
     try:
         file = File.model_validate(document)
     except ValidationError as fault:
-        raise InvalidDocument(WHAT, list_problems(fault)) from None
+        problems = list_problems(fault)
+        try:
+            file = File.model_validate(_leave_out(document, fault))
+        except ValidationError:
+            raise InvalidDocument(WHAT, problems) from None
     if not any(
         modification.special_scenario
         for modification in file.modification_details_dictionary.values()
     ):
-        raise InvalidDocument(WHAT, [("", "holds no special scenario")])
-    return file
+        raise InvalidDocument(WHAT, problems or [("", "holds no special scenario")])
+    return file, problems
+
+
+def _leave_out(document: dict[Any, Any], fault: ValidationError) -> dict[Any, Any]:
+    """Return the document without the special scenarios, or base tokens, that have a fault."""
+    by_token = document.get(TOKENS)
+    if not isinstance(by_token, dict):
+        return document
+    kept = dict(by_token)
+    for _, token, *steps in (error["loc"] for error in fault.errors() if error["loc"][1:]):
+        details = kept.pop(token, None)
+        if steps[:1] == ["special_scenario"] and len(steps) > 2 and details is not None:
+            rest = {key: row for key, row in details[steps[0]].items() if key != steps[1]}
+            kept[token] = details | {steps[0]: rest}
+    return document | {TOKENS: kept}
 
 
 def entry_place(token: str, index: str | int, *steps: str | int) -> str:
     """Return where in a file a part of a special scenario stands."""
-    return path("modification_details_dictionary", token, "special_scenario", str(index), *steps)
+    return path(TOKENS, token, "special_scenario", str(index), *steps)
 
 
 def read_entry(

@@ -29,7 +29,6 @@ from augment.scene.intent import IntentOrigin
 from augment.services.scenarios.scene_imports import free_scene_slug, keep_reading
 from augment.services.scenarios.scenes import NewScenario, add_scenario
 
-_KEY = "modification_details_dictionary"
 _VEHICLE, _BUS = AgentType.VEHICLE, AgentType.BUS
 _Sizes = Sequence[tuple[float, float]]
 
@@ -65,9 +64,11 @@ def import_interplan(*, folder: Path, data: Path | None = None) -> Iterator[Impo
     Raises:
         InvalidDocument: There is not exactly one modification file, or it breaks its format.
     """
-    file = interplan_file.parse_file(
+    file, problems = interplan_file.parse_file(
         read_yaml_file(_modification_file_in(folder), what=interplan_file.WHAT)
     )
+    for place, problem in problems:
+        yield ImportStep(StepKind.SKIPPED, f"Skipped for a fault: {place}: {problem}")
     by_token = file.modification_details_dictionary
     wanted = {token: entry_of for token, entry_of in by_token.items() if entry_of.special_scenario}
     for token in (token for token in by_token if token not in wanted):
@@ -97,10 +98,12 @@ def _modification_file_in(folder: Path) -> Path:
         for file in ([folder] if folder.is_file() else sorted(folder.rglob("*.y*ml")))
         if file.is_file()
         and file.stat().st_size <= MAX_CHARACTERS
-        and _KEY.encode() in file.read_bytes()
+        and interplan_file.TOKENS.encode() in file.read_bytes()
     ]
     if len(files) != 1:
-        problem = f"{len(files)} YAML files with {_KEY} are there; there must be one"
+        problem = (
+            f"{len(files)} YAML files with {interplan_file.TOKENS} are there; there must be one"
+        )
         raise InvalidDocument(interplan_file.WHAT, [(str(folder), problem)])
     return files[0]
 
@@ -143,7 +146,7 @@ def _verbatim(
     parts: dict[str, tuple[BaseModel, set[str]]] = {
         "entry": (entry, set()),
         "details": (file.modification_details_dictionary[token], {"special_scenario"}),
-        "file": (file, {_KEY}),
+        "file": (file, {interplan_file.TOKENS}),
     }
     document = {"index": index} | {
         name: part.model_dump(mode="json", exclude_unset=True, exclude=left_out)
