@@ -26,9 +26,9 @@ serve: $(VENV)/.runtime ## Serve what is there
 test: chromium receivers ## Style, floors, types and every test that is not slow, on SQLite, Redis, PostgreSQL and in a browser
 	@$(MAKE) --no-print-directory -j 2 lint quick-tests
 
-quick-tests: # beside lint, whose types need one core for more than a minute
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow"
-	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow" -n 2
+quick-tests: # beside lint, whose types need a core for a minute; a third process fills what browsers wait for
+	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not slow"
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow" -n 3
 
 test-all: chromium receivers ## The slow tests: whole journeys, kills, all roles of the API
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow

@@ -83,7 +83,10 @@ def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego(keeps_rule: bool)
     assert -2.588 - 2.4 - 5.0 < x < -2.588 - 2.4
 
 
-@pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS, *MOVING_SLUGS])
+@pytest.mark.parametrize(
+    "slug",
+    [*MOVING_SLUGS, *(pytest.param(s, marks=pytest.mark.slow) for s in (*SLUGS, *HARD_SLUGS))],
+)
 def test_everybody_is_at_one_place_in_checks_films_stills_and_drives(slug: str) -> None:
     assert_everybody_is_at_one_place(
         DriveSetting(scene=shown_scene(slug), modification=entry(slug).reference)
