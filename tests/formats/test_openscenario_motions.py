@@ -241,9 +241,19 @@ def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None
     second = event(follow.format(-0.01), AFTER, name="then")
     (other,) = moves(read(write(tmp_path, scenario(first, second, other_does=(speed(8),))))).others
     # Two bends of 0.4 rad in a radius of 100 m, the other way round. Paths have no headings: the
-    # second begins along the way of the middle, 0.014 rad more.
+    # second begins along the way of the middle, up to 0.014 rad more.
     x_m, y_m = 200.0 * math.sin(0.4), 200.0 * (1.0 - math.cos(0.4))
-    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.6)
+    assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.4)
+
+
+def test_after_the_bend_of_a_trajectory_its_actor_goes_straight_on(tmp_path: Path) -> None:
+    place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
+    shape = f'<Clothoid curvature="0.05" curvaturePrime="0" length="30">{place}</Clothoid>'
+    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
+    file = write(tmp_path, scenario(event(action, by_time(0)), other_does=(speed(8),)))
+    (other,) = moves(read(file)).others
+    rest = other.states[42:]
+    assert rest[:, 2] == pytest.approx(np.full(len(rest), 1.5), abs=0.001)
 
 
 CLOTHOID = (

@@ -344,7 +344,7 @@ class _Draft:
         rows = np.array([*((pose.x_m, pose.y_m) for pose in before), *points]).reshape(-1, 2)
         apart = np.append(np.hypot(*np.diff(rows, axis=0).T) > 0.005, True)
         kept = rows[apart]
-        thinned = np.round(_simplify(kept, _THIN_M, _MOST_POINTS), 4)
+        thinned = np.round(_thin(kept), 4)
         self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
         begin = self._find_begin(place)
         here = np.array([[begin.x_m, begin.y_m]])
@@ -438,8 +438,12 @@ def fit_speeds(times_s: FloatArray, ways_m: FloatArray) -> list[tuple[float, flo
             np.maximum([ends[0], *mps, ends[1]], 0.0),
         ]
     )
-    rows = _simplify(knots, 0.001, _MOST_SPEEDS).tolist()
-    return [(round(time_s, 4), round(speed_mps, 4)) for time_s, speed_mps in rows]
+    within_mps = 0.001
+    while True:
+        line = shapely.LineString(knots).simplify(within_mps, preserve_topology=False)
+        if len(line.coords) <= _MOST_SPEEDS:
+            return [(round(time_s, 4), round(speed_mps, 4)) for time_s, speed_mps in line.coords]
+        within_mps *= 2.0
 
 
 def read_speed_target(action: Element, mps_of: Callable[[str], float], place: str) -> float:
@@ -455,14 +459,22 @@ def read_speed_target(action: Element, mps_of: Callable[[str], float], place: st
     return value
 
 
-def _simplify(rows: FloatArray, within: float, most: int) -> FloatArray:
-    """Return the rows (R, 2) that a line needs to lie so near; of more than so many, fewer."""
-    while len(rows) > 2:
-        line = shapely.LineString(rows).simplify(within, preserve_topology=False)
-        if len(line.coords) <= most:
-            return shapely.get_coordinates(line)
-        within *= 2.0
-    return rows
+def _thin(rows: FloatArray) -> FloatArray:
+    """Return those of the rows (R, 2) that a smooth line needs to lead by all of them."""
+    from scipy.interpolate import PchipInterpolator
+
+    ways_m = np.cumsum(np.hypot(*np.diff(rows, axis=0, prepend=rows[:1]).T))
+    kept = np.unique([0, len(rows) - 1])
+    while 1 < len(kept) < _MOST_POINTS:
+        off_m = np.hypot(*(PchipInterpolator(ways_m[kept], rows[kept])(ways_m) - rows).T)
+        gaps = np.split(off_m, kept[1:-1])
+        worst = kept[:-1] + [int(gap.argmax()) for gap in gaps]
+        worst = worst[off_m[worst] > _THIN_M]
+        if not len(worst):
+            break
+        most = np.argsort(-off_m[worst])[: _MOST_POINTS - len(kept)]
+        kept = np.union1d(kept, worst[most])
+    return rows[kept]
 
 
 def _find(action: Element, path: str, place: str) -> Any:
