@@ -48,8 +48,8 @@ UNUSED = {
     "opendrive": "connection@id header@revMinor junction@id lane@id laneSection/center "
     "predecessor@elementId road/link road/objects road@junction road@length signal@dynamic "
     "signal@id signal@orientation signal@s signal@t successor@elementId",
-    "openscenario": "Act/ManeuverGroup Act/StartTrigger Act@name Action@name Center@z "
-    "Dimensions@height Event/StartTrigger Event@name Maneuver/Event Maneuver@name "
+    "openscenario": "Act/ManeuverGroup Act@name Action@name Center@z "
+    "Dimensions@height Event@name Maneuver/Event Maneuver@name "
     "ManeuverGroup/Actors ManeuverGroup/Maneuver ManeuverGroup@name "
     "SpeedActionDynamics@dynamicsDimension SpeedActionDynamics@dynamicsShape "
     "SpeedActionDynamics@value StartTrigger/ConditionGroup Story/Act Story@name "

@@ -33,6 +33,21 @@ from tests.formats.openscenario_files import (
 )
 
 
+@pytest.mark.parametrize(("owner", "conditions"), [("event", ""), ("act", by_time(0))])
+def test_what_has_an_empty_trigger_never_begins(
+    owner: str, conditions: str, tmp_path: Path
+) -> None:
+    text = scenario(event(BRAKES), other_does=(speed(10),))
+    trigger = f"<StartTrigger><ConditionGroup>{conditions}</ConditionGroup></StartTrigger>"
+    idle = text.replace(trigger, "<StartTrigger/>")
+    reading = read(write(tmp_path, idle))
+    (other,) = moves(reading).others
+    assert other.states[-1, 3] == 10.0
+    assert f"An {owner} whose StartTrigger is empty never begins." in reading.notes
+    (other,) = moves(read(write(tmp_path, text.replace(trigger, "")))).others
+    assert other.states[-1, 3] < 10.0
+
+
 @pytest.mark.parametrize("way", ["2", "4"])
 @pytest.mark.parametrize("is_in_catalog", [False, True])
 def test_a_route_is_kept_as_lanes(way: str, is_in_catalog: bool, tmp_path: Path) -> None:
@@ -254,6 +269,49 @@ def test_after_the_bend_of_a_trajectory_its_actor_goes_straight_on(tmp_path: Pat
     (other,) = moves(read(file)).others
     rest = other.states[42:]
     assert rest[:, 2] == pytest.approx(np.full(len(rest), 1.5), abs=0.001)
+
+
+LATER = (
+    '<Act name="a2"><ManeuverGroup name="g"><Actors><EntityRef entityRef="Other"/></Actors>'
+    '<Maneuver name="m">{}</Maneuver></ManeuverGroup>'
+    "<StartTrigger><ConditionGroup>{}</ConditionGroup></StartTrigger></Act></Story>"
+)
+
+
+@pytest.mark.parametrize(
+    ("act", "own", "began_s"),
+    [(by_time(6), AFTER, 6.0), (AFTER, by_time(6), 6.0), (AFTER, "", 2.0), ("", AFTER, 2.0)],
+)
+def test_an_event_begins_once_both_its_act_and_its_own_conditions_hold(
+    act: str, own: str, began_s: float, tmp_path: Path
+) -> None:
+    text = scenario(event(speed(9), by_time(2)), other_does=(speed(8),))
+    later = LATER.format(event(speed(12), own, name="then"), act)
+    reading = read(write(tmp_path, text.replace("</Story>", later)))
+    (other,) = moves(reading).others
+    faster = other.states[:, 3] > 11.0
+    assert faster.argmax() == pytest.approx(10 * began_s + 1, abs=1)
+    is_told = any("begins so long after" in note for note in reading.notes)
+    assert is_told == (began_s == 6.0)
+
+
+def test_a_trajectory_that_is_not_understood_is_noted_once(tmp_path: Path) -> None:
+    vertex = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75"/></Position></Vertex>'
+    action = FOLLOW.format(vertex.format(0, 60) + vertex.format(1, "nan"), TIMING)
+    notes = read(write(tmp_path, scenario(event(action, by_time(0))))).notes
+    assert [note[:50] for note in notes if "Vertex" in note or "WorldPosition" in note] == [
+        "Not understood and left out: events (1); first eve"
+    ]
+
+
+def test_a_time_that_is_none_costs_its_event_alone(tmp_path: Path) -> None:
+    vertex = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75"/></Position></Vertex>'
+    action = FOLLOW.format(vertex.format(0, 60) + vertex.format(1, 68), TIMING)
+    text = scenario(event(action, by_time("soon")), event(speed(12), by_time(2), "then"))
+    reading = read(write(tmp_path, text))
+    (other,) = moves(reading).others
+    assert other.states[-1, 3] == 12.0
+    assert any("got 'soon'" in note for note in reading.notes)
 
 
 CLOTHOID = (

@@ -112,7 +112,7 @@ def find_trigger(
         step = round(time_s / float(expected.times_s[1]))
         return AtTime(after_s=time_s), min(step, len(expected.times_s) - 1)
     step, watched = find_step(event, expected)
-    tried = [e for group in (*event.begins, *event.groups) for c in group for e in c.iter()]
+    tried = [element for condition in event.conditions for element in condition.iter()]
     along = [e for e in tried if e.get("coordinateSystem", "entity") != "entity"]
     doubts.assume("A distance along roads is taken as the one between places", len(along))
     goals = [e for e in tried if e.tag == "Position" and not _list_refs(e)]

@@ -38,6 +38,7 @@ class StoryEvent:
         actions: Those that are read, by their kinds.
         begins: Conditions by which the act begins, likewise.
         around: Names of the story, act, group and maneuver that it is in.
+        time_s: When it begins if times alone say that, None otherwise.
     """
 
     place: str
@@ -46,19 +47,17 @@ class StoryEvent:
     actions: tuple[tuple[str, Element], ...]
     begins: Groups = ()
     around: tuple[str, ...] = ()
+    time_s: float | None = 0.0
 
     @property
-    def time_s(self) -> float | None:
-        """When it begins if times alone say that, None otherwise."""
-        moments_s = [_find_time(groups, self.place) for groups in (self.begins, self.groups)]
-        known_s = [moment_s for moment_s in moments_s if moment_s is not None]
-        return max(known_s) if len(known_s) == 2 else None
+    def conditions(self) -> list[Element]:
+        """All of them, the act's first."""
+        return [condition for group in (*self.begins, *self.groups) for condition in group]
 
     @property
     def waits_for(self) -> Element | None:
         """What it waits for if one element of the storyboard alone says when, None otherwise."""
-        conditions = [condition for group in self.groups for condition in group]
-        wait = conditions[0].find(WAIT) if len(conditions) == 1 else None
+        wait = self.conditions[0].find(WAIT) if len(self.conditions) == 1 else None
         return None if wait is None or has_begun(wait, self.around) else wait
 
 
@@ -66,17 +65,17 @@ def list_events(source: ScenarioSource) -> dict[str, list[StoryEvent]]:
     """Return everybody's events in the order of the file; what is left out is noted."""
     events, doubts = defaultdict[str, list[StoryEvent]](list), source.doubts
     for story in source.root.findall("Storyboard/Story"):
-        for act in story.findall("Act"):
+        for act in _list_beginning(story, "Act", doubts):
             begins = _list_conditions(act, ())
             for group in act.findall("ManeuverGroup"):
                 actors = [row.get("entityRef", "") for row in group.findall("Actors/EntityRef")]
                 for maneuver in group.findall("Maneuver"):
                     around = tuple(e.get("name", "") for e in (story, act, group, maneuver))
-                    for event in maneuver.findall("Event"):
-                        groups = _list_conditions(event, around)
+                    for event in _list_beginning(maneuver, "Event", doubts):
                         for actor, made in _split(event, actors, doubts):
-                            made = replace(made, groups=groups, begins=begins, around=around)
-                            events[actor].append(made)
+                            made = replace(made, begins=begins, around=around)
+                            with doubts.about("events"):
+                                events[actor].append(_with_conditions(made, event))
     return events
 
 
@@ -93,6 +92,21 @@ def describe_action(action: Element) -> str:
 
 
 # Private
+
+
+def _list_beginning(owner: Element, tag: str, doubts: Doubts) -> list[Element]:
+    """Return the acts or events that can begin: no trigger fires at once, an empty one never."""
+    parts = owner.findall(tag)
+    idle = [part for part in parts if not all(map(len, part.findall("StartTrigger")))]
+    doubts.assume(f"An {tag.lower()} whose StartTrigger is empty never begins", len(idle))
+    return [part for part in parts if part not in idle]
+
+
+def _with_conditions(made: StoryEvent, event: Element) -> StoryEvent:
+    groups = _list_conditions(event, made.around)
+    times_s = [_find_time(each, made.place) for each in (made.begins, groups)]
+    known_s = [time_s for time_s in times_s if time_s is not None]
+    return replace(made, groups=groups, time_s=max(known_s) if len(known_s) == 2 else None)
 
 
 def _list_conditions(owner: Element, around: tuple[str, ...]) -> Groups:

@@ -228,7 +228,9 @@ class _Draft:
         start: Trigger
         if (wait := event.waits_for) is not None:
             done = expected.find_done(wait, event.place)
-            delay_s = foreign.read_number(event.groups[0][0].get("delay") or "0", event.place, 0.0)
+            delay_s = foreign.read_number(
+                event.conditions[0].get("delay") or "0", event.place, 0.0
+            )
             since_s = done.since_s(wait) + delay_s
             if done.actor == self._name and self.start is not None:
                 return since_s

@@ -6,6 +6,7 @@ a trajectory by the clock alone was recorded, as it were; whatever else moves ge
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -13,6 +14,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from augment import foreign
+from augment.errors import InvalidDocument
 from augment.foreign import FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.opendrive.maps import map_around
@@ -114,7 +116,9 @@ class _Scenario:
         self.ego_name = self._find_ego(item)
         self._tracks, self._gone_s = dict[str, tuple[FloatArray, FloatArray]](), dict[str, float]()
         for name in self._entities:
-            with self._doubts.about("trajectories"):
+            # Those of others are read again, as events, where they are no track.
+            is_ego, about = name == self.ego_name, self._doubts.about("trajectories")
+            with about if is_ego else suppress(InvalidDocument):
                 self._read_track(name)
 
     def log(self) -> Log:
@@ -185,10 +189,7 @@ class _Scenario:
         }
 
         def count(name: str) -> int:
-            conditions = [
-                c for e in self._events[name] for group in (*e.begins, *e.groups) for c in group
-            ]
-            parts = [part for condition in conditions for part in condition.iter()]
+            parts = [p for e in self._events[name] for c in e.conditions for p in c.iter()]
             elements = (part.get("storyboardElementRef", "").split("::")[-1] for part in parts)
             watched = {part.get("entityRef") for part in parts} | set(map(owners.get, elements))
             return len(watched & (self._events.keys() - {name, self.ego_name}))
