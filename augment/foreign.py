@@ -70,6 +70,8 @@ def read_numbers(rows: Any, place: str, columns: int | None = None) -> FloatArra
     """
     try:
         array = np.array(rows)
+        if array.dtype.kind == "U" and np.char.count(array, "_").any():
+            raise ValueError
         if array.dtype.kind not in "iufb":
             array = np.array(rows, dtype=object).astype(np.float64)
         array = array.astype(np.float64).reshape(len(array), -1)
@@ -126,7 +128,7 @@ def read_number(
     number = math.nan
     if isinstance(value, int | float | str) and not isinstance(value, bool):
         with suppress(ValueError, OverflowError):
-            number = float(value)
+            number = math.nan if "_" in str(value) else float(value)  # 1_000 is Python's own
     if not least <= number <= most:
         reach = f"from {least:g} to {most:g}"
         raise fault_at(place, f"expected a finite number {reach}, got {str(value)[:40]!r}")

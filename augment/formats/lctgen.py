@@ -27,6 +27,8 @@ from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Traf
 
 NAME = "lctgen"
 _COLUMNS = 7
+_VEHICLE = 1.0
+"""The type of a vehicle, where rows have one."""
 _TRACK_COLUMNS = [0, 1, 7, 8, 6, 3, 4, 9]
 """Where x, y, vx, vy, heading, length, width and valid stand in a track's state."""
 _BROKEN = (*BROKEN_ZIP, OSError, ValueError, RuntimeError, lzma.LZMAError)
@@ -101,7 +103,7 @@ def _rows(document: object, doubts: Doubts) -> FloatArray:
     if not isinstance(values, list | np.ndarray) or not len(values):
         raise fault_at("", "expected LCTGen's `agent` or `tracks`")
     read = [
-        doubts.read("vehicles", _first_state, value, f"vehicles[{number}]")
+        doubts.read("vehicles", _first_state, value, f"vehicles[{number}]", doubts)
         for number, value in enumerate(values)
     ]
     rows = np.vstack([row for row in read if row is not None] or [np.zeros(_COLUMNS + 1)])
@@ -111,9 +113,15 @@ def _rows(document: object, doubts: Doubts) -> FloatArray:
     return np.asarray(rows[rows[:, -1] > 0.0, :_COLUMNS])
 
 
-def _first_state(value: Any, place: str) -> FloatArray:
+def _first_state(value: Any, place: str, doubts: Doubts) -> FloatArray:
     """Return a vehicle at t0: a row, or the beginning of a track; last, whether it is there."""
     if not isinstance(value, Mapping):
-        return np.append(read_finite([value], place, _COLUMNS), 1.0)
+        row, kinds = (
+            read_finite([value], place, _COLUMNS),
+            read_numbers([value], place)[0, _COLUMNS:],
+        )
+        is_odd = row.any() and (kinds[:1] != _VEHICLE).any()
+        doubts.assume(f"A type other than {_VEHICLE:g} was left out: a vehicle as all", is_odd)
+        return np.append(row, 1.0)
     states = read_numbers(value.get("state"), f"{place}.state", 10)[:1, _TRACK_COLUMNS]
     return read_finite(states, f"{place}.state", len(_TRACK_COLUMNS)).reshape(-1)

@@ -189,6 +189,9 @@ BACK = "<point><x>0</x><y>60</y></point>"
         ("<type>car<", "<type>zeppelin<", "objects (1); first dynamicObstacle 70: unk", (2, 1, 1)),
         ("<color>red<", "<color>blue<", "states of lights (1); first trafficLight 50", (2, 1, 2)),
         ("<x>-1.5</x><y>40", "<x>1e999</x><y>40", "lanelets (2); first lanelet 2", (1, 0, 2)),
+        ("<x>-1.5</x><y>40", "<x>-1_5</x><y>40", "lanelets (2); first lanelet 2", (1, 0, 2)),
+        ("<x>-1.5</x><y>40", "<x>-1<b>5</b></x><y>40", "lanelets (2); first lan", (1, 0, 2)),
+        (">5.0<", "> 5<b>1</b> <", "objects (1); first dynamicObstacle 70.vel", (2, 1, 1)),
         ('ref="3"', 'ref="three"', "a whole number, got 'three'", (2, 1, 2)),
         (
             "<exact>2</exact>",

@@ -67,6 +67,13 @@ def test_what_is_not_said_is_noted() -> None:
     )
 
 
+def test_a_type_that_is_no_vehicle_is_noted() -> None:
+    rows = [[*EGO, 1.0], [*AHEAD, 2.0], [*AHEAD, 1.0], [*PADDING, 0.0]]
+    modification, notes = read_vehicles({"agent": rows})
+    assert [vehicle.type for vehicle in modification.added] == [AgentType.VEHICLE] * 2
+    assert notes[1:] == ("A type other than 1 was left out: a vehicle as all.",)
+
+
 @pytest.mark.parametrize("odd", [[math.nan] * 7, ["x"] * 7, [1e9] * 7, [1.0], "car", {}])
 def test_one_that_is_no_vehicle_costs_no_other(odd: object) -> None:
     modification, notes = read_vehicles({"agent": [EGO, odd, AHEAD]})

@@ -229,6 +229,7 @@ def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: P
         (by_hand(), "@1,-1,500", "road 1.s: expected a finite number from -0.01 to 100.01"),
         (by_hand(), "1,-1", "needs ROAD,LANE,S"),
         (by_hand(width=WIDTH.replace("3.5", "NaN")), None, "road 1.lane 1.a: expected a finite"),
+        (by_hand(width=WIDTH.replace('"0"', '"-1"', 1)), None, "lane 1.sOffset: expected a fin"),
         (by_hand(shape=""), None, "road 1.planView: has no shape; allowed are line, arc"),
         (by_hand(shape='<arc curvature="1e9"/>'), None, "planView.curvature: expected a finite"),
         (by_hand(lanes='<laneSection s="0"/>' * 5_001), None, "has 5001 lane sections"),

@@ -121,6 +121,13 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
             lane(4, (2, 2), *points(8, (1060, 500), (1080, 500)), (13, message((3, 77)))),
             "edges of lanes (1); first map_features.4.boundary_feature_id: unknown '77'",
         ),
+        *(
+            (
+                lane(4, *points(8, (1060, 500), (1080, 500)), (13, message(*ends, (3, 9)))),
+                "An edge of a lane counts as far as the lane's line goes.",
+            )
+            for ends in ([(1, 0), (2, 2)], [(1, 1), (2, 0)])
+        ),
         (
             track(8, 1, *[state(1030, 500, 0.0, 0.0)] * 3),
             "Two objects have one id; both are taken.",

@@ -143,6 +143,9 @@ _NOBODY = Obstacle(
 def _root(path: Path) -> tuple[Element, float]:
     """The file and the seconds between its steps."""
     root = read_xml(path, what=foreign.WHAT)
+    for element in root.iter():
+        if len(element) and (text := (element.text or "").strip()):
+            element.text = f"{text} <{element[0].tag}>"  # what goes on so is no number
     version = root.get("commonRoadVersion", "")
     if root.tag != "commonRoad" or version not in VERSIONS:
         text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"

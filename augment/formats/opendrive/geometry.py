@@ -19,6 +19,8 @@ LONGEST_M = 100_000.0
 """No road is longer."""
 SHARPEST_PM = 10.0
 """No line is more curved, in 1/m: that of a circle of 10 cm."""
+_LEAST_M = -0.01
+"""No station is less, but for how it is rounded."""
 _PANEL_M, _PANEL_RAD, _CUBIC_PANEL_M = 2.0, 0.5, 0.25
 """Integrals are taken over panels that are no longer, and bend no more."""
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -62,7 +64,8 @@ class PiecewiseCubic:
     def read(cls, elements: Iterable[Element], at: str, place: str) -> "PiecewiseCubic":
         """Return the profile in elements whose attribute `at` is their start."""
         table = [
-            [read_float(element, name, place) for name in (at, *_CUBIC)] for element in elements
+            [read_float(part, at, place, _LEAST_M), *(read_float(part, n, place) for n in _CUBIC)]
+            for part in elements
         ]
         numbers = np.array(sorted(table, key=lambda row: row[0])).reshape(-1, 5)
         return cls(starts_m=numbers[:, 0], rows=numbers[:, 1:])

@@ -476,7 +476,7 @@ def _thin(rows: FloatArray) -> FloatArray:
             break
         most = np.argsort(-off_m[worst])[: _MOST_POINTS - len(kept)]
         kept = np.union1d(kept, worst[most])
-    return rows[kept]
+    return np.asarray(rows[kept])
 
 
 def _find(action: Element, path: str, place: str) -> Any:

@@ -268,7 +268,10 @@ def _segment(
 
     def read_edge(part: Any) -> tuple[int, int, FloatArray]:
         edge = foreign.look_up(edges, part.boundary_feature_id, f"{place}.boundary_feature_id")
-        return part.lane_start_index, part.lane_end_index, edge
+        start, end = part.lane_start_index, part.lane_end_index
+        text = "An edge of a lane counts as far as the lane's line goes"
+        doubts.assume(text, not 0 <= start <= end < len(line))
+        return start, end, edge
 
     left, right = (
         edge_distances(
