@@ -284,10 +284,12 @@ def _read_json(text: str) -> VotesTable:
 
 
 def _name_columns(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    named = {_column_name(name): value for name, value in pairs}
-    if len(named) < len(pairs):
-        raise VotesFileUnreadable(f"an object names one of its columns twice: {', '.join(named)}")
-    return named
+    """Return a vote, or an object within one: other columns may hold and name what they like."""
+    names = [_column_name(name) for name, _ in pairs]
+    for name in _KNOWN:
+        if names.count(name) > 1:
+            raise VotesFileUnreadable(f"an object names the column {name!r} twice")
+    return dict(zip(names, (value for _, value in pairs), strict=True))
 
 
 def _read_parquet(content: io.BytesIO) -> VotesTable:

@@ -71,6 +71,13 @@ def test_newer_words_for_both_bad_are_ties(votes: Any) -> None:
         assert document(file, rounds=100)["standings"] == plain
 
 
+def test_what_other_columns_of_json_hold_and_are_called_counts_for_nothing(tmp_path: Path) -> None:
+    vote = {"model_a": "a", "model_b": "b", "winner": "tie", "Turns": 1, "turns": 2}
+    path = tmp_path / "votes.json"
+    path.write_text(json.dumps([vote | {"words": {"Paris": 1, "paris": 2}}]))
+    assert document(str(path), rounds=100)["votes"] == 1
+
+
 def test_votes_on_a_further_sheet_are_said_to_be_unread(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     for sheet in (book.active, book.create_sheet(), book.create_sheet("about")):
@@ -189,7 +196,7 @@ def _zipped(**entries: bytes) -> bytes:
         (b'{"votes": []}', "there is no column 'model_a'"),
         (
             b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]',
-            "columns twice: model_a, model_b, winner",
+            "the column 'model_a' twice",
         ),
         (
             b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]',
