@@ -7,6 +7,7 @@ from django.conf import settings
 from django.core.cache import cache
 from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
+from django.db.migrations.loader import MigrationLoader
 
 from augment.errors import QueueFault
 from augment.services.running import workforce
@@ -54,9 +55,11 @@ def find_unapplied_migrations() -> list[str]:
 
 
 def find_later_migrations() -> list[str]:
-    """The migrations of ours that a later release has applied."""
-    loader = MigrationExecutor(connection).loader
-    strange = loader.applied_migrations.keys() - loader.disk_migrations.keys()
+    """The migrations of ours that a later release has applied; a squashed one stands for many."""
+    loader = MigrationLoader(connection)
+    ours = loader.disk_migrations
+    strange = loader.applied_migrations.keys() - ours.keys()
+    strange -= {old for migration in ours.values() for old in migration.replaces}
     return sorted(f"{app}.{name}" for app, name in strange if app in ("arena", "augment"))
 
 
