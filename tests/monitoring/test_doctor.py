@@ -7,6 +7,7 @@ import pytest
 from django.core.cache import cache
 from django.core.management import CommandError, call_command
 from django.db import connection
+from django.db.migrations.loader import MigrationLoader
 from django.db.migrations.recorder import MigrationRecorder
 from pytest_django import Settings
 
@@ -66,6 +67,20 @@ def test_a_database_of_a_later_release() -> None:
     cache.clear()
     assert wrong() == {"database": Level.BROKEN}
     assert any("later release: arena.0999_new" in found.text for found in examine())
+
+
+def test_what_a_squashed_migration_replaced_is_of_no_later_release(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    load = MigrationLoader.load_disk
+
+    def load_without(loader: MigrationLoader) -> None:
+        load(loader)
+        del loader.disk_migrations["arena", "0002_invitations"]
+
+    monkeypatch.setattr(MigrationLoader, "load_disk", load_without)
+    assert ("arena", "0002_invitations") in MigrationLoader(connection).applied_migrations
+    assert readiness.find_later_migrations() == []
 
 
 @pytest.mark.parametrize(
