@@ -176,10 +176,8 @@ def _in_a_row(
     along_m = distance_m
     for index in range(request.count or 2):
         first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
-        left_m, turn_rad = (
-            offset_m + loose * _SIDES_M[index],
-            loose * _TURNS_RAD[index] + first_rad,
-        )
+        left_m = offset_m + loose * _SIDES_M[index]
+        turn_rad = loose * _TURNS_RAD[index] + first_rad
 
         def pose_at(
             gap_m: float, from_m: float = along_m, left_m: float = left_m, rad: float = turn_rad

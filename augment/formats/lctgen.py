@@ -3,7 +3,7 @@
 LCTGen (Tan et al., CoRL 2023) places up to 32 vehicles on the lanes around the ego, in the frame
 of the ego at t0: metres, x forward, y left. Read from the released code, its own words:
 
-    agent    rows of x, y, vx, vy, heading, length, width[, type], the ego first: the features of
+    agent    rows of x, y, vx, vy, heading, length, width[, type: 1], the ego first: the features of
              its `WaymoAgent`s, in a .npz, a .json, or a pickled dictionary
     tracks   by number from 0, the ego first, each a `state` (T, 10) of x, y, z, length, width,
              height, heading, vx, vy, valid, of which the first row is t0: the pickle of its
@@ -27,8 +27,6 @@ from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Traf
 
 NAME = "lctgen"
 _COLUMNS = 7
-_VEHICLE = 1.0
-"""The type of a vehicle, where rows have one."""
 _TRACK_COLUMNS = [0, 1, 7, 8, 6, 3, 4, 9]
 """Where x, y, vx, vy, heading, length, width and valid stand in a track's state."""
 _BROKEN = (*BROKEN_ZIP, OSError, ValueError, RuntimeError, lzma.LZMAError)
@@ -116,12 +114,9 @@ def _rows(document: object, doubts: Doubts) -> FloatArray:
 def _first_state(value: Any, place: str, doubts: Doubts) -> FloatArray:
     """Return a vehicle at t0: a row, or the beginning of a track; last, whether it is there."""
     if not isinstance(value, Mapping):
-        row, kinds = (
-            read_finite([value], place, _COLUMNS),
-            read_numbers([value], place)[0, _COLUMNS:],
-        )
-        is_odd = row.any() and (kinds[:1] != _VEHICLE).any()
-        doubts.assume(f"A type other than {_VEHICLE:g} was left out: a vehicle as all", is_odd)
+        row, kind = read_finite([value], place, _COLUMNS), read_numbers([value], place)[:, 7:8]
+        is_odd = row.any() and (kind != 1.0).any()
+        doubts.assume("A type other than 1 was left out: a vehicle as all", is_odd)
         return np.append(row, 1.0)
     states = read_numbers(value.get("state"), f"{place}.state", 10)[:1, _TRACK_COLUMNS]
     return read_finite(states, f"{place}.state", len(_TRACK_COLUMNS)).reshape(-1)

@@ -196,7 +196,9 @@ def _watch(
         "RelativeDistanceCondition": _measure_gap,
         "DistanceCondition": _measure_gap,
         "ReachPositionCondition": _measure_gap,
-        "TimeHeadwayCondition": _measure_headway,
+        "TimeHeadwayCondition": lambda name, own, e, p: (
+            _measure_gap(name, own, e, p) / e.states[name][:, 3]
+        ),
         "TimeToCollisionCondition": _measure_collision,
         "TraveledDistanceCondition": _measure_way,
         "SpeedCondition": lambda name, _, e, p: e.find_states(name, p)[:, 3],
@@ -263,10 +265,6 @@ def _measure_gap(name: str, element: Element, expected: Expectation, place: str)
         sizes = expected.sizes_m[name], expected.sizes_m.get(other, (0.0, 0.0))
         gap_m = np.maximum(gap_m - sum(size[kind == "lateral"] for size in sizes) / 2.0, 0.0)
     return np.asarray(gap_m)
-
-
-def _measure_headway(name: str, element: Element, expected: Expectation, place: str) -> FloatArray:
-    return np.asarray(_measure_gap(name, element, expected, place) / expected.states[name][:, 3])
 
 
 def _measure_collision(

@@ -31,7 +31,7 @@ _STEP_M = 0.25
 _MOST_OPEN = 100
 """Positions relative to each other."""
 _LONGEST_M = 20_000.0
-"""Nor is a route."""
+"""No route is longer."""
 Place = tuple[MapRoad, float, float, int]
 """Road, s and t there, and the id of the lane."""
 
