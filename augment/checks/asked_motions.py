@@ -82,10 +82,8 @@ def _start(
             what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
             yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
         ends_m = near.span_m if near else (planned.REACHED_M, planned.REACHED_M)
-        what, wanted = (
-            "The ego's distance at the start of {agents[0]}",
-            motion_bounds("within_m", *ends_m),
-        )
+        what = "The ego's distance at the start of {agents[0]}"
+        wanted = motion_bounds("within_m", *ends_m)
         yield hold(kind, [agent], what, start.within_m, wanted)
         return
     words = f"{{agents[0]}} is to begin {wish}; its start is of another kind."

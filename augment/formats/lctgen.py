@@ -3,7 +3,7 @@
 LCTGen (Tan et al., CoRL 2023) places up to 32 vehicles on the lanes around the ego, in the frame
 of the ego at t0: metres, x forward, y left. Read from the released code, its own words:
 
-    agent    rows of x, y, vx, vy, heading, length, width[, type: 1], the ego first: the features of
+    agent    rows of x, y, vx, vy, heading, length, width[, type], the ego first: the features of
              its `WaymoAgent`s, in a .npz, a .json, or a pickled dictionary
     tracks   by number from 0, the ego first, each a `state` (T, 10) of x, y, z, length, width,
              height, heading, vx, vy, valid, of which the first row is t0: the pickle of its

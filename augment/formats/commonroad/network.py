@@ -222,9 +222,7 @@ def _show_lights(
 
 
 def _references(parent: Element, path: str, doubts: Doubts) -> tuple[int, ...]:
-    rows = (
-        (reference.get("ref", ""), f"{parent.tag}.{path}") for reference in parent.findall(path)
-    )
+    rows = ((part.get("ref", ""), f"{parent.tag}.{path}") for part in parent.findall(path))
     return tuple(doubts.read_all("references", foreign.read_whole, rows))
 
 

@@ -19,8 +19,6 @@ LONGEST_M = 100_000.0
 """No road is longer."""
 SHARPEST_PM = 10.0
 """No line is more curved, in 1/m: that of a circle of 10 cm."""
-_LEAST_M = -0.01
-"""No station is less, but for how it is rounded."""
 _PANEL_M, _PANEL_RAD, _CUBIC_PANEL_M = 2.0, 0.5, 0.25
 """Integrals are taken over panels that are no longer, and bend no more."""
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -64,7 +62,7 @@ class PiecewiseCubic:
     def read(cls, elements: Iterable[Element], at: str, place: str) -> "PiecewiseCubic":
         """Return the profile in elements whose attribute `at` is their start."""
         table = [
-            [read_float(part, at, place, _LEAST_M), *(read_float(part, n, place) for n in _CUBIC)]
+            [read_float(part, at, place, -0.01), *(read_float(part, n, place) for n in _CUBIC)]
             for part in elements
         ]
         numbers = np.array(sorted(table, key=lambda row: row[0])).reshape(-1, 5)

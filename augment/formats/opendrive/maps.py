@@ -235,10 +235,8 @@ def _list_connections(network: RoadNetwork, roads: Mapping[str, MapRoad]) -> Ite
             inner, incoming = roads.get(connecting), roads.get(connection.get("incomingRoad", ""))
             if inner is None or incoming is None:
                 continue
-            place, contact = (
-                f"junction {junction.get('id')}",
-                connection.get("contactPoint", "start"),
-            )
+            place = f"junction {junction.get('id')}"
+            contact = connection.get("contactPoint", "start")
             with network.doubts.about("connections of junctions"):
                 end = foreign.look_up(CONTACTS, contact, f"{place}.contactPoint")
             if contact not in CONTACTS:

@@ -277,10 +277,8 @@ class _Draft:
         is_kept = action.find(".//RelativeTargetSpeed[@continuous='true']") is not None
         self._doubts.assume("A speed that is kept relative to somebody is taken once", is_kept)
         dynamics = _find(action, "SpeedActionDynamics", place)
-        by, value = (
-            dynamics.get("dynamicsDimension"),
-            abs(read_float(dynamics, "value", place, default=0.0)),
-        )
+        by = dynamics.get("dynamicsDimension")
+        value = abs(read_float(dynamics, "value", place, default=0.0))
         shape = foreign.look_up(_SHAPES, dynamics.get("dynamicsShape"), place)
         change_mps, mean_mps = abs(goal_mps - now_mps), max((goal_mps + now_mps) / 2.0, 0.1)
         spans = {

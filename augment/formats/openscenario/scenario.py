@@ -210,10 +210,8 @@ class _Scenario:
     def _begin(self, name: str, action: Element) -> None:
         """Take an action at t0: a place, a speed, or what goes on from there."""
         kind = describe_action(action)
-        position, found = (
-            action.find("TeleportAction/Position"),
-            action.find(ACTIONS.get(kind, "-")),
-        )
+        position = action.find("TeleportAction/Position")
+        found = action.find(ACTIONS.get(kind, "-"))
         if position is not None:
             self._positions[name] = position
         elif kind == "SpeedAction" and found is not None and _is_step(found):
