@@ -207,6 +207,14 @@ def test_what_does_not_pass_by_waiting_is_not_asked_for_again(row: dict[str, Any
     assert not fault.retryable
 
 
+@pytest.mark.parametrize("what", ["capacity", "GPU memory", "resources"])
+def test_what_a_server_lacks_for_a_while_is_asked_for_again(what: str) -> None:
+    body = {"error": {"message": f"The cluster has insufficient {what} at the moment."}}
+    fault = fault_of_status(503, body, {}, sent={})
+    assert isinstance(fault, ModelFault)
+    assert fault.retryable
+
+
 @pytest.mark.parametrize("code", [400, "402", "invalid_api_key", "model_not_found"])
 def test_an_error_in_a_200_that_stays_is_not_asked_for_again(code: object) -> None:
     fault = outcome({"error": {"message": "No.", "code": code}})
