@@ -75,9 +75,7 @@ class AccountForm(forms.Form):
         widget=forms.Textarea(attrs={"rows": 3, "spellcheck": "false"}),
     )
     role = forms.ChoiceField(
-        choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)],
-        initial="expert",
-        label="Role",
+        choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)], initial="expert"
     )
 
     def clean_username(self) -> list[tuple[str, str | None]]:

@@ -19,11 +19,6 @@ def page_asked(request: HttpRequest, name: str = "page") -> int:
     return int(text) if text.isascii() and text.isdigit() and len(text) < 9 and int(text) else 1
 
 
-def search_asked(request: HttpRequest) -> str:
-    """Return the search term; empty for everything."""
-    return request.GET.get("q", "").strip()[:LONGEST_SEARCH]
-
-
 def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:
     """Return the chosen value of a filter; empty for an unknown one."""
     value = request.GET.get(name, "")
@@ -95,7 +90,7 @@ def read_listing(
         keep: Names whose values stay in the address when the form is sent.
     """
     return Listing(
-        search=search_asked(request),
+        search=request.GET.get("q", "").strip()[:LONGEST_SEARCH],
         choices=tuple(
             ListChoice(
                 name=name,

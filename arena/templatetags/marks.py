@@ -178,19 +178,6 @@ def pager(context: Context, page: Page[Any], name: str = "page", what: str = "")
     }
 
 
-@register.simple_tag(takes_context=True)
-def query_with(context: Context, **changes: object) -> str:
-    """The address's query with these changes, from the first page on; empty values go."""
-    query = context["request"].GET.copy()
-    for name in ("page", "row"):
-        query.pop(name, None)
-    for name, value in changes.items():
-        query.pop(name, None)
-        if value not in ("", None):
-            query[name] = str(value)
-    return f"?{query.urlencode()}"
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ from arena.models import ScenarioFile
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.shell.forms import CapsForm
-from arena.shell.listing import choice_asked, page_asked, read_listing, read_page
+from arena.shell.listing import page_asked, read_listing, read_page
 from augment.models import Augmentation, GenerationJob
 from augment.services import read_request
 from augment.services.judging import repeatability
@@ -97,11 +97,10 @@ def _first_tab(counts: JobCounts, tabs: list[str]) -> str:
 
 
 def _show_grid(request: HttpRequest, counts: JobCounts) -> Context:
-    chosen = choice_asked(request, "state", State.values)
     states = [
         (state, f"{state.label} ({number})")
         for state, number in counts.by_state.items()
-        if number or state == chosen
+        if number or state == request.GET.get("state")
     ]
     listing = read_listing(request, {"state": ("With a result that is", states)})
     grid = grid_part(counts.job, listing, page_asked(request, "row"))
