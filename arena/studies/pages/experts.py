@@ -71,21 +71,46 @@ CONSENT = (
 class EnrolmentForm(forms.Form):
     """The rules of an enrolment link."""
 
-    consent = forms.CharField(max_length=LONGEST_CONSENT, initial=CONSENT)
-    asks_for = forms.CharField(max_length=120, initial=gettext_lazy("Your name or worker ID"))
+    consent = forms.CharField(
+        max_length=LONGEST_CONSENT,
+        initial=CONSENT,
+        label="What people agree to",
+        widget=forms.Textarea({"rows": 5}),
+    )
+    asks_for = forms.CharField(
+        max_length=120,
+        initial=gettext_lazy("Your name or worker ID"),
+        label="What they enter",
+        help_text="One ID has one place. Admins alone see it.",
+    )
     places = forms.IntegerField(min_value=1, max_value=100_000, initial=100)
-    votes_each = forms.IntegerField(min_value=1, max_value=10_000, initial=30)
+    votes_each = forms.IntegerField(
+        min_value=1,
+        max_value=10_000,
+        initial=30,
+        label="Pairs for each",
+        help_text="Hidden repeats and checks come on top, as the study’s rules say.",
+    )
     drop_out_after_h = forms.IntegerField(
-        min_value=1, max_value=10_000, required=False, initial=24
+        min_value=1,
+        max_value=10_000,
+        required=False,
+        initial=24,
+        label="Hours of silence until a place is free again",
+        help_text="Empty: never. Answers that were given stay; the rest goes to who comes next.",
     )
     completes_with = forms.RegexField(
         r"\A(https://[^\s/@]+(/\S*)?|[\w -]+)\Z",
         max_length=200,
         required=False,
         strip=True,
+        label="Completion code or return address",
+        help_text="The study’s own on a platform, such as "
+        "https://app.prolific.com/submissions/complete?cc=… Empty: everybody gets a code of "
+        "their own.",
         error_messages={"invalid": "A code, or an address that begins with https://."},
     )
-    is_open = forms.BooleanField(required=False, initial=True)
+    is_open = forms.BooleanField(required=False, initial=True, label="The link takes people on")
 
 
 class NewcomerForm(forms.Form):
@@ -267,8 +292,7 @@ def _enrol_once(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str])
     )
     if not isinstance(enrolled, StoredAnswer):
         return enrolled.expert
-    accounts = User.objects.select_related("person").filter(pk=int(enrolled.content))
-    return get_object_or_404(accounts, is_active=True)
+    return get_object_or_404(User, pk=int(enrolled.content), is_active=True)
 
 
 @form_for(ADMIN)
