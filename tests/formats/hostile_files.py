@@ -107,7 +107,7 @@ def commonroad_that_lasts_very_long(root: Path) -> Made:
         '<dynamicObstacle id="{n}"><type>car</type><initialState><position><point><x>0</x><y>0</y>'
         "</point></position><time><exact>{t}</exact></time></initialState></dynamicObstacle>"
     )
-    cars = "".join(obstacle.format(n=number, t=99_999) for number in range(20_000))
+    cars = "".join(obstacle.format(n=number, t=9_999) for number in range(20_000))
     file = root / "long.xml"
     file.write_text(HEAD.format(version="2020a") + cars + f"{PROBLEM}</commonRoad>")
     return "commonroad", file
