@@ -88,6 +88,7 @@ def test_our_own_json_gives_the_change_itself(change: Modification) -> None:
     assert found == change
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUFFIXES)
 @examples(20)
 @given(change=changes())

@@ -269,6 +269,7 @@ def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: wis
     assert found.distances_m == pytest.approx([0.0], abs=0.002)
 
 
+@pytest.mark.slow
 @given(
     name=st.sampled_from(sorted(PLACED)),
     shifts=st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 2), min_size=8, max_size=8),

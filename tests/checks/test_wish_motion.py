@@ -177,6 +177,7 @@ def test_a_careless_answer_is_far_off_or_wrong_and_no_further_than_the_reference
     assert distance_m <= found.mean_m + 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "slug", ["hard-braking-quarry-narrows", CUT_IN, "u-turn-market-crossing-ahead"]
 )

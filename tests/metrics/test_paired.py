@@ -48,6 +48,7 @@ def test_too_few_unequal_pairs_are_not_tested() -> None:
     assert find_p_by_signed_ranks(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])) == 2 / 2**6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "p_values", [(0.01, 0.04, 0.03, 0.5), (0.2, 0.2, 0.9), (0.001,), (0.04, 0.04, 0.04, 0.0001)]
 )

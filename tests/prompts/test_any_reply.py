@@ -84,6 +84,7 @@ def test_no_answer_leads_a_pattern_astray(unit: str) -> None:
     assert time.process_time() - started < 5.0
 
 
+@pytest.mark.slow
 def test_ten_thousand_mutated_answers() -> None:
     rng = random.Random(20_261_121)
     for _ in range(10_000):

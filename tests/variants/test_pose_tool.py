@@ -131,6 +131,7 @@ def test_a_place_that_is_taken_names_who_stands_there_and_the_nearest_free_one(
         assert again["taken_by"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", [None, TurnType.STRAIGHT, TurnType.LEFT, TurnType.RIGHT])
 @pytest.mark.parametrize("name", ["market-crossing", "theatre-crossing", "orchard-circle"])
 def test_the_tool_goes_where_the_checks_measure(name: str, goal: TurnType | None) -> None:
