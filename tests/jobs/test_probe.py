@@ -38,8 +38,8 @@ class Candidate(JsonServer):
             return refused
         content = body["messages"][0]["content"]
         if not isinstance(content, str) and "images" not in self.can:
-            if "a bad day" in self.can:
-                return 503, _error("busy", None)
+            if "a filter" in self.can:
+                return 400, _error("flagged: content_filter", None)
             return 400, _error("This model takes no image_url", None)
         message = {"role": "assistant", "content": self._said(body, content)}
         if "tools" in body:
@@ -118,19 +118,22 @@ def test_a_server_that_can_do_everything() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lacks", "ability"),
+    ("lacks", "has", "ability", "has_it"),
     [
-        ("temperature", Ability.TEMPERATURE),
-        ("tools", Ability.NATIVE_TOOLS),
-        ("images", Ability.VISION),
-        ("window", Ability.WHOLE_PROMPT),
+        ("temperature", "", Ability.TEMPERATURE, False),
+        ("tools", "", Ability.NATIVE_TOOLS, False),
+        ("images", "", Ability.VISION, False),
+        ("images", "a filter", Ability.VISION, None),
+        ("window", "", Ability.WHOLE_PROMPT, False),
     ],
 )
-def test_what_a_server_can_not_do_is_found_and_nothing_else(lacks: str, ability: Ability) -> None:
-    with candidate(EVERYTHING - {lacks}):
+def test_what_a_server_can_not_do_is_found_and_nothing_else(
+    lacks: str, has: str, ability: Ability, has_it: bool | None
+) -> None:
+    with candidate(EVERYTHING - {lacks} | {has}):
         report = asked()
     found = {made.ability: made.has_it for made in report.findings}
-    assert found == dict.fromkeys(Ability, True) | {ability: False}
+    assert found == dict.fromkeys(Ability, True) | {ability: has_it}
 
 
 def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:

@@ -43,7 +43,7 @@ def address() -> Iterator[str]:
     ("base_url", "model", "key", "says"),
     [
         (None, "fake-best", "", r"fake-best at .* can’t be asked: .* 404 .*It lists: fake-429, "),
-        ("http://127.0.0.1:1/v1", "any", "", "any at http://127.0.0.1:1/v1 can’t be asked: "),
+        ("http://127.0.0.1:1/v1", "any", "", "any at .* can’t be asked: .* URL right, up to /v1"),
         ("127.0.0.1:1", "any", "", "base_url: an address such as"),
         (None, "fake-good", "sk-secret", "key_variable: the name of an environment variable"),
     ],
@@ -64,10 +64,12 @@ def test_a_model_of_ones_own_runs_within_its_cap(
     address: str, broker: Broker, monkeypatch: pytest.MonkeyPatch, sees: bool
 ) -> None:
     request = EndpointRequest(base_url=address)
+    elsewhere = EndpointRequest(base_url=address.replace("127.0.0.1", "localhost"))
     own = add_model(request, "fake-good" if sees else "fake-no-vision")
     variants = [slug.rsplit("-", 1)[1] for slug in own.contestants]
     assert variants == ["otm", "fc", "tqa", *(["vqa"] if sees else [])]
     assert add_model(request, own.name) == own
+    assert add_model(elsewhere, own.name).name == f"{own.name}-2"
     assert not Contestant.objects.get(slug=own.contestants[0]).is_simulated
     for slug in ("near", "far"):
         add_scenario(slug, instruction=f"{INSTRUCTION} It is {slug}.")
@@ -82,9 +84,13 @@ def test_a_model_of_ones_own_runs_within_its_cap(
         assert AUGMENTATIONS.perform(waiting[0].pk)
         finish_if_over(job_pk=job.pk)
 
+    if not sees:
+        job.augmentations.filter(scenario__slug="near").update(state="failed", reason="too long")
+        monkeypatch.setattr("arena.management.commands.demo.retry_failed", lambda job: None)
     complete = finish(job, lines.append, work_on_one)
     asked = ModelCall.objects.filter(served_from=None).count()
     assert asked + own.probe_calls <= 20
-    assert complete == (["near"] if sees else ["far", "near"])
+    assert complete == (["near"] if sees else ["far"])
+    assert sees or lines[-1].endswith("of what failed: too long")
     states = set(job.augmentations.values_list("state", flat=True))
-    assert states == ({"done", "cancelled"} if sees else {"done"})
+    assert states == {"done", "cancelled" if sees else "failed"}

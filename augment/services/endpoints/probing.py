@@ -153,8 +153,10 @@ def ensure_model(request: EndpointRequest, *, model: str) -> EndpointModel:
             with suppress(ParameterRefused):
                 wire.complete(questions_for(model)[0].request)
         except ModelFault as fault:
+            hint = "Is its base URL right, up to /v1?" if fault.status in (None, 404) else ""
             with suppress(ModelFault):  # many endpoints list none
-                fault.args = (f"{fault} It lists: {', '.join(wire.list_models()[:MOST_LISTED])}.",)
+                hint = f"It lists: {', '.join(wire.list_models()[:MOST_LISTED])}."
+            fault.args = (f"{fault}. {hint}".strip(),)
             raise
     row = model_at(endpoint=endpoint or add_endpoint(request), model=model)
     probe(row)
@@ -240,7 +242,8 @@ class _Prober:
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
         cut = find_cut(request, reply, context_tokens=self._row.context_tokens)
-        is_good = question.is_good(reply) if cut is None else False
+        # What a filter withheld tells of no ability.
+        is_good = cut is None and (None if reply.refusal else question.is_good(reply))
         if is_good is False and ability in (Ability.ANSWER_LIMIT, Ability.SCHEMA):
             # Some servers pass over a parameter that they do not know instead of refusing it.
             is_limit = ability == Ability.ANSWER_LIMIT
