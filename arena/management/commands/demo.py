@@ -44,7 +44,7 @@ from augment.services.endpoints import (
     ensure_model,
     paper_variants,
 )
-from augment.services.endpoints.contestants import REFERENCE, contestant_slug
+from augment.services.endpoints.contestants import REFERENCE
 from augment.services.judging import pairs_apart
 from augment.services.running import JobRequest, count_rows
 from augment.services.running.estimates import estimate
@@ -156,7 +156,6 @@ class Command(TerminalCommand):
             f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
         ]
         self.stdout.write("\n".join(lines))
-        self.stdout.flush()
 
     @staticmethod
     def _keep(name: str, line: str) -> None:
@@ -201,9 +200,8 @@ def prepare(say: Callable[[str], None]) -> None:
     models.Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
     say(f"Contestants: {', '.join(models.Contestant.objects.values_list('slug', flat=True))}")
-    usernames = set(User.objects.values_list("username", flat=True))
     for username, role in PEOPLE:
-        if username not in usernames:
+        if not User.objects.filter(username=username).exists():
             create_person(username=username, password=PASSWORD, role=role)
     demo.add_experts()
 
@@ -224,13 +222,8 @@ def add_model(request: EndpointRequest, model: str) -> OwnModel:
     known = dict(models.Contestant.objects.filter(**asked).values_list("variant", "slug"))
     for variant in variants:
         if variant not in known:
-            slug = contestant_slug(model, variant, {})
-            add_contestant(
-                ContestantRequest(
-                    slug=slug, variant=variant, endpoint=row.endpoint.label, model=model
-                )
-            )
-            known[variant] = slug
+            wanted = ContestantRequest(variant=variant, endpoint=row.endpoint.label, model=model)
+            known[variant] = add_contestant(wanted).slug
     report = row.probe_report or {}
     slugs = tuple(known[variant] for variant in variants)
     name = "".join(slugs[0].rsplit("-otm", 1))  # of the same model elsewhere it is another
@@ -294,8 +287,8 @@ def finish(
         cancel(job)
         say(f"{job.name!r} is at its cap of {job.cap_calls} calls; the rest is cancelled.")
     lost = job.augmentations.filter(state__in=(State.FAILED, State.CANCELLED))
-    reasons = "; ".join(sorted(set(lost.exclude(reason="").values_list("reason", flat=True))))
     rest = job.scenarios.exclude(pk__in=lost.values("scenario")).values_list("slug", flat=True)
+    reasons = "; ".join(sorted(set(lost.values_list("reason", flat=True)) - {""}))
     # The stand-ins have no cap, and never fail.
     if not rest or (now.failed and job.cap_calls is None):
         raise DemoFailed(reasons or f"{job.name!r} has no scenario that all of it have done.")
@@ -337,17 +330,15 @@ def vote_and_rate(
     scenarios: list[str], folder: Path, own: OwnModel | None = None
 ) -> tuple[str, list[Path]]:
     """Return the table of a study with simulated votes, and the files that it is written to."""
-    name = demo.SIMULATED_STUDY
-    contestants: tuple[str, ...] = demo.RATED
-    if own is not None:
-        name = f"Demo with {own.name[:80]} (simulated votes)"
-        contestants += own.contestants
-    study = demo.hold_study(scenarios=scenarios, name=name, contestants=contestants)
-    if own is not None:
-        # Of a few pairs most are decided already.
-        open_to_try(OPEN_STUDY_WITH_MODEL, contestants, scenarios, 2 * len(scenarios))
-    else:
+    if own is None:
+        study = demo.hold_study(scenarios=scenarios)
         open_to_try(OPEN_STUDY, *choose_visible(scenarios))
+    else:
+        name = f"Demo with {own.name[:80]} (simulated votes)"
+        rated = (*demo.RATED, *own.contestants)
+        study = demo.hold_study(scenarios=scenarios, name=name, contestants=rated)
+        # Of a few pairs most are decided already.
+        open_to_try(OPEN_STUDY_WITH_MODEL, rated, scenarios, 2 * len(scenarios))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []
