@@ -148,7 +148,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "first": first,
         "scenarios": scene.scenarios.only("base_scene", "code", "slug", "instruction"),
         "notes": note_sentences(scene.notes),
-        "found": {name: len(scene.document.get(name, ())) for name in PARTS}
+        "facts": {name: len(scene.document.get(name, ())) for name in PARTS}
         | {
             "provenance": scene.provenance,
             "recorded_s": scene.recording["times_s"][-1] if scene.recording else 0.0,
