@@ -10,8 +10,8 @@ function refresh() {
     const all = group.querySelector("[data-all]");
     if (!all) continue;
     const ticked = members(group).filter((box) => box.checked).length;
-    const said = group.querySelector("[data-ticked]");
-    if (said) said.textContent = ticked ? `: ${ticked} chosen` : "";
+    const count = group.querySelector("[data-ticked]");
+    if (count) count.textContent = ticked ? `: ${ticked} chosen` : "";
     all.checked = ticked > 0 && ticked === members(group).length;
     all.indeterminate = ticked > 0 && !all.checked;
   }
@@ -33,17 +33,17 @@ function refresh() {
 
 // The estimate of a new job comes with the page that its button would bring.
 const estimate = form.querySelector("[data-estimate]");
-let asked = 0;
+let requests = 0;
 
 async function askEstimate() {
-  const mine = ++asked;
+  const mine = ++requests;
   const sent = new FormData(form);
   sent.set("estimate", "1");
   const answer = await fetch(form.action, { method: "POST", body: sent });
-  if (!answer.ok || mine !== asked) return;
+  if (!answer.ok || mine !== requests) return;
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-  const found = page.querySelector("[data-estimate]");
-  if (found && mine === asked) estimate.replaceChildren(...found.childNodes);
+  const fresh = page.querySelector("[data-estimate]");
+  if (fresh && mine === requests) estimate.replaceChildren(...fresh.childNodes);
 }
 
 if (estimate) {

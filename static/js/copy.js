@@ -13,11 +13,11 @@ for (const button of document.querySelectorAll("[data-copy]")) {
       if (!document.execCommand("copy")) return;
     }
     const label = button.querySelector("[data-label]");
-    const said = label.textContent;
-    if (said === button.dataset.copied) return;
+    const before = label.textContent;
+    if (before === button.dataset.copied) return;
     label.textContent = button.dataset.copied;
     setTimeout(() => {
-      label.textContent = said;
+      label.textContent = before;
     }, 2000);
   });
 }

@@ -15,21 +15,21 @@ export class Lane {
   /** Where a point lies, and the lane's heading there. */
   project(x_m, y_m) {
     const last = this.parts.length - 1;
-    const found = this.parts.map((part, index) => {
+    const places = this.parts.map((part, index) => {
       const [dx, dy] = [x_m - part.x, y_m - part.y];
       const along = dx * part.ux + dy * part.uy;
       const t = Math.min(Math.max(along, index ? 0 : -Infinity), index < last ? part.length : Infinity);
       const away = Math.hypot(dx - t * part.ux, dy - t * part.uy);
       return { away, ahead_m: part.s + t, left_m: dy * part.ux - dx * part.uy, heading: Math.atan2(part.uy, part.ux) };
     });
-    return found.reduce((best, one) => (one.away < best.away ? one : best));
+    return places.reduce((best, place) => (place.away < best.away ? place : best));
   }
 
   /** Where an agent comes to with another place along or beside the lane, and how it turns with it. */
   move(agent, name, value) {
     const before = this.project(agent.x_m, agent.y_m);
     const [s, d] = name === "ahead_m" ? [value, before.left_m] : [before.ahead_m, value];
-    const part = this.parts.findLast((one) => one.s <= s) ?? this.parts[0];
+    const part = this.parts.findLast((part) => part.s <= s) ?? this.parts[0];
     const t = s - part.s;
     const [x, y] = [part.x + t * part.ux - d * part.uy, part.y + t * part.uy + d * part.ux];
     return { x, y, turn: Math.atan2(part.uy, part.ux) - before.heading };

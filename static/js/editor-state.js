@@ -34,7 +34,7 @@ export class Edit {
   everyone() {
     const moved = new Map(this.change.move.map((agent) => [agent.id, agent]));
     const gone = new Set(this.change.remove);
-    const known = this.scene.agents.map((agent) => {
+    const recorded = this.scene.agents.map((agent) => {
       if (gone.has(agent.id)) return [agent, "removed"];
       return moved.has(agent.id) ? [moved.get(agent.id), "moved"] : [agent, "kept"];
     });

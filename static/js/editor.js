@@ -18,12 +18,12 @@ const stage = new Stage(svg, scene, words.picture);
 const lane = new Lane(scene.route);
 const numbers = form.querySelector("[data-numbers]");
 const list = form.querySelector("[data-list]");
-const said = form.querySelector("[data-findings]");
+const findings = form.querySelector("[data-findings]");
 const showSentence = makeSentence(form);
 const degrees = 180 / Math.PI;
 let armed = false;
 let isDirty = false;
-let asked = 0;
+let requests = 0;
 let timer = 0;
 
 // Null for what is no JSON.
@@ -87,9 +87,9 @@ function showNumbers() {
     const isTyped = document.activeElement === input && input.dataset.field !== "preset";
     if (!isTyped) input.value = shown(agent, input.dataset.field);
   }
-  const known = scene.presets[shown(agent, "preset")];
-  for (const name of ["within_m", "number"]) numberOf(name).closest(".field").hidden = !known;
-  if (known) numberOf("number").labels[0].textContent = known.number;
+  const preset = scene.presets[shown(agent, "preset")];
+  for (const name of ["within_m", "number"]) numberOf(name).closest(".field").hidden = !preset;
+  if (preset) numberOf("number").labels[0].textContent = preset.number;
 }
 
 function numberOf(name) {
@@ -120,7 +120,7 @@ function take() {
 
 function changed() {
   take();
-  asked += 1; // what is under way is about what was before
+  requests += 1; // what is under way is about what was before
   clearTimeout(timer);
   timer = setTimeout(() => check().catch(fail), 250);
 }
@@ -129,7 +129,7 @@ function changed() {
 // whoever it names moves so.
 async function check(snapped = "", modification = edit.document, preset = null) {
   clearTimeout(timer);
-  const mine = ++asked;
+  const mine = ++requests;
   const answer = await fetch(words.check, {
     method: "POST",
     headers: { "Content-Type": "application/json", "X-CSRFToken": form.elements.csrfmiddlewaretoken.value },
@@ -143,21 +143,21 @@ async function check(snapped = "", modification = edit.document, preset = null) 
       type: form.elements.type?.value || form.elements.own_type?.value || "",
     }),
   });
-  if (mine !== asked) return;
+  if (mine !== requests) return;
   if (!answer.ok) throw new Error(String(answer.status));
-  const found = await answer.json();
-  if (mine !== asked) return;
-  if (found.modification) Object.assign(edit, { presets: found.presets ?? {}, ways: found.ways ?? {} });
-  if ((snapped || preset) && found.modification) {
+  const reply = await answer.json();
+  if (mine !== requests) return;
+  if (reply.modification) Object.assign(edit, { presets: reply.presets ?? {}, ways: reply.ways ?? {} });
+  if ((snapped || preset) && reply.modification) {
     edit.begin();
-    edit.change = Edit.read(found.modification);
+    edit.change = Edit.read(reply.modification);
     take();
   } else show();
-  tell(found);
+  tell(reply);
 }
 
-function tell(found) {
-  const lines = found.problem ? [{ severity: "wrong", label: words.wrong, sentence: found.problem }] : found.lines;
+function tell(answer) {
+  const lines = answer.problem ? [{ severity: "wrong", label: words.wrong, sentence: answer.problem }] : answer.lines;
   const items = lines.map(({ severity, label, sentence }) => {
     const item = document.createElement("li");
     const badge = document.createElement("span");
@@ -166,9 +166,9 @@ function tell(found) {
     item.append(badge, ` ${sentence}`);
     return item;
   });
-  said.replaceChildren(...items);
-  form.querySelector("[data-fine]").hidden = Boolean(found.problem) || lines.some((one) => one.severity !== "fact");
-  if (found.statements) showAsked(found);
+  findings.replaceChildren(...items);
+  form.querySelector("[data-fine]").hidden = Boolean(answer.problem) || lines.some((line) => line.severity !== "fact");
+  if (answer.statements) showAsked(answer);
 }
 
 // What the drawing asks for, and the sentence that it makes, until somebody types another.
@@ -188,9 +188,9 @@ function fail() {
 
 // A preset that was chosen has its usual numbers.
 function move(agent_id, isNew) {
-  const given = (name) => (isNew || numberOf(name).value === "" ? null : Number(numberOf(name).value));
+  const read = (name) => (isNew || numberOf(name).value === "" ? null : Number(numberOf(name).value));
   const preset = numberOf("preset").value || null;
-  const wish = { agent_id, preset, within_m: given("within_m"), number: given("number") };
+  const wish = { agent_id, preset, within_m: read("within_m"), number: read("number") };
   return check("", edit.document, wish).catch(fail);
 }
 

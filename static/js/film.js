@@ -69,7 +69,7 @@ export class View {
     this.pen.fillRect(0, 0, this.width, this.height);
     this.drawRoad(colours);
     if (options.proposals) this.drawProposals(at, colours);
-    for (const one of this.trace.objects) this.drawObject(one, at, colours);
+    for (const object of this.trace.objects) this.drawObject(object, at, colours);
     const ego = this.trace.ego;
     this.drawBox(ego.poses[at], ego.length_m, ego.width_m, colours.ego, colours.ink, 2);
     this.drawText(at, colours);
@@ -93,7 +93,7 @@ export class View {
   }
 
   drawProposals(step, colours) {
-    const plan = this.trace.plans.findLast((one) => one.step <= step);
+    const plan = this.trace.plans.findLast((plan) => plan.step <= step);
     if (!plan) return;
     const order = plan.scores.map((score, n) => [score, n]).sort((a, b) => a[0] - b[0]);
     for (const [score, n] of order) {
@@ -106,12 +106,12 @@ export class View {
     this.stroke(best, colours.high, 4);
   }
 
-  drawObject(one, step, colours) {
-    const still = one.poses.length === 1 && one.first === 0;
-    const pose = still ? one.poses[0] : one.poses[step - one.first];
+  drawObject(object, step, colours) {
+    const still = object.poses.length === 1 && object.first === 0;
+    const pose = still ? object.poses[0] : object.poses[step - object.first];
     if (!pose) return;
-    const colour = one.changed ? colours.changed : colours.other;
-    this.drawBox(pose, one.length_m, one.width_m, colour, colours.ink, one.changed ? 2 : 1);
+    const colour = object.changed ? colours.changed : colours.other;
+    this.drawBox(pose, object.length_m, object.width_m, colour, colours.ink, object.changed ? 2 : 1);
   }
 
   drawBox([x, y, heading], length, width, colour, ink, line) {
@@ -132,8 +132,8 @@ export class View {
     this.pen.font = "600 14px sans-serif";
     this.pen.fillStyle = braking ? colours.low : colours.ink;
     const mark = braking ? " ■" : "";
-    const said = `${(step * this.trace.step_s).toFixed(1)} s   ${speed.toFixed(1)} m/s${mark}`;
-    this.say(said, 26, colours);
+    const time = `${(step * this.trace.step_s).toFixed(1)} s   ${speed.toFixed(1)} m/s${mark}`;
+    this.say(time, 26, colours);
     // A scale of 10 m.
     const y = this.height - 14;
     this.pen.fillRect(14, y, 10 * this.scale, 3);
@@ -222,11 +222,11 @@ export function coloursIn(place) {
   const probe = document.createElement("i");
   place.append(probe);
   const names = ["ground", "road", "edge", "walk", "lane", "ego", "changed", "other", "ink", "low", "high"];
-  const found = {};
+  const colours = {};
   for (const name of names) {
     probe.style.color = `var(--drive-${name})`;
-    found[name] = getComputedStyle(probe).color;
+    colours[name] = getComputedStyle(probe).color;
   }
   probe.remove();
-  return found;
+  return colours;
 }

@@ -23,7 +23,7 @@ export async function load(urls) {
     if (!grounds.has(shown)) grounds.set(shown, Object.assign(new Image(), { src: ground }));
   }
   await Promise.all([...grounds.values()].map((ground) => ground.decode()));
-  return films.map((one) => ({ ...one, ground: grounds.get(one.window) }));
+  return films.map((film) => ({ ...film, ground: grounds.get(film.window) }));
 }
 
 function drawing({ fill, stroke, width, points = [], disc }) {
@@ -254,10 +254,10 @@ export class Player {
       if (pose) canvas.dispatchEvent(new CustomEvent("egomoved", { bubbles: true, detail: pose.slice(0, 2) }));
     });
     this.range.value = Math.round(this.step);
-    const said = `${(this.step * this.films[0].step_s).toFixed(1)} s`;
-    if (said === this.clock.textContent) return;
-    this.clock.textContent = said;
-    this.range.setAttribute("aria-valuetext", said);
+    const time = `${(this.step * this.films[0].step_s).toFixed(1)} s`;
+    if (time === this.clock.textContent) return;
+    this.clock.textContent = time;
+    this.range.setAttribute("aria-valuetext", time);
   }
 
   #tell() {

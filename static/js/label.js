@@ -1,11 +1,11 @@
 // Keys 1, 2 and 3 tick the faults, Enter saves; in the note they are what is typed.
 const form = document.getElementById("label");
 const boxes = [...form.querySelectorAll("input[type=checkbox]")];
-const said = form.querySelector("[data-none]");
+const note = form.querySelector("[data-none]");
 let isSent = false;
 
 function tell() {
-  said.textContent = boxes.some((box) => box.checked) ? said.dataset.some : said.dataset.none;
+  note.textContent = boxes.some((box) => box.checked) ? note.dataset.some : note.dataset.none;
 }
 
 for (const box of boxes) box.addEventListener("change", tell);

@@ -24,11 +24,11 @@ async function hasMoved() {
   const progress = await answer.json();
   newest = answer.headers.get("ETag") ?? "";
   if (progress.is_over) {
-    const said = document.getElementById("said");
-    said.textContent =
+    const announcement = document.getElementById("said");
+    announcement.textContent =
       progress.settled < progress.total
-        ? said.dataset.stopped.replace("{}", progress.settled)
-        : said.dataset.all;
+        ? announcement.dataset.stopped.replace("{}", progress.settled)
+        : announcement.dataset.all;
   }
   const isFirst = shown === "";
   if (isFirst) shown = newest;
@@ -77,13 +77,13 @@ async function showAnew() {
 }
 
 async function loop() {
-  const asked = performance.now();
+  const startedAt = performance.now();
   try {
     if ((await hasMoved()) && (await showAnew())) return;
   } catch {
     // The network may be back at the next turn.
   }
-  const took = performance.now() - asked;
+  const took = performance.now() - startedAt;
   setTimeout(loop, Math.max(document.hidden ? HIDDEN_MS : SHOWN_MS, PAUSE_PER_ANSWER * took));
 }
 
