@@ -142,10 +142,13 @@ def find_media(folder: str = "") -> Iterator[str]:
         folders, files = default_storage.listdir(folder)
     except FileNotFoundError:  # nothing has been drawn yet
         return
-    for name in sorted(files):
-        if not name.startswith("."):  # half a file of a worker that was killed
-            yield f"{folder}{name}"
-    for name in sorted(folders):
+    # Hidden: half a file of a worker that was killed, and a backup that is being written here.
+    folders, files = (
+        sorted(name for name in names if not name.startswith(".")) for names in (folders, files)
+    )
+    for name in files:
+        yield f"{folder}{name}"
+    for name in folders:
         if f"{folder}{name}" not in (*FOLDERS, THUMBNAILS, COMPUTED):
             yield from find_media(f"{folder}{name}/")
 
