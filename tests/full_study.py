@@ -15,11 +15,10 @@ from django.utils import timezone
 from arena.models import Matchup, Study, Vote
 from arena.people.services import create_person
 from arena.studies.services.opening import close_study
-from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.codec import scene_to_document
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.entities import ScenarioType
 from tests.opening import open_study
-from tests.scenes import scene as street
+from tests.study_rows import scenario
 
 PAPERS = (
     ("interplan", "interPlan", "", 1042),
@@ -58,22 +57,12 @@ def contestants() -> list[Contestant]:
 
 
 def scenarios(number: int) -> list[Scenario]:
-    base = BaseScene.objects.create(
-        slug="street",
-        document=scene_to_document(street(name="street")),
-        source="authored",
-        provenance="a test",
-    )
+    made = [scenario(f"place-{index:02d}") for index in range(number)]
     types = list(ScenarioType)
-    return [
-        Scenario.objects.create(
-            slug=f"place-{index:02d}",
-            base_scene=base,
-            type=types[index % len(types)],
-            instruction=f"Park a car on place {index}.",
-        )
-        for index in range(number)
-    ]
+    for index, row in enumerate(made):
+        row.type = types[index % len(types)]
+        row.save()
+    return made
 
 
 def pictures(places: Sequence[Scenario], rated: Sequence[Contestant], image: str = "") -> None:

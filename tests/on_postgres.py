@@ -18,7 +18,7 @@ from tests.environment import roomy_memory
 FILES = (
     "exports/test_study_folder",
     *("jobs/test_budget", "jobs/test_call_limits", "jobs/test_cancelling", "jobs/test_cap"),
-    *("jobs/test_leases", "jobs/test_lock_order", "jobs/test_workers"),
+    *("jobs/test_leases", "jobs/test_workers"),
     *("services/test_append_only", "services/test_backups", "services/test_costs"),
     *("services/test_refused_backups", "services/test_submissions", "services/test_uploads"),
     "services/test_work",

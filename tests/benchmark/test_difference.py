@@ -96,7 +96,6 @@ def test_a_format_of_others_gives_what_it_can_say(
     name: str, change: Modification, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     content = through(name, change, tmp_path_factory.mktemp("there"))
-    assert content.scene is not None
     view = identify(show_source(TASK, name), content)
     found, _ = find_difference(street(), content.scene, view)
     assert are_alike(found, said(name, change)), (found, said(name, change))
@@ -194,7 +193,6 @@ def _that_waits(name: str, *, for_whom: str) -> TrafficAgent:
 
 def test_what_a_format_can_not_say_is_named_and_stays(tmp_path: Path) -> None:
     content = through("commonroad", Modification(removed=("Agent2",)), tmp_path)
-    assert content.scene is not None
     view = identify(show_source(TASK, "commonroad"), content)
     found, notes = find_difference(street(), content.scene, view)
     assert found == Modification(removed=("Agent2",))

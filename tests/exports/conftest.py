@@ -9,3 +9,13 @@ def drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         "arena.exports.drawing.compute_once", lambda suffix, compute, *parts: compute()
     )
+
+
+@pytest.fixture
+def no_charts(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_charts(monkeypatch)
+
+
+def without_charts(patch: pytest.MonkeyPatch) -> None:
+    """Draw no chart: for files of which others are looked at."""
+    patch.setattr("arena.exports.drawing.compute_once", lambda *_: b"a chart")

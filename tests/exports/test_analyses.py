@@ -43,7 +43,6 @@ def a_job() -> GenerationJob:
 
 def answer(job: GenerationJob, scenario: Scenario, contestant: Contestant, off_m: float) -> None:
     reference = LoadedScenario(scenario).reference
-    assert reference is not None
     moved = tuple(replace(one, x_m=one.x_m + off_m) for one in reference.added)
     rows.add_answer(job, scenario, contestant, Modification(added=moved))
 

@@ -20,23 +20,11 @@ def run(*arguments: object) -> str:
     return out.getvalue()
 
 
-def open_arguments(**changes: object) -> list[object]:
+def open_arguments() -> list[object]:
     cast = cast_of()
-    options = {"votes_per_expert": 6, "seed": 1, **changes}
-    return [
-        "open_study",
-        "Round 1",
-        "--contestants",
-        *cast["contestants"],
-        "--scenarios",
-        *cast["scenarios"],
-        "--experts",
-        *cast["experts"],
-        "--votes-per-expert",
-        options["votes_per_expert"],
-        "--seed",
-        options["seed"],
-    ]
+    shown = ["--contestants", *cast["contestants"], "--scenarios", *cast["scenarios"]]
+    people = ["--experts", *cast["experts"], "--votes-per-expert", 6, "--seed", 1]
+    return ["open_study", "Round 1", *shown, *people]
 
 
 def test_a_study_is_opened_closed_rated_and_exported_by_commands(tmp_path: Path) -> None:

@@ -26,11 +26,7 @@ def job() -> GenerationJob:
     """Two contestants on two scenarios of one scene of nuPlan's."""
     launched = rows.launch(scenarios=2, contestants=("ann", "bob"))
     BaseScene.objects.update(source="nuplan", source_item=BASE)
-    for row in launched.augmentations.all():
-        for name, value in rows.done().columns.items():
-            setattr(row, name, value)
-        row.state = Augmentation.State.DONE
-        row.save()
+    launched.augmentations.update(state=Augmentation.State.DONE, **rows.done().columns)
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     return launched
 

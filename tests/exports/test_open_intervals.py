@@ -26,24 +26,24 @@ FEW = (
 )
 
 
+def rated(folder: Path, *lines: str, rounds: int) -> Snapshot:
+    """The rating of votes that were read from a file."""
+    path = folder / "votes.csv"
+    path.write_text("\n".join(["model_a,model_b,winner", *lines]) + "\n")
+    call_command("import_votes", str(path), "--name", "Open", stdout=io.StringIO())
+    return rate(study=Study.objects.get(name="Open"), rounds=rounds)
+
+
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def snapshot(tmp_path: Path) -> Snapshot:
     """Best won all, weak lost nearly all, few has six votes; four are close to each other."""
-    lines = ["model_a,model_b,winner"]
+    lines = []
     for one, other in combinations("abcd", 2):
         lines += [f"{one},{other},model_a"] * 40 + [f"{one},{other},model_b"] * 38
     lines += [f"best,{one},model_a" for one in "abcd" for _ in range(30)]
     lines += [f"{one},weak,model_a" for one in "abcd" for _ in range(60)] + ["a,weak,model_b"]
     lines += ["few,a,model_a", "few,a,model_a", "few,a,model_b"] * 2
-    path = tmp_path / "votes.csv"
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
-@pytest.fixture
-def snapshot(file: Path) -> Snapshot:
-    call_command("import_votes", str(file), "--name", "Open", stdout=io.StringIO())
-    return rate(study=Study.objects.get(name="Open"), rounds=1000)
+    return rated(tmp_path, *lines, rounds=1000)
 
 
 def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(snapshot: Snapshot) -> None:
@@ -68,9 +68,6 @@ def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(snapshot:
 
 
 def test_nobody_is_first_where_everybody_would_be(tmp_path: Path) -> None:
-    path = tmp_path / "votes.csv"
-    path.write_text("model_a,model_b,winner\n" + "a,b,model_a\na,b,model_b\n" * 40)
-    call_command("import_votes", str(path), "--name", "Even", stdout=io.StringIO())
-    table = leaderboard_table(rate(study=Study.objects.get(name="Even"), rounds=100))
+    table = leaderboard_table(rated(tmp_path, *["a,b,model_a", "a,b,model_b"] * 40, rounds=100))
     assert [row.rank for row in table.rows] == [None, None]
     assert NOT_RANKED in table.reasons

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
-from django.core.management import call_command
+from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
 
@@ -18,11 +19,14 @@ from arena.exports.written_files import MadeFile, keep_file
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.studies.services.opening import product_version
+from augment.formats.interplan.file import scene_token
 from augment.formats.writers import WRITERS
-from augment.models import BaseScene, Contestant, GenerationJob
+from augment.models import BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import scene_from_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
-from augment.services.scenarios.scenes import NewScenario, add_scenario
+from augment.services.scenarios.catalogue import load_catalogue
+from augment.services.scenarios.scenes import LoadedScenario, NewScenario, add_scenario
+from tests.fixtures.shelf import FOLDER
 from tests.jobs import rows
 from tests.scenes import junction, pedestrian, vehicle
 
@@ -156,10 +160,30 @@ def test_a_zip_that_a_newer_one_overtook_leaves_no_file(
     held = {row: SCENARIO_FILES.take(row.pk) for row in (slow, fast)}
     with django_capture_on_commit_callbacks(execute=True):
         for row in (fast, slow):
-            lease = held[row]
-            assert lease is not None
-            keep_file(row, lease, MadeFile(name="a.zip", content=ContentFile(b"zip")))
+            keep_file(row, held[row], MadeFile(name="a.zip", content=ContentFile(b"zip")))
     (left,) = ScenarioFile.objects.all()
     assert (left, left.is_waiting) == (fast, False)
     assert default_storage.exists(left.stored)
     assert not default_storage.exists(f"{ScenarioFile.FOLDER}/{slow.code}.zip")
+
+
+INTERPLAN = ("crash-mill-junction", "overtake-mill-junction", "nudge-ferry-road")
+
+
+def test_a_job_goes_to_interplans_file_and_who_refused_is_named(tmp_path: Path) -> None:
+    load_catalogue(folder=FOLDER)
+    Scenario.objects.filter(slug__in=INTERPLAN).update(keep_traffic=False)
+    job = GenerationJob.objects.create(name="Round 1")
+    reference, rule = rows.add_kind("reference"), rows.add_kind("rule", Contestant.Kind.RULE)
+    for scenario in Scenario.objects.filter(slug__in=INTERPLAN):
+        rows.add_answer(job, scenario, reference, LoadedScenario(scenario).reference)
+        rows.add_answer(job, scenario, rule)
+    said = export("--format", "interplan", "--out", str(tmp_path / "interplan.zip"))
+    assert "Left out: crash-mill-junction by rule: there is no modification: refused." in said
+    with zipfile.ZipFile(tmp_path / "interplan.zip") as archive:
+        (name,) = [one for one in archive.namelist() if one.endswith(".yaml")]
+        details = yaml.safe_load(archive.read(name))["modification_details_dictionary"]
+    assert set(details) == {scene_token("mill-junction"), scene_token("ferry-road")}
+    assert list(details[scene_token("mill-junction")]["special_scenario"]) == ["0", "1"]
+    with pytest.raises(CommandError, match=r"Unknown contestant 'nobody'. Known: reference, rule"):
+        export("--format", "interplan", "--contestant", "nobody", "--out", "-")

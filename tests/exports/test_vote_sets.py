@@ -4,18 +4,21 @@ import csv
 import io
 import json
 from datetime import datetime
+from typing import Any
 
 import pytest
+from django.contrib.auth.models import User
 from django.template.loader import render_to_string
 from pyarrow import parquet
 
 from arena.exports.files import sha256_hex
 from arena.models import Snapshot, Study, Vote
+from arena.people.links import mark_author
 from arena.rating.vote_columns import COLUMNS
 from arena.results.api import SnapshotDocument
 from arena.results.exports.tables import leaderboard_table, method_text
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.exports.writers import FORMATS, RATING_FILES, plain_text
+from arena.results.exports.writers import FORMATS, RATING_FILES, bundle_files, plain_text
 from arena.results.pages.tabs import TABS
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import Filters, last_vote_id, vote_set
@@ -24,9 +27,10 @@ from arena.results.services.ratings import rate_now as rate
 from arena.results.services.vote_files import vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
-from augment.models import Scenario
+from augment.models import Event, Scenario
 from augment.scene.entities import ScenarioType
 from tests.append_only import rewriting
+from tests.full_study import Size, full_study
 from tests.study_rows import a_study, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -63,6 +67,7 @@ def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:
     assert found.left_out == {}
 
 
+@pytest.mark.usefixtures("no_charts")
 def test_settled_pairs_are_ties_of_experts_but_no_judgements_of_theirs() -> None:
     study = a_study(votes_per_expert=6)
     study.rules["identical"] = [[f"place-{n}", "ann", "bob"] for n in range(6)]
@@ -169,10 +174,10 @@ def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
     names = {found.counted[0].judge: "=cmd|calc"}
     lines = list(csv.DictReader(io.StringIO(votes_csv(vote_rows(found.counted, names)).decode())))
     assert tuple(lines[0]) == COLUMNS
-    assert [line["winner"] for line in lines] == ["model_a", "model_b", "tie (bothbad)"]
-    assert [line["side"] for line in lines] == ["left", "right", ""]
+    told = [(line["winner"], line["side"], line["ms_visible"]) for line in lines]
+    wanted = [("model_a", "left", "1200"), ("model_b", "right", "")]
+    assert told == [*wanted, ("tie (bothbad)", "", "")]
     assert lines[0]["model_a"] == first.left.contestant.slug
-    assert (lines[0]["ms_visible"], lines[1]["ms_visible"]) == ("1200", "")
     assert {line["judge"] for line in lines} == {"'=cmd|calc"}
 
 
@@ -183,23 +188,17 @@ def test_a_vote_is_exported_with_all_that_was_kept_of_it() -> None:
     said = {"comment": "=both\nturn", "aids": ("zoom", "ruler"), "strength": "slightly"}
     kept = vote(first, "left", **said)
     vote(second, "skip", reason="unclear", comment="never in the file")
-    snapshot = rate(study=close_study(study=study), rounds=10)
-    (line,) = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
-    assert datetime.fromisoformat(line["at"]) == kept.at.replace(
-        microsecond=kept.at.microsecond // 1000 * 1000
-    )
-    assert (line["position"], line["aids"]) == (str(first.position), "zoom ruler")
-    assert line["comment"] == "'=both turn", "no formula, one line"
-    assert line["strength"] == "slightly"
-    assert (line["augmentation_a"], line["augmentation_b"]) == (
-        str(first.left.code),
-        str(first.right.code),
-    )
-    (row,) = parquet.read_table(
-        io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot)))
-    ).to_pylist()
+    table = vote_table(rate(study=close_study(study=study), rounds=10))
+    (line,) = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(table).decode()))
+    milliseconds = kept.at.microsecond // 1000 * 1000
+    assert datetime.fromisoformat(line["at"]) == kept.at.replace(microsecond=milliseconds)
+    wanted = {"position": str(first.position), "aids": "zoom ruler", "strength": "slightly"}
+    wanted |= {"augmentation_a": str(first.left.code), "augmentation_b": str(first.right.code)}
+    wanted |= {"comment": "'=both turn"}  # no formula, one line
+    assert {name: line[name] for name in wanted} == wanted
+    (row,) = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(table))).to_pylist()
     assert (row["position"], row["comment"]) == (first.position, "=both\nturn")
-    assert row["augmentation_b"] == str(first.right.code)
+    assert row["augmentation_b"] == wanted["augmentation_b"]
 
 
 def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
@@ -215,3 +214,35 @@ def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
     assert VOTE_FORMATS["csv"].write(vote_table(snapshot)) == before
     table = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(vote_table(snapshot))))
     assert tuple(table.column_names) == COLUMNS[:10]
+
+
+SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
+AUTHOR, OWN = "expert-1", "gpt-4o-otm"
+
+
+def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
+    return {row.slug: (row.rank, row.rating, row.votes) for row in snapshot.standings.all()}
+
+
+@pytest.mark.usefixtures("no_charts")
+def test_they_count_unless_a_rating_leaves_them_out_and_no_file_says_whose() -> None:
+    study = full_study(size=SIZE)
+    plain = rate(study=study, rounds=50)
+    author = User.objects.get(username=AUTHOR)
+    mark_author(study=study, expert=author, contestant=OWN)
+    counted = rate(study=study, rounds=50)
+    assert "authors" not in str(Event.objects.filter(verb="rate").latest("pk").after)
+    assert (counted.votes_sha256, table_of(counted)) == (plain.votes_sha256, table_of(plain))
+    left = rate(study=study, rounds=50, filters=Filters(leave_out_own=True))
+    own, code = left.votes_left_out["own"], str(author.person.code)
+    assert own > 0
+    assert left.votes_counted == counted.votes_counted - own
+    assert left.votes_sha256 != counted.votes_sha256
+    theirs = [vote for vote in read_votes(left).counted if vote.judge == code]
+    assert theirs
+    assert not any(OWN in (vote.left, vote.right) for vote in theirs)
+    files = bundle_files(Snapshot.objects.get(pk=left.pk))
+    manifest = json.loads(files["manifest.json"])
+    assert (manifest["filters"]["leave_out_own"], manifest["filters"]["authors"]) == (True, 1)
+    assert manifest["votes"]["left_out"] == left.votes_left_out
+    assert code.encode() not in b"".join(files.values())

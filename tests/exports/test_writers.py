@@ -1,7 +1,6 @@
 import csv
 import io
 import json
-from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -9,6 +8,8 @@ import pytest
 
 from arena.exports.latex import escape
 from arena.models import Snapshot, Study
+from arena.rating.comparisons import Estimate
+from arena.rating.lines import whole_percent
 from arena.results.exports.tables import (
     EARLY_LOOK,
     SIMULATED_TABLE,
@@ -17,6 +18,7 @@ from arena.results.exports.tables import (
     for_experts,
 )
 from arena.results.exports.writers import FORMATS
+from arena.templatetags.results import estimate, percent
 
 PAPER = (
     ("interPlan", "", 1, 1042, 9, 11, 1960),
@@ -26,23 +28,12 @@ PAPER = (
 
 
 def row(model: str, variant: str = "", **changes: object) -> Row:
-    made = Row(
-        name=model,
-        variant=variant,
-        slug=model.lower(),
-        kind="llm",
-        is_simulated=False,
-        rank=1,
-        rating=1000.0,
-        lower=990.0,
-        upper=1010.0,
-        votes=10,
-        wins=4,
-        ties=3,
-        losses=3,
-        note="",
-    )
-    return replace(made, **changes)  # type: ignore[arg-type]
+    made: dict[str, Any] = {
+        **{"name": model, "variant": variant, "slug": model.lower(), "kind": "llm"},
+        **{"is_simulated": False, "rank": 1, "rating": 1000.0, "lower": 990.0, "upper": 1010.0},
+        **{"votes": 10, "wins": 4, "ties": 3, "losses": 3, "note": ""},
+    }
+    return Row(**made | changes)
 
 
 def table(
@@ -66,20 +57,12 @@ def latex(given: LeaderboardTable) -> str:
 
 
 def papers_rows() -> list[Row]:
-    return [
-        row(
-            name,
-            variant,
-            rank=rank,
-            rating=elo + 0.2,
-            lower=float(elo - low),
-            upper=float(elo + up),
-            votes=votes,
-            rank_best=1,
-            rank_worst=3,
-        )
-        for name, variant, rank, elo, low, up, votes in PAPER
-    ]
+    made = []
+    for name, variant, rank, elo, low, up, votes in PAPER:
+        found = {"rank": rank, "rating": elo + 0.2, "lower": float(elo - low)}
+        found |= {"upper": float(elo + up), "votes": votes, "rank_best": 1, "rank_worst": 3}
+        made.append(row(name, variant, **found))
+    return made
 
 
 def test_latex_has_the_form_of_the_papers_table() -> None:
@@ -135,31 +118,18 @@ def parsed(given: LeaderboardTable) -> list[dict[str, str]]:
 
 def test_csv_has_a_line_per_contestant() -> None:
     first, *_ = parsed(table(*papers_rows()))
-    assert first["model"] == "interPlan"
-    assert (first["rank"], first["elo"], first["lower"], first["upper"]) == (
-        "1",
-        "1042.20",
-        "1033.00",
-        "1053.00",
-    )
-    assert (first["votes"], first["wins"], first["ties"], first["losses"]) == (
-        "1960",
-        "4",
-        "3",
-        "3",
-    )
-    assert (first["simulated"], first["study_simulated"]) == ("no", "no")
+    wanted = {"model": "interPlan", "rank": "1", "elo": "1042.20", "lower": "1033.00"}
+    wanted |= {"upper": "1053.00", "votes": "1960", "wins": "4", "ties": "3", "losses": "3"}
+    wanted |= {"simulated": "no", "study_simulated": "no"}
+    assert {name: first[name] for name in wanted} == wanted
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n"])
 def test_no_cell_is_a_formula(start: str) -> None:
     line = parsed(table(row(f"{start}cmd|calc", note=f"{start}1"), study=f"{start}x"))[0]
-    kept = start.replace("\r", " ").replace("\n", " ")
-    assert [line["model"], line["note"], line["study"]] == [
-        f"'{kept}cmd|calc",
-        f"'{kept}1",
-        f"'{kept}x",
-    ]
+    kept = "'" + start.replace("\r", " ").replace("\n", " ")
+    cells = [line[name] for name in ("model", "note", "study")]
+    assert cells == [f"{kept}cmd|calc", f"{kept}1", f"{kept}x"]
 
 
 def test_a_negative_rating_is_a_number_not_a_formula() -> None:
@@ -188,7 +158,14 @@ def test_json_has_everything_that_makes_the_table_again() -> None:
     assert [first[key] for key in wanted] == ["interPlan", 1, 1042.2, 1033.0, 1053.0, 1960]
 
 
-@pytest.mark.parametrize("name", FORMATS)
-def test_every_format_is_byte_identical_for_the_same_table(name: str) -> None:
-    given = table(*papers_rows(), row("No $votes", rating=None, lower=None, upper=None, rank=None))
-    assert FORMATS[name].write(given) == FORMATS[name].write(given)
+@pytest.mark.parametrize(
+    ("share", "shown"),
+    [(0.0, 0), (0.005, 0), (0.015, 2), (0.425, 42), (0.575, 58), (0.995, 100), (1.0, 100)],
+)
+def test_a_half_goes_to_the_even_number(share: float, shown: int) -> None:
+    assert whole_percent(share) == shown
+
+
+def test_pages_print_it_so() -> None:
+    assert percent(0.575) == "58 %"
+    assert "58 %" in estimate(Estimate(value=0.575, lower=0.425, upper=0.995), "percent")

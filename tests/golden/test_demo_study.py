@@ -132,19 +132,19 @@ def digest(path: Path) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def test_tables_of_the_study_are_what_they_were(demo_folder: Path, check: Check) -> None:
+def test_tables_and_folder_of_the_study_are_what_they_were(
+    demo_folder: Path, check: Check, tmp_path: Path
+) -> None:
     for suffix in ("csv", "json", "tex"):
         check(f"leaderboard.{suffix}", (demo_folder / f"leaderboard.{suffix}").read_text())
     job = GenerationJob.objects.get()
     for by in (By.TYPE, By.VARIANT):
         table = displacement_table(job, by=by)
         check(f"displacement-{by.value}.csv", DISPLACEMENT["csv"].write(table).decode())
+    check_folder(tmp_path / "study", check)
 
 
-def test_the_folder_of_the_study_is_what_it_was(
-    demo_folder: Path, check: Check, tmp_path: Path
-) -> None:
-    out = tmp_path / "study"
+def check_folder(out: Path, check: Check) -> None:
     write_study(Study.objects.get(name=SIMULATED_STUDY), out, say=print)
     manifest = json.loads((out / MANIFEST).read_text())
     del manifest["study"]["rules"]["entries"]  # all pictures, which `media` has as well

@@ -25,7 +25,7 @@ from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps, Room
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import JobRequest, JobScope
-from augment.services.running.runner import AUGMENTATIONS, Held
+from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, only_row
 from tests.variants.playing import GOOD
@@ -33,6 +33,7 @@ from tests.variants.playing import GOOD
 pytestmark = pytest.mark.django_db
 
 ROW, JOB = Augmentation.State, GenerationJob.State
+NANO, INSTANT = 1_000_000, timedelta(microseconds=1)
 ONE_USD = Price(prompt_usd=Decimal(1), completion_usd=Decimal(1))
 WORST = WorstCase(prompt_tokens=600, completion_tokens=400)
 
@@ -134,50 +135,32 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
     served = ModelCall.objects.get(served_from__isnull=False)
-    assert served.attempt is not None
     assert (served.attempt.number, served.number, served.answer) == (2, 1, "Sorry?")
     assert (served.cost_nano_usd, served.spent_tokens) == (0, 0)
-    assert served.served_from is not None
-    assert served.served_from.attempt is not None
     assert served.served_from.attempt.number == 1
     assert job.spent_calls == 2
 
 
 def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
     job = llama_job(price="1")
-    row = only_row(job)
-    long_ago = timezone.now() - timedelta(minutes=1)
-    held = AUGMENTATIONS.take(row.pk, now=long_ago)
-    assert held is not None
-    in_flight(job, held)
-    AUGMENTATIONS.take_back_lost(now=timezone.now())
-    job.refresh_from_db()
+    call = in_flight_when_lost(job)
     assert (job.reserved_calls, job.spent_calls) == (0, 1)
     assert (job.spent_tokens, job.spent_nano_usd) == (1000, 1_000_000)
-    call = ModelCall.objects.get()
     assert call.is_cost_estimated
     assert call.fault == "nobody saw the end: its worker stopped"
 
 
 def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
     job = llama_job(price="1")
-    held = AUGMENTATIONS.take(only_row(job).pk, now=timezone.now() - timedelta(minutes=1))
-    assert held is not None
-    in_flight(job, held, is_sent=False)
-    AUGMENTATIONS.take_back_lost(now=timezone.now())
+    call = in_flight_when_lost(job, is_sent=False)
     assert_nothing_is_counted(job)
-    call = ModelCall.objects.get()
     assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
     assert call.fault == "not sent: its worker stopped while it waited for a place"
 
 
 def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     job = llama_job(price="1")
-    row = only_row(job)
-    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
-    assert held is not None
-    call = in_flight(job, held)
-    AUGMENTATIONS.take_back_lost(now=timezone.now())
+    call = in_flight_when_lost(job)
     used = budget.settle_reply(reply(), worst=WORST, price=ONE_USD)
     budget.settle(call=call, used=used, now=timezone.now())
     job.refresh_from_db()
@@ -185,12 +168,16 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
-def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelCall:
-    assert (
-        budget.reserve(jobs=GenerationJob.objects.filter(pk=job.pk), worst=WORST, price=ONE_USD)
-        == Room.TAKEN
-    )
-    return ModelCall.objects.create(
+def reserve(job: GenerationJob) -> Room:
+    asked = GenerationJob.objects.filter(pk=job.pk)
+    return budget.reserve(jobs=asked, worst=WORST, price=ONE_USD)
+
+
+def in_flight_when_lost(job: GenerationJob, *, is_sent: bool = True) -> ModelCall:
+    """A call of a worker that was taken for dead meanwhile."""
+    held = AUGMENTATIONS.take(only_row(job).pk, now=timezone.now() - timedelta(minutes=1))
+    assert reserve(job) == Room.TAKEN
+    call = ModelCall.objects.create(
         attempt=Attempt.objects.get(augmentation=held.pk),
         number=1,
         role="modifier",
@@ -200,6 +187,10 @@ def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelC
         reserved_tokens=WORST.tokens,
         reserved_nano_usd=WORST.nano_usd(ONE_USD),
     )
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
+    job.refresh_from_db()
+    call.refresh_from_db()
+    return call
 
 
 def test_a_money_cap_needs_every_price() -> None:
@@ -222,11 +213,6 @@ def test_a_money_cap_needs_every_price() -> None:
 def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
     with pytest.raises(InvalidDocument, match="goes from 1"):
         given.columns()
-
-
-NANO = 1_000_000
-
-INSTANT = timedelta(microseconds=1)
 
 
 @pytest.mark.parametrize(
@@ -263,10 +249,7 @@ def test_a_cap_has_room_up_to_its_last_unit(
     columns |= {f"spent_{name}": value for name, value in spent.items()}
     columns |= {f"reserved_{name}": value for name, value in reserved.items()}
     GenerationJob.objects.update(**columns)
-    assert (
-        budget.reserve(jobs=GenerationJob.objects.filter(pk=job.pk), worst=WORST, price=ONE_USD)
-        == room
-    )
+    assert reserve(job) == room
     after = GenerationJob.objects.get()
     taken = int(room == Room.TAKEN)
     assert after.reserved_tokens == reserved.get("tokens", 0) + 1000 * taken
@@ -304,15 +287,9 @@ def test_when_a_start_no_longer_counts_for_its_minute(
 
 def test_without_earlier_runs_only_the_calls_are_known() -> None:
     add_llama(price="2")
-    for number in range(4):
-        add_scenario(f"street-{number}")
     add_kind("reference")
-    found = estimate(
-        JobScope(
-            contestants=["llama", "reference"],
-            scenarios=[f"street-{number}" for number in range(4)],
-        )
-    )
+    places = [add_scenario(f"street-{number}").slug for number in range(4)]
+    found = estimate(JobScope(contestants=["llama", "reference"], scenarios=places))
     (line,) = found.lines
     assert (found.rows, found.asking_rows, line.seen) == (8, 4, 0)
     assert line.calls == (4, 4, 8)
@@ -331,9 +308,6 @@ def test_after_a_run_it_is_what_was_used() -> None:
     assert line.usd == Decimal("0.00604")
 
 
-DONE = Augmentation.State.DONE
-
-
 def again(*, is_fresh: bool = False) -> GenerationJob:
     return jobs.launch(
         JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"], is_fresh=is_fresh)
@@ -345,7 +319,7 @@ def test_the_same_request_is_answered_once_and_the_copy_costs_nothing() -> None:
     first = ran(llama_job(price="1"), model)
     job = again()
     second = ran(job, model)
-    assert (second.state, second.modification) == (DONE, first.modification)
+    assert (second.state, second.modification) == (ROW.DONE, first.modification)
     assert len(model.requests) == 1
     source, copy = ModelCall.objects.order_by("pk")
     assert (copy.served_from, copy.answer, copy.request) == (source, source.answer, source.request)
@@ -361,7 +335,7 @@ def test_a_fault_is_no_answer() -> None:
     ran(job, broken)
     jobs.retry_failed(job)
     model = Model()
-    assert ran(job, model).state == DONE
+    assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == 1
 
 
@@ -388,5 +362,5 @@ def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> No
     job.refresh_from_db()
     assert job.spent_tokens > 0
     whole = Model()
-    assert ran(again(), whole).state == DONE
+    assert ran(again(), whole).state == ROW.DONE
     assert len(whole.requests) == 1

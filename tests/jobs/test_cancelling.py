@@ -73,7 +73,6 @@ def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     job = llama_job()
     row = only_row(job)
     held = AUGMENTATIONS.take(row.pk)
-    assert held is not None
     endpoint = Endpoint.objects.get()
     Endpoint.objects.update(max_concurrency=1)
     client = runner.open_wire(endpoint, held)

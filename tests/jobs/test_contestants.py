@@ -1,5 +1,7 @@
+import json
+import logging
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from decimal import Decimal
 from importlib import import_module
 from io import StringIO
@@ -7,7 +9,9 @@ from typing import Any
 
 import pytest
 from django.apps import apps
+from django.conf import LazySettings
 from django.core.management import CommandError, call_command
+from django.urls import reverse
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.fake_llm.server import FakeServer, running
@@ -36,30 +40,26 @@ from augment.services.endpoints.known_endpoints import (
 from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
 from augment.services.running.jobs import JobRequest
+from augment.services.running.transcript_records import full_transcript
 from augment.variants.respondents import ModelRole
 from tests.intents import known
 from tests.jobs.models import llama_job, ran
 from tests.jobs.rows import add_scenario, only_row
 from tests.llm.json_server import recorder
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"
 
 
-def local(*, is_simulated: bool = False, key_variable: str = "") -> Endpoint:
-    return ensure_endpoint(
-        EndpointRequest(
-            label="local", base_url=LOCAL, is_simulated=is_simulated, key_variable=key_variable
-        )
-    )
+def local() -> Endpoint:
+    return ensure_endpoint(EndpointRequest(label="local", base_url=LOCAL))
 
 
 def add(slug: str = "llama-otm", **changes: Any) -> Contestant:
-    facts: dict[str, Any] = {
-        "variant": "OTM",
-        "endpoint": "local",
-        "model": "llama3.1:70b",
-    } | changes
+    facts: dict[str, Any] = {"variant": "OTM", "endpoint": "local", "model": "llama3.1:70b"}
+    facts |= changes
+    facts["roles"] = {ModelRole(role): seat for role, seat in facts.get("roles", {}).items()}
     return contestants.add_contestant(ContestantRequest(slug=slug, **facts))
 
 
@@ -85,7 +85,6 @@ def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatc
         add(endpoint="openai")
     monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
     made = add(endpoint="openai", model="gpt-4o")
-    assert made.endpoint is not None
     assert made.endpoint.base_url == "https://api.openai.com/v1"
     assert made.endpoint.key_variable == "OPENAI_API_KEY"
     assert known_endpoints.read_key(made.endpoint) == "sk-very-secret"
@@ -100,7 +99,6 @@ def test_an_endpoint_is_moved_only_where_that_is_asked_for_and_it_is_logged() ->
     change_endpoint(row, facts=EndpointFacts(base_url="http://127.0.0.1:9/v1/"))
     assert Endpoint.objects.get().base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
-    assert event.before is not None
     assert event.before["base_url"] == LOCAL
 
 
@@ -122,7 +120,6 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
 
 
 SECRETS = ("ARENA_SECRET_KEY", "DATABASE_URL", "REDIS_URL", "AWS_SECRET_ACCESS_KEY", "HOME")
-URL = "http://127.0.0.1:9/v1"
 
 
 @pytest.mark.parametrize(
@@ -263,28 +260,10 @@ def wire(endpoint: Endpoint) -> Iterator[ChatClient]:
         yield client
 
 
-def opened(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
-    return wire(endpoint)
-
-
 def add_roles(variant: str, **roles: tuple[str | None, str]) -> Contestant:
-    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
-    ensure_endpoint(EndpointRequest(label="there", base_url="http://127.0.0.1:2/v1"))
-    return contestants.add_contestant(
-        ContestantRequest(
-            slug="one",
-            variant=variant,
-            endpoint="here",
-            model="text-model",
-            roles={ModelRole(role): seat for role, seat in roles.items()},
-        )
-    )
-
-
-def sees(model: str, endpoint: str, *, vision: bool | None) -> None:
-    EndpointModel.objects.update_or_create(
-        endpoint=Endpoint.objects.get(label=endpoint), model=model, defaults={"vision": vision}
-    )
+    for port, label in enumerate(("here", "there"), start=1):
+        ensure_endpoint(EndpointRequest(label=label, base_url=f"http://127.0.0.1:{port}/v1"))
+    return add("one", variant=variant, endpoint="here", model="text-model", roles=roles)
 
 
 def test_roles_are_stored_by_label_and_model() -> None:
@@ -318,50 +297,40 @@ def test_a_simulated_reviewer_makes_a_simulated_contestant() -> None:
 def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
     add_roles("vqa", viewer=("there", "eyes"))
     add_scenario("street-1")
-    sees("text-model", "here", vision=True)
+    EndpointModel.objects.filter(model="text-model").update(vision=True)
+    asked = JobRequest(name="J", contestants=["one"], scenarios=["street-1"])
     with pytest.raises(Conflict) as raised:
-        jobs.launch(JobRequest(name="J", contestants=["one"], scenarios=["street-1"]))
+        jobs.launch(asked)
     obstacle = find_obstacle(Contestant.objects.get())
     assert "viewer eyes at there sees pictures" in obstacle
     assert f"one: {obstacle}" in str(raised.value)
     assert not GenerationJob.objects.exists()
     EndpointModel.objects.filter(model="eyes").update(vision=True)
     assert find_obstacle(Contestant.objects.get()) == ""
-    jobs.launch(JobRequest(name="J", contestants=["one"], scenarios=["street-1"]))
+    jobs.launch(asked)
 
 
 def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
     add_roles("tqa", reviewer=("there", "boss"))
     add_scenario("street-1")
     EndpointModel.objects.filter(model="text-model").update(price_in_usd=1, price_out_usd=2)
+    capped = JobRequest(name="J", contestants=["one"], scenarios=["street-1"], cap_usd=Decimal(1))
     with pytest.raises(Conflict, match="boss at there"):
-        jobs.launch(
-            JobRequest(name="J", contestants=["one"], scenarios=["street-1"], cap_usd=Decimal(1))
-        )
+        jobs.launch(capped)
 
 
 def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     with running(known=known) as other:
-        ensure_endpoint(EndpointRequest(label="a", base_url=server.url, is_simulated=True))
-        ensure_endpoint(EndpointRequest(label="b", base_url=other.url, is_simulated=True))
-        contestants.add_contestant(
-            ContestantRequest(
-                slug="two",
-                variant="fc-plus+vqa",
-                endpoint="a",
-                model="fake-qa-low",
-                roles={
-                    ModelRole.VIEWER: ("b", "fake-careless"),
-                    ModelRole.ENGINEER: ("b", "fake-good"),
-                },
-            )
-        )
+        for label, url in (("a", server.url), ("b", other.url)):
+            ensure_endpoint(EndpointRequest(label=label, base_url=url, is_simulated=True))
+        roles = {"viewer": ("b", "fake-careless"), "engineer": ("b", "fake-good")}
+        add("two", variant="fc-plus+vqa", endpoint="a", model="fake-qa-low", roles=roles)
         add_scenario("street-1")
         EndpointModel.objects.filter(model="fake-qa-low").update(native_tools=True)
         EndpointModel.objects.filter(model="fake-careless").update(vision=True)
         job = jobs.launch(JobRequest(name="J", contestants=["two"], scenarios=["street-1"]))
         row = only_row(job)
-        ran(row, opened)
+        ran(row, wire)
     assert row.state == Augmentation.State.DONE, row.reason
     asked = [
         (call.role[0], call.request["model"]) for call in ModelCall.objects.order_by("number")
@@ -370,7 +339,65 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     assert asked == [low, low, boss, eyes, boss] * 2
     first = ModelCall.objects.get(number=1)
     assert first.request["tools"][0]["function"]["name"] == "pose_on_lane"
-    assert first.extras is not None
     assert first.extras["tool_calls"][0]["name"] == "pose_on_lane"
     kinds = list(row.attempts.get().notes.values_list("kind", flat=True))
     assert kinds == ["tool_call", "round", "review"] * 2 + ["kept"]
+
+
+KEY = "sk-planted-0123456789abcdef"
+ECHO = {
+    "id": KEY,
+    "object": "chat.completion",
+    "created": 0,
+    "model": f"m {KEY}",
+    "choices": [
+        {
+            "index": 0,
+            "finish_reason": KEY,
+            "message": {"role": "assistant", "content": f"You sent Bearer {KEY}."},
+        }
+    ],
+    "usage": {"prompt_tokens": 1, "completion_tokens": 1, "total_tokens": 2},
+}
+REFUSED = {"error": {"message": f"Incorrect API key provided: {KEY}", "code": KEY}}
+
+
+def every_stored_value() -> Iterator[str]:
+    """All columns of all rows of all tables, as text."""
+    for model in apps.get_models(include_auto_created=True):
+        for row in model._default_manager.values():
+            yield f"{model.__name__} {row}"
+
+
+@pytest.mark.parametrize(("status", "body"), [(200, ECHO), (401, REFUSED)])
+def test_a_planted_key_is_found_nowhere(
+    settings: LazySettings,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    status: int,
+    body: object,
+) -> None:
+    monkeypatch.setenv("PLANTED_API_KEY", KEY)
+    settings.KEY_VARIABLES = ["PLANTED_API_KEY=127.0.0.1"]
+    caplog.set_level(logging.DEBUG)
+    row = only_row(llama_job())
+    with recorder(status, body) as server:
+        Endpoint.objects.update(base_url=server.url, key_variable="PLANTED_API_KEY")
+        runner.AUGMENTATIONS.perform(row.pk, worker="w")
+        assert server.heard[0]["authorization"] == f"Bearer {KEY}", "it was planted"
+    row.refresh_from_db()
+    assert row.state in (Augmentation.State.UNREADABLE, Augmentation.State.FAILED)
+    assert ModelCall.objects.exists()
+
+    staff = signed_in(people()["admin"])
+    pages = [
+        staff.get(reverse(name, args=[code])).content.decode()
+        for name, code in (
+            ("augmentation", row.code),
+            ("transcript", row.code),
+            ("job", row.job.code),
+        )
+    ]
+    kept = [*every_stored_value(), caplog.text, json.dumps(full_transcript(row)), *pages]
+    assert [text[:200] for text in kept if KEY in text] == []
+    assert any("[key]" in text for text in kept), "the server did echo it"

@@ -21,7 +21,7 @@ PLANNER = "tests.jobs.test_simulations.Straight"
 @pytest.fixture
 def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Five streets, each with a cone further to the left; the last two are passed."""
-    monkeypatch.setitem(STEPS, False, 40)
+    monkeypatch.setitem(STEPS, False, 26)
     cells = [
         Cell(
             name=f"cone {n}",

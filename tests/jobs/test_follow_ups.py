@@ -60,7 +60,7 @@ def server() -> Iterator[Scripted]:
         yield made
 
 
-def two_steps(*, intents: bool = False) -> tuple[Scenario, Scenario]:
+def two_steps() -> tuple[Scenario, Scenario]:
     """A car and two cones; then the car becomes a bus 4 m further on, and the cones stay."""
     stay = cones(40.0, 2, Shape.LINE).requests
     asked = [
@@ -87,6 +87,14 @@ def launched(*contestants: str) -> list[Augmentation]:
     """The rows of a job on the follow-up alone, each behind the one that it follows."""
     job = jobs.launch(JobRequest(name="J", contestants=contestants, scenarios=["street-then-1"]))
     return list(job.augmentations.order_by("contestant__slug", "scenario__slug"))
+
+
+def two_waiting(server: Scripted, *script: str, variant: str = "otm") -> list[Augmentation]:
+    """Ann's two rows, at a server that says these things in turn."""
+    two_steps()
+    add(server, "ann", variant)
+    server.script = list(script or server.script)
+    return launched("ann")
 
 
 def run(*waiting: Augmentation) -> None:
@@ -121,9 +129,7 @@ def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
 def test_a_worker_that_has_done_the_first_sends_the_follow_up(
     server: Scripted, broker: Broker
 ) -> None:
-    two_steps()
-    add(server, "ann")
-    first, second = launched("ann")
+    first, second = two_waiting(server)
     tasks.enqueue_job(first.job_id)
     assert len(broker) == 1
     tasks.work.run("augmentation", first.pk)
@@ -132,11 +138,9 @@ def test_a_worker_that_has_done_the_first_sends_the_follow_up(
 
 
 def test_it_goes_on_from_the_round_that_counted(server: Scripted) -> None:
-    two_steps()
-    add(server, "ann", "tqa")
-    server.script = [car(10.0), rating(2, 2, 2, "a"), car(20.0), rating(3, 4, 4, "b"), car(30.0)]
-    server.script += [rating(1, 1, 1, "c"), car(24.0), rating(5, 5, 5)]
-    first, second = launched("ann")
+    script = [car(10.0), rating(2, 2, 2, "a"), car(20.0), rating(3, 4, 4, "b"), car(30.0)]
+    script += [rating(1, 1, 1, "c"), car(24.0), rating(5, 5, 5)]
+    first, second = two_waiting(server, *script, variant="tqa")
     run(first, second)
     talk = server.bodies[6]["messages"]
     assert talk[-2]["content"] == car(20.0)
@@ -152,10 +156,7 @@ def test_it_goes_on_from_the_round_that_counted(server: Scripted) -> None:
 def test_whoever_has_no_answer_of_its_own_has_none_to_the_follow_up(
     server: Scripted, said: str, state: str
 ) -> None:
-    two_steps()
-    add(server, "ann")
-    server.script = [said]
-    first, second = launched("ann")
+    first, second = two_waiting(server, said)
     run(first)
     asked = len(server.bodies)
     run(second)
@@ -174,10 +175,7 @@ def test_whoever_has_no_answer_of_its_own_has_none_to_the_follow_up(
 def test_a_refused_follow_up_keeps_the_last_answer_and_the_next_goes_on(
     server: Scripted, said: str, state: str, shown_m: list[float]
 ) -> None:
-    two_steps()
-    add(server, "ann")
-    server.script = [car(20.0), said, car(22.0)]
-    first, second = launched("ann")
+    first, second = two_waiting(server, car(20.0), said, car(22.0))
     run(first, second)
     assert (second.state, bool(second.reason)) == (state, state == State.REFUSED)
     assert [one["x_m"] for one in (second.modification or {})["add"]] == shown_m
@@ -191,11 +189,8 @@ def test_a_refused_follow_up_keeps_the_last_answer_and_the_next_goes_on(
 
 
 def test_a_fault_of_the_first_is_one_of_the_second_and_both_run_again(server: Scripted) -> None:
-    two_steps()
-    add(server, "ann")
-    first, second = launched("ann")
+    first, second = two_waiting(server)
     held = AUGMENTATIONS.take(first.pk)
-    assert held is not None
     assert held.settle(rows.failed())
     run(second)
     assert (second.state, second.reason) == (
@@ -211,16 +206,13 @@ def test_a_fault_of_the_first_is_one_of_the_second_and_both_run_again(server: Sc
 def test_somebody_says_what_to_change_and_may_go_back_and_say_something_else(
     server: Scripted,
 ) -> None:
-    first_scenario, _ = two_steps()
-    add(server, "ann")
-    server.script = [car(20.0), car(22.0), car(18.0)]
-    first, _ = launched("ann")
+    first, _ = two_waiting(server, car(20.0), car(22.0), car(18.0))
     run(first)
     further = ask_follow_up(first, FollowUpRequest(instruction="Further.", cap_calls=3))
     nearer = ask_follow_up(first, FollowUpRequest(instruction="Nearer."))
     assert further.job.cap_calls == 3
     scenario = further.scenario
-    assert (scenario.slug, scenario.follows) == ("street-then-2", first_scenario)
+    assert (scenario.slug, scenario.follows) == ("street-then-2", first.scenario)
     assert (scenario.retired_at is None, scenario.reference) == (False, None)
     run(further, nearer)
     placed = [(row.modification or {})["add"][0]["x_m"] for row in (first, further, nearer)]
@@ -272,12 +264,9 @@ def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the
     found = {one.row.pk: one for one in of_job(good.job)}
     assert found[good_first.pk].kept == ()
     best = found[good.pk]
-    assert best.displacement is not None
     assert best.displacement.error_m == pytest.approx(0.0, abs=0.01)
-    assert best.kept_summary is not None
     assert (best.kept_summary.to_keep, best.kept_summary.kept) == (2, 2)
     worse = found[careless.pk].kept_summary
-    assert worse is not None
     assert (worse.to_keep, worse.kept) == (2, 0)
 
 
@@ -294,10 +283,8 @@ def test_a_message_with_calls_comes_back_as_it_was_written() -> None:
 def test_the_page_the_api_and_the_command_say_what_comes_next(
     server: Scripted, broker: Broker
 ) -> None:
-    two_steps()
-    add(server, "ann")
-    server.script = [car(20.0), answer(block(agent(type="BUS", y_m=1.0), agent(id="Agent3")))]
-    first, second = launched("ann")
+    bus = answer(block(agent(type="BUS", y_m=1.0), agent(id="Agent3")))
+    first, second = two_waiting(server, car(20.0), bus)
     run(first, second)
     admin = people()["admin"]
     browser, page = signed_in(admin), f"/augmentations/{second.code}/"

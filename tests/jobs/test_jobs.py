@@ -16,26 +16,19 @@ State = Augmentation.State
 Job = GenerationJob.State
 
 
-def test_a_job_gets_one_waiting_row_per_cell() -> None:
-    add_kind("rule-placer", Contestant.Kind.RULE)
-    job = launch(scenarios=3, contestants=("reference", "rule-placer"))
-    assert job.state == GenerationJob.State.RUNNING
+def test_a_launch_makes_a_waiting_row_for_each_cell_and_is_logged() -> None:
+    for slug in ("reference", "rule"):
+        add_kind(slug, Contestant.Kind.RULE)
+    scenarios = [add_scenario(f"street-{number}").slug for number in range(3)]
+    admin, contestants = User.objects.create_user("admin"), ["reference", "rule"]
+    asked = JobRequest(name="R", contestants=contestants, scenarios=scenarios)
+    job = jobs.launch(asked, actor=admin)
+    assert (job.state, job.launched_by) == (GenerationJob.State.RUNNING, admin)
     assert count_rows(job).by_state == dict.fromkeys(State, 0) | {State.QUEUED: 6}
     assert set(job.augmentations.values_list("sent_at", flat=True)) == {None}
-
-
-def test_a_launch_is_logged_with_who_and_what() -> None:
-    add_kind("reference")
-    add_scenario("street")
-    admin = User.objects.create_user("admin")
-    job = jobs.launch(
-        JobRequest(name="R", contestants=["reference"], scenarios=["street"]), actor=admin
-    )
     event = Event.objects.get()
-    assert job.launched_by == admin
     assert (event.actor, event.verb, event.object_code) == (admin, "launch", str(job.code))
-    assert event.after is not None
-    assert (event.after["name"], event.after["contestants"]) == ("R", ["reference"])
+    assert (event.after["name"], event.after["contestants"]) == ("R", contestants)
 
 
 def test_the_reference_can_not_run_where_there_is_none() -> None:

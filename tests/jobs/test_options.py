@@ -41,71 +41,40 @@ def png_widths(bodies: Bodies) -> list[int]:
     return [struct.unpack(">I", header)[0] for header in headers]
 
 
-def text(bodies: Bodies) -> str:
-    return json.dumps(bodies[0]["messages"])
+def sends(calls: int) -> Callable[[Bodies], bool]:
+    return lambda bodies: len(bodies) == calls
 
 
+def are_wide(*px: int) -> Callable[[Bodies], bool]:
+    return lambda bodies: png_widths(bodies) == [*px]
+
+
+def have_form(*each: bool) -> Callable[[Bodies], bool]:
+    return lambda bodies: ["response_format" in body for body in bodies] == [*each]
+
+
+def shows_far(is_shown: bool) -> Callable[[Bodies], bool]:
+    return lambda bodies: ("[60,0]" in json.dumps(bodies[0]["messages"])) is is_shown
+
+
+def has_tools(are_there: bool) -> Callable[[Bodies], bool]:
+    return lambda bodies: ("tools" in bodies[0]) is are_there
+
+
+EFFORT, MOST = "reasoning_effort", "max_completion_tokens"
 TABLE: list[tuple[str, str, object, Callable[[Bodies], bool], Callable[[Bodies], bool]]] = [
     ("temperature", "tqa", 0.7, every("temperature", 0.7), every("temperature", None)),
     ("seed", "tqa", 41, every("seed", 41), every("seed", None)),
-    (
-        "reasoning_effort",
-        "tqa",
-        "low",
-        every("reasoning_effort", "low"),
-        every("reasoning_effort", None),
-    ),
-    (
-        "max_output_tokens",
-        "tqa",
-        500,
-        every("max_completion_tokens", 500),
-        every("max_completion_tokens", 8192),
-    ),
-    (
-        "protocol",
-        "fc",
-        "native",
-        lambda bodies: "tools" in bodies[0],
-        lambda bodies: "tools" not in bodies[0],
-    ),
-    ("rounds", "tqa", 2, lambda bodies: len(bodies) == 4, lambda bodies: len(bodies) == 6),
-    (
-        "accepted_from",
-        "tqa",
-        3.0,
-        lambda bodies: len(bodies) == 2,
-        lambda bodies: len(bodies) == 6,
-    ),
-    (
-        "radius_m",
-        "otm",
-        30.0,
-        lambda bodies: "[60,0]" not in text(bodies),
-        lambda bodies: "[60,0]" in text(bodies),
-    ),
-    (
-        "prompt_version",
-        "otm",
-        prompt_version(),
-        lambda bodies: len(bodies) == 1,
-        lambda bodies: len(bodies) == 1,
-    ),
-    (
-        "picture_px",
-        "vqa",
-        600,
-        # Too small in the first picture, what was changed is enlarged in another.
-        lambda bodies: png_widths(bodies) == [600, 600],
-        lambda bodies: png_widths(bodies) == [1200],
-    ),
-    (
-        "block",
-        "otm",
-        "schema",
-        lambda bodies: ["response_format" in body for body in bodies] == [False, True],
-        lambda bodies: ["response_format" in body for body in bodies] == [False],
-    ),
+    (EFFORT, "tqa", "low", every(EFFORT, "low"), every(EFFORT, None)),
+    ("max_output_tokens", "tqa", 500, every(MOST, 500), every(MOST, 8192)),
+    ("protocol", "fc", "native", has_tools(True), has_tools(False)),
+    ("rounds", "tqa", 2, sends(4), sends(6)),
+    ("accepted_from", "tqa", 3.0, sends(2), sends(6)),
+    ("radius_m", "otm", 30.0, shows_far(False), shows_far(True)),
+    ("prompt_version", "otm", prompt_version(), sends(1), sends(1)),
+    # Too small in the first picture, what was changed is enlarged in another.
+    ("picture_px", "vqa", 600, are_wide(600, 600), are_wide(1200)),
+    ("block", "otm", "schema", have_form(False, True), have_form(False)),
 ]
 
 
@@ -129,7 +98,6 @@ def test_what_is_sent_is_what_the_option_says(
         assert as_told(server.bodies[:sent])
         # The default set is another one: nothing of it is answered from what this one got.
         assert by_default(server.bodies[sent:]) or name == "prompt_version"
-    assert told.options is not None
     assert told.options[name] == value
     assert full_transcript(told)["contestant"]["frozen_options"] == told.options
     assert full_transcript(told)["contestant"]["options"] == {name: value}

@@ -49,7 +49,7 @@ ACROSS = "add[0].y_m"
 @pytest.fixture(autouse=True)
 def allowed(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     settings.PLANNERS = (STRAIGHT.planner,)
-    monkeypatch.setitem(STEPS, False, 60)  # enough to come to whatever stands there
+    monkeypatch.setitem(STEPS, False, 40)  # enough to come to whatever stands there
 
 
 def parked(y_m: float) -> Modification:
@@ -58,9 +58,12 @@ def parked(y_m: float) -> Modification:
 
 def planned(low: float = 0.0, high: float = 3.5, count: int = 8) -> Sweep:
     """A sweep of how far to the left a car stands in front of one who never steers."""
+    return plan_sweep(scenario=add_parked(), request=asked(low=low, high=high, count=count))
+
+
+def add_parked() -> Scenario:
     document = modification_to_document(parked(0.0))
-    scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
-    return plan_sweep(scenario=scenario, request=asked(low=low, high=high, count=count))
+    return rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
 
 
 def asked(**changed: Any) -> SweepRequest:
@@ -78,7 +81,6 @@ def settle_others(**scores: float) -> None:
     """Let all others have driven: lawfully, with a score by value, or not where none is given."""
     trace, document = short_drive()
     for drive in Simulation.objects.exclude(planner=STRAIGHT.planner).select_related("swept"):
-        assert drive.swept is not None
         score = scores.get(f"at_{drive.swept.value:g}", 0.0)
         parts = {one["name"]: one["value"] for one in document["metrics"]["nuplan"]}
         parts |= {"no_ego_at_fault_collisions": float(score > 0.0)}
@@ -112,16 +114,19 @@ def test_the_threshold_is_that_of_driving_every_value_by_hand() -> None:
     assert (result.under_way, sweep.concluded_at) == (24, None)
 
 
-def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> None:
-    sweep = planned(1.0, 3.0, 3)
-    settle_others(at_1=0.5, at_2=0.8, at_3=0.1)
+def ended(sweep: Sweep, **scores: float) -> Sweep:
+    """The sweep, all of whose values were driven."""
+    settle_others(**scores)
     drive_tested()
     sweep.refresh_from_db()
+    return sweep
+
+
+def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> None:
+    sweep = ended(planned(1.0, 3.0, 3), at_1=0.5, at_2=0.8, at_3=0.1)
     kept = sweep.hardest
-    assert kept is not None
     assert sweep.concluded_at is not None
     reference = LoadedScenario(kept).reference
-    assert reference is not None
     assert (kept.slug, reference.added[0].y_m) == ("parked-1", 1.0)
     assert kept.instruction.endswith("(add[0].y_m: 1)")
     conclude(sweep.pk)
@@ -129,10 +134,7 @@ def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> Non
 
 
 def test_nothing_is_kept_where_nobody_solves_what_the_planner_fails() -> None:
-    sweep = planned(1.0, 3.0, 3)
-    settle_others(at_3=0.9)
-    drive_tested()
-    sweep.refresh_from_db()
+    sweep = ended(planned(1.0, 3.0, 3), at_3=0.9)
     assert sweep.concluded_at is not None
     assert sweep.hardest is None
 
@@ -142,12 +144,10 @@ def test_a_worker_that_dies_in_a_drive_or_after_the_last_one_loses_nothing() -> 
     settle_others(at_2=0.8)
     first, last = Simulation.objects.filter(planner=STRAIGHT.planner).order_by("pk")
     held = DRIVES.take(first.pk, now=rows.NOON)
-    assert held is not None
     assert DRIVES.take_back_lost(now=rows.NOON + rows.STALE * 10) == [first.pk]
     assert DRIVES.perform(first.pk)
     assert not DRIVES.perform(first.pk)
     again = DRIVES.take(last.pk)
-    assert again is not None
     assert not held.renew()
     outcome = DRIVES.run(last, again)
     assert again.settle(outcome)  # and dies before it concludes
@@ -167,16 +167,11 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
         scenario=scenario, request=asked(number=number, low=20.0, high=220.0, count=3)
     )
     near, middle, far = sweep_result(sweep).lines
-    assert near.row.modification is not None
     assert near.row.modification["add"][0]["x_m"] == pytest.approx(20.0, abs=0.5)
     assert (middle.row.modification, far.row.modification) == (None, None), "the lane ends"
     assert middle.row.reason
     assert not middle.drives
-    settle_others(at_20=0.4)
-    drive_tested()
-    sweep.refresh_from_db()
-    assert sweep.hardest is not None
-    assert LoadedScenario(sweep.hardest).intent == cones(20.0, 1, Shape.LINE)
+    assert LoadedScenario(ended(sweep, at_20=0.4).hardest).intent == cones(20.0, 1, Shape.LINE)
 
 
 @pytest.mark.parametrize("now", [cones(60.0, 1, Shape.LINE), parked_car(20.0)])
@@ -188,11 +183,7 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
         scenario=scenario, request=asked(number="requests[0].count", low=1.0, high=2.0)
     )
     enter_intent(scenario="cones", document=intent_to_document(now))
-    settle_others(at_2=0.4)
-    drive_tested()
-    sweep.refresh_from_db()
-    assert sweep.hardest is not None
-    assert LoadedScenario(sweep.hardest).intent is None
+    assert LoadedScenario(ended(sweep, at_2=0.4).hardest).intent is None
 
 
 @pytest.mark.parametrize(
@@ -207,8 +198,7 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
 def test_a_sweep_that_can_not_be_is_refused(
     changed: dict[str, Any], error: type[Exception], words: str
 ) -> None:
-    document = modification_to_document(parked(0.0))
-    scenario = rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
+    scenario = add_parked()
     with pytest.raises(error, match=words):
         plan_sweep(scenario=scenario, request=asked(**changed))
     assert not Sweep.objects.exists()
@@ -223,10 +213,7 @@ def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -
     assert [row.slug for row in made] == [f"cones-{n}" for n in range(1, len(made) + 1)]
     for row in made:
         intent, reference = LoadedScenario(row).intent, LoadedScenario(row).reference
-        assert intent is not None
-        assert reference is not None
         distance = intent.requests[0].spot.distance
-        assert distance is not None
         assert reference.added[0].x_m == pytest.approx(distance.low_m, abs=0.5)
         assert f"{distance} ahead" in row.instruction
     with pytest.raises(Conflict, match="1 to 100"):
@@ -243,8 +230,7 @@ def said(command: str, *arguments: str, **options: Any) -> str:
 
 @pytest.mark.slow
 def test_the_command_tells_the_values_and_where_the_planner_fails(tmp_path: Path) -> None:
-    document = modification_to_document(parked(0.0))
-    rows.add_scenario("parked", reference=document, intent=None, intent_origin="")
+    add_parked()
     how = {"low": 2.0, "high": 3.0, "count": 2}
     told = said("sweep", "parked", ACROSS, planner=STRAIGHT.planner, **how)
     assert f"2: {STRAIGHT.planner} 0.0 (fails); idm " in told

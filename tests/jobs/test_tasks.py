@@ -66,30 +66,25 @@ def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) ->
     assert len(broker) == 1
 
 
-def test_recover_leaves_alone_what_is_on_its_way(broker: Broker) -> None:
-    job = launch(scenarios=2)
-    tasks.enqueue_job(job.pk)
-    tasks.recover(now=timezone.now() + timedelta(minutes=5))
-    assert len(broker) == 2
-    tasks.recover(now=timezone.now() + timedelta(minutes=11))
-    assert len(broker) == 4
-
-
-def test_recover_sends_again_when_the_broker_has_forgotten(broker: Broker) -> None:
-    job = launch(scenarios=2)
-    tasks.enqueue_job(job.pk)
-    broker.purge()
-    tasks.recover(now=timezone.now())
-    assert len(broker) == 0
-    tasks.recover(now=timezone.now() + timedelta(minutes=1))
-    assert len(broker) == 2
-
-
-def test_a_worker_that_starts_sends_all_that_waits(broker: Broker) -> None:
-    job = launch(scenarios=2)
-    tasks.enqueue_job(job.pk)
-    tasks.recover(now=timezone.now(), at_start=True)
-    assert len(broker) == 4
+@pytest.mark.parametrize(
+    ("is_forgotten", "minutes", "at_start", "waiting"),
+    [
+        (False, 5, False, 2),
+        (False, 11, False, 4),
+        (True, 0, False, 0),
+        (True, 1, False, 2),
+        (False, 0, True, 4),
+    ],
+)
+def test_messages_are_sent_again_when_old_or_forgotten_and_as_a_worker_starts(
+    broker: Broker, is_forgotten: bool, minutes: int, at_start: bool, waiting: int
+) -> None:
+    tasks.enqueue_job(launch(scenarios=2).pk)
+    if is_forgotten:
+        broker.purge()
+        tasks.recover(now=timezone.now())  # looks what is waiting there
+    tasks.recover(now=timezone.now() + timedelta(minutes=minutes), at_start=at_start)
+    assert len(broker) == waiting
 
 
 def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: Broker) -> None:

@@ -3,10 +3,12 @@
 import csv
 import io
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from django.core.management import call_command
+from django.test import Client
 from django.urls import reverse
 
 from augment.llm.messages import request_hash
@@ -27,7 +29,9 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 
-def test_the_document_holds_the_whole_record() -> None:
+def test_the_document_holds_the_whole_record_and_is_a_line_of_its_jobs_file(
+    tmp_path: Path,
+) -> None:
     row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
     document = json.loads(json.dumps(full_transcript(row)))
     assert (document["format"], document["version"]) == ("scenario-arena/transcript", 3)
@@ -57,6 +61,10 @@ def test_the_document_holds_the_whole_record() -> None:
         "cost_usd": "0.01208",
         "is_cost_estimated": False,
     }
+    out = tmp_path / "all.jsonl"
+    call_command("export", "transcripts", row.job.name, "--out", str(out))
+    lines = [json.loads(line) for line in out.read_text().splitlines()]
+    assert lines == [document | {"images": sorted(document["images"])}]
 
 
 def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
@@ -100,7 +108,6 @@ def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
 
     row = ran(only_row(llama_job()), Model())
     call = ModelCall.objects.get()
-    assert call.attempt is not None
     note = TranscriptNote.objects.create(
         attempt=call.attempt,
         number=1,
@@ -159,29 +166,24 @@ def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
 EVIL = "<script>alert(1)</script>"
 
 
-def page_of(row: Augmentation) -> str:
-    answer = signed_in(people()["researcher"]).get(reverse("augmentation", args=[row.code]))
+def page_of(row: Augmentation, reader: Client | None = None) -> str:
+    reader = reader or signed_in(people()["researcher"])
+    answer = reader.get(reverse("augmentation", args=[row.code]))
     assert answer.status_code == 200
-    return " ".join(answer.content.decode().split())
+    return answer.content.decode()
 
 
-def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
-    shown = page_of(ran(only_row(llama_job(price="2")), Model()))
-    assert "Call 1, modifier" in shown
-    assert "2,900 tokens in, 120 out" in shown
-    assert "$0.0060" in shown
-    assert "A parked car ahead." in shown
+def test_pages_show_role_tokens_cost_and_answer_and_lead_from_a_copy_to_its_source() -> None:
+    reader, first = signed_in(people()["researcher"]), ran(llama_job(price="2"), Model())
+    shown = page_of(first, reader)
+    for part in ("Call 1, modifier", "2,900 tokens in, 120 out", "$0.0060", "A parked car ahead."):
+        assert part in shown
     assert "llama3.1-2407" in shown
     assert "Prompt version" in shown
-
-
-def test_a_call_from_the_store_is_marked_and_leads_to_its_source() -> None:
-    first = ran(only_row(llama_job(price="1")), Model())
     job = jobs.launch(JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"]))
-    shown = page_of(ran(only_row(job), Model()))
+    shown = page_of(ran(job, Model()), reader)
     assert "answered from the store" in shown
-    source = f"{reverse('augmentation', args=[first.code])}#call-1-1"
-    assert source in shown
+    assert f"{reverse('augmentation', args=[first.code])}#call-1-1" in shown
 
 
 def test_what_a_model_says_is_never_markup() -> None:

@@ -14,7 +14,7 @@ from bench.injected_faults import Tally, measure, shifted_share
 from tests.checks.worlds import findings
 from tests.scenes import scene, vehicle
 
-COUNT = 150
+COUNT = 105
 
 
 @pytest.fixture(scope="module")

@@ -67,7 +67,6 @@ def test_who_has_no_motion_keeps_its_distance_and_all_count_alike() -> None:
     for over_time in (found.over_time, summary.over_time):
         assert over_time is not None
         assert astuple(over_time) == pytest.approx(astuple(expected))
-    assert summary.box is not None
     assert summary.box.median_m == pytest.approx(expected.average_m)
     assert found.mean_m == pytest.approx(expected.average_m)
     assert found.error_m == pytest.approx(expected.average_m)

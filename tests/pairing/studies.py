@@ -55,9 +55,9 @@ def appearances(made: MatchupPlan) -> Counter[str]:
 
 
 def smallest_gap(mine: list[PlannedMatchup]) -> int:
-    """How many others lie at least between two showings of a scenario."""
+    """How many others lie at least between two showings of a scenario; many if none has two."""
     last: dict[str, int] = {}
-    gaps = [len(mine)]
+    gaps = [10_000]
     for matchup in mine:
         if matchup.scenario in last:
             gaps.append(matchup.position - last[matchup.scenario] - 1)

@@ -17,12 +17,9 @@ ENTRIES = tuple(
 
 
 def rules(votes: int) -> PlanRules:
+    experts = ("eva", "finn", "gil")
     return PlanRules(
-        entries=ENTRIES,
-        experts=("eva", "finn", "gil"),
-        votes_per_expert=votes,
-        seed=3,
-        challengers=NEW,
+        entries=ENTRIES, experts=experts, votes_per_expert=votes, seed=3, challengers=NEW
     )
 
 

@@ -19,14 +19,22 @@ from tests.properties import examples
 
 def twelve_by_forty(share: float, seed: int = 1) -> PlanRules:
     """Nine contestants on fifty scenarios: 480 votes on 1,800 units."""
-    entries = tuple(
-        Entry(scenario=f"s{scenario:02}", contestant=f"c{one}", picture=f"{scenario} {one}")
-        for scenario in range(50)
-        for one in range(9)
-    )
-    experts = tuple(f"e{number:02}" for number in range(12))
+    return overlapping(9, 50, 12, 40, share, seed)
+
+
+def overlapping(
+    contestants: int, scenarios: int, experts: int, votes: int, share: float, seed: int = 1
+) -> PlanRules:
     return PlanRules(
-        entries=entries, experts=experts, votes_per_expert=40, seed=seed, overlap_share=share
+        entries=tuple(
+            Entry(scenario=f"s{scenario:02}", contestant=f"c{one}", picture=f"{scenario} {one}")
+            for scenario in range(scenarios)
+            for one in range(contestants)
+        ),
+        experts=tuple(f"e{number:02}" for number in range(experts)),
+        votes_per_expert=votes,
+        seed=seed,
+        overlap_share=share,
     )
 
 
@@ -77,19 +85,11 @@ def test_it_is_honoured_wherever_there_are_votes_enough(
     contestants: int, scenarios: int, experts: int, votes: int, share: float
 ) -> None:
     votes = min(votes, scenarios * math.comb(contestants, 2))
-    entries = tuple(
-        Entry(scenario=f"s{scenario}", contestant=f"c{one}", picture=f"{scenario} {one}")
-        for scenario in range(scenarios)
-        for one in range(contestants)
-    )
-    names = tuple(f"e{number}" for number in range(experts))
-    asked = PlanRules(
-        entries=entries, experts=names, votes_per_expert=votes, seed=1, overlap_share=share
-    )
+    asked = overlapping(contestants, scenarios, experts, votes, share)
     made = plan(asked)
     judged, twice = shared(made)
     assert twice >= share * judged - 1e-9
-    assert Counter(one.expert for one in made.matchups) == dict.fromkeys(names, votes)
+    assert Counter(one.expert for one in made.matchups) == dict.fromkeys(asked.experts, votes)
 
 
 @pytest.mark.parametrize(("votes", "share"), [(20, 0.3), (40, 0.1)])
@@ -97,20 +97,7 @@ def test_experts_of_whom_each_has_scenarios_and_pairs_of_their_own_share_some(
     votes: int, share: float
 ) -> None:
     """Two on ninety scenarios: no exchange within their quotas brings anything together."""
-    entries = tuple(
-        Entry(scenario=f"s{scenario:02}", contestant=f"c{one}", picture=f"{scenario} {one}")
-        for scenario in range(90)
-        for one in range(8)
-    )
-    made = plan(
-        PlanRules(
-            entries=entries,
-            experts=("ada", "eva"),
-            votes_per_expert=votes,
-            seed=1,
-            overlap_share=share,
-        )
-    )
+    made = plan(overlapping(8, 90, 2, votes, share))
     judged, twice = shared(made)
     assert share * judged <= twice < share * (judged + 1) + 1, "as many as asked for, not one more"
     found = quotas(made)

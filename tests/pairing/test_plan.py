@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import _two_places
-from arena.pairing.plan import Entry, MatchupPlan, PlannedMatchup, PlanRules, plan
+from arena.pairing.plan import Entry, MatchupPlan, PlanRules, plan
+from tests.pairing.studies import by_expert, check_extras, pair
 from tests.properties import examples
 
 
@@ -36,10 +37,6 @@ def rules(
     return PlanRules(entries=entries, experts=names, votes_per_expert=votes, seed=seed)
 
 
-def pair(matchup: PlannedMatchup) -> frozenset[str]:
-    return frozenset((matchup.left, matchup.right))
-
-
 def spread(counts: Counter[object], places: int) -> int:
     """Most minus least, places that never occur counting as zero."""
     values = list(counts.values()) + [0] * (places - len(counts))
@@ -48,20 +45,9 @@ def spread(counts: Counter[object], places: int) -> int:
 
 def check_rules_hold(asked: PlanRules, made: MatchupPlan) -> None:
     """What holds for every plan, whatever was available."""
+    check_extras(asked, made)
+    assert by_expert(made).keys() == set(asked.experts)
     pictures = {(entry.scenario, entry.contestant): entry.picture for entry in asked.entries}
-    for expert in asked.experts:
-        mine = [matchup for matchup in made.matchups if matchup.expert == expert]
-        assert [matchup.position for matchup in mine] == list(range(1, len(mine) + 1))
-        assert len(mine) == asked.votes_per_expert
-        assert len({(pair(matchup), matchup.scenario) for matchup in mine}) == len(mine)
-        last: dict[str, int] = {}
-        for matchup in mine:
-            seen = last.get(matchup.scenario)
-            assert seen is None or matchup.position - seen > made.scenario_gap
-            last[matchup.scenario] = matchup.position
-        shown = Counter(pair(matchup) for matchup in mine)
-        first_left = Counter(pair(m) for m in mine if m.left == min(m.left, m.right))
-        assert all(abs(2 * first_left[key] - shown[key]) <= 1 for key in shown)
     for matchup in made.matchups:
         left = pictures[matchup.scenario, matchup.left]
         assert left != pictures[matchup.scenario, matchup.right]

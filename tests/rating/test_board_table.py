@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from typing import Any
 
 import pytest
 
@@ -49,37 +50,22 @@ def test_opponents_are_the_first_the_last_and_evenly_between(ranked: str, chosen
 
 
 def a_table() -> BoardTableDocument:
-    line = BoardLine(
-        name="Ann",
-        rating=1000.5,
-        slug="ann",
-        kind="submission",
-        is_simulated=False,
-        since="2026-01-01",
-        authors=("Ada", "Bo"),
-        is_open=False,
-    )
-    study = PooledStudy(
-        name="Round 1", code="1", closed_at="2026-01-01", votes=3, preregistration="0" * 64
-    )
+    day, sha256 = "2026-01-01", "0" * 64
+    who: dict[str, Any] = {"name": "Ann", "slug": "ann", "kind": "submission", "since": day}
+    who |= {"authors": ("Ada", "Bo"), "is_open": False, "is_simulated": False}
+    line = BoardLine(rating=1000.5, **who)
+    study = PooledStudy(name="Round 1", code="1", closed_at=day, votes=3, preregistration=sha256)
+    texts = {"board": "City", "benchmark": "city@1", "question": "Which?", "answer": "Nobody."}
+    rated: dict[str, Any] = {"lines": (line,), "studies": (study,), "founders": ("ann",)}
+    rated |= {"votes": 3, "votes_sha256": sha256, "left_out": {"skip": 1}, "notes": ("Few.",)}
     return BoardTableDocument(
-        board="City",
         number=1,
-        made_at="2026-01-01T12:00:00+00:00",
-        benchmark="city@1",
-        benchmark_sha256="0" * 64,
-        question="Which?",
+        made_at=f"{day}T12:00:00+00:00",
+        benchmark_sha256=sha256,
         method="Bradley-Terry",
-        answer="Nobody.",
-        lines=(line,),
-        studies=(study,),
-        founders=("ann",),
-        votes=3,
-        votes_sha256="0" * 64,
-        left_out={"skip": 1},
-        notes=("Few.",),
         versions={"numpy": "2"},
         includes_simulated=False,
+        **texts | rated,
     )
 
 

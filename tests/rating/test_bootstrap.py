@@ -19,8 +19,6 @@ def test_vote_intervals_cover_the_truth_when_votes_are_independent() -> None:
     for seed in range(80):
         board = by_votes(simulated(TRUTH, 500, seed), rounds=300, seed=seed)
         for line, truth in zip(board.lines, TRUTH, strict=True):
-            assert line.lower is not None
-            assert line.upper is not None
             covered.append(line.lower <= truth <= line.upper)
     assert 0.92 < np.mean(covered) < 0.975
 
@@ -44,13 +42,13 @@ def test_single_votes_are_drawn_as_by_a_multinomial(seen: list[int]) -> None:
         pair_of=np.empty(0, dtype=np.int64),
         outcome_of=np.empty(0, dtype=np.int64),
     )
-    blocks = resample(simulated(TRUTH, 1, 1), counts, unit=Unit.VOTE, rounds=40_000, seed=2)
+    blocks = resample(simulated(TRUTH, 1, 1), counts, unit=Unit.VOTE, rounds=20_000, seed=2)
     games, scores, ties = zip(*((one.games, one.scores, one.ties) for one in blocks), strict=True)
     assert (np.hstack(games).sum(axis=0) == sum(seen)).all()
     shares = np.array(seen).reshape(3, -1) / sum(seen)
     for drawn, share in ((games, shares.sum(axis=0)), ([ties], shares[1].sum(keepdims=True))):
         expected, variance = sum(seen) * share, sum(seen) * share * (1.0 - share)
-        error = 4.0 * np.sqrt(variance / 40_000) + 1e-9
+        error = 4.0 * np.sqrt(variance / 20_000) + 1e-9
         assert np.abs(np.hstack(drawn).mean(axis=-1) - expected).max(initial=0.0) <= error.max()
         assert np.hstack(drawn).var(axis=-1) == pytest.approx(variance, rel=0.04)
     assert np.hstack(scores).mean(axis=1) == pytest.approx(
@@ -67,8 +65,6 @@ def test_votes_that_agree_within_scenarios_widen_the_scenario_interval() -> None
 
     def width(unit: Unit) -> float:
         line = by_votes(clustered, rounds=500, unit=unit, seed=3).lines[0]
-        assert line.lower is not None
-        assert line.upper is not None
         return line.upper - line.lower
 
     assert width(Unit.SCENARIO) > 3 * width(Unit.VOTE)

@@ -28,10 +28,13 @@ def test_no_votes(method: Method) -> None:
     assert [line.note for line in board.lines] == ["no votes", "no votes"]
 
 
-def test_one_contestant() -> None:
+def test_one_contestant_and_too_many() -> None:
     board = by_votes(as_arrays(("a",), []))
     assert board.status is Status.ONE_CONTESTANT
     assert "only one contestant, a" in board.explanation
+    names = [f"c{number}" for number in range(2001)]
+    with pytest.raises(TooManyContestants, match="not 2001"):
+        rate(as_arrays(names, versus("c0", "c1", 1, 0, 0)))
 
 
 def test_a_contestant_who_lost_everything_has_no_rating_and_the_rest_is_rated_alone() -> None:
@@ -121,12 +124,6 @@ def test_rules_that_make_no_sense_are_refused() -> None:
         by_votes(votes, rounds=0)
     with pytest.raises(ValueError, match="single votes only, not by scenario"):
         by_votes(votes, method=Method.ELO, unit=Unit.SCENARIO)
-
-
-def test_more_than_two_thousand_contestants_are_refused() -> None:
-    names = [f"c{number}" for number in range(2001)]
-    with pytest.raises(TooManyContestants, match="not 2001"):
-        rate(as_arrays(names, versus("c0", "c1", 1, 0, 0)))
 
 
 # --- Few and lopsided votes, by every method and unit -----------------------------------------

@@ -92,19 +92,18 @@ def test_a_slight_preference_can_weigh_three_quarters_of_a_win() -> None:
     strengths = bradley_terry(
         named(versus("a", "b", 3, 0, 1)), np.array([True, True, False, False])
     )
-    assert strengths is not None
     gap = (strengths[0] - strengths[1]) * ELO_PER_LOGIT
     assert gap == pytest.approx(88.739, abs=1e-3)
 
 
 def test_an_expert_without_whom_nothing_is_determined_is_said_to_be_so() -> None:
-    def vote(expert: str, first: str, second: str) -> list[Comparison]:
-        return [
+    votes = named(
+        [
             Comparison(first=first, second=second, score=score, expert=expert, scenario="s")
+            for expert, first, second in (("e", "a", "b"), ("f", "b", "c"), ("g", "a", "b"))
             for score in (1.0, 0.0, 1.0)
         ]
-
-    votes = named(vote("e", "a", "b") + vote("f", "b", "c") + vote("g", "a", "b"))
+    )
     strengths = fit(votes)
     assert rank_changes(strengths, without_each_expert(votes, strengths)) == [0, None, 0]
 
@@ -150,7 +149,6 @@ def test_no_much_smaller_set_of_votes_changes_the_first_place_and_that_one_does(
         for dropped in combinations(range(len(votes)), size)
         if first_of(votes, [*{*range(len(votes))} - {*dropped}]) not in (None, first)
     )
-    assert found is not None
     # As few as any, or one more: influence orders votes one by one, not together.
     assert fewest <= found.votes <= fewest + 1
 
@@ -159,5 +157,4 @@ def test_ties_that_nobody_cast_are_never_dropped() -> None:
     votes = simulated([1030.0, 1000, 970], 60, 1, ties=0.2)
     assert votes_behind_first(votes, np.zeros(60, dtype=np.bool_)) is None
     found = votes_behind_first(votes, np.ones(60, dtype=np.bool_))
-    assert found is not None
     assert found.cast == 60

@@ -15,21 +15,11 @@ from arena.site import demo
 from arena.site.demo import RATED, SIMULATED_EXPERTS, hold_study
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant
-from augment.scene.codec import modification_to_document
-from augment.scene.entities import Modification
-from tests.scenes import vehicle
+from tests.golden.test_demo_study import OFF_M, PLACES, document
 from tests.study_rows import a_study, contestant, expert, picture, scenario, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
-
-PLACES = 24
-OFF_M = dict(zip(RATED, (0.0, 0.8, 1.6, 4.0), strict=True))
-"""How far from the reference each contestant places its car, on the average scenario."""
-
-
-def document(ahead_m: float) -> dict[str, object]:
-    return modification_to_document(Modification(added=(vehicle("Agent2", ahead_m, -0.7),)))
 
 
 @pytest.fixture
@@ -81,7 +71,9 @@ def test_a_simulated_study_that_was_cut_short_is_gone_on_with(
     assert hold_study() == rating.study
 
 
-def test_displacement_and_the_experts_are_those_counted_from_the_rows(rating: Snapshot) -> None:
+def test_displacement_and_the_experts_are_as_counted_from_the_rows_and_in_every_file(
+    rating: Snapshot,
+) -> None:
     lines, votes = lines_of(rating), list(decided(rating))
     slugs = [(won.contestant.slug, lost.contestant.slug) for won, lost in votes]
     known = [pair for pair in slugs if RATED[0] not in pair]
@@ -106,9 +98,10 @@ def test_displacement_and_the_experts_are_those_counted_from_the_rows(rating: Sn
     assert experts.share.value == pytest.approx(np.mean(means))
     assert (experts.known, experts.role) == (len(means), LineRole.EXPERTS)
     assert lines["A coin"].known == len(votes)
+    check_page_and_files(rating)
 
 
-def test_the_page_says_it_first_and_every_file_has_it(rating: Snapshot) -> None:
+def check_page_and_files(rating: Snapshot) -> None:
     found = lines_of(rating)["Displacement"]
     client = signed_in(people()["researcher"])
     address = reverse("results-tab", args=[rating.study.code, "agreement"])

@@ -28,7 +28,6 @@ def test_agreement_by_krippendorffs_package_and_by_loops(shown: Shown) -> None:
         for judge, score in values:
             table[judges.index(judge), column] = 2 * score
     found = shown.results.trust.agreement
-    assert found is not None
     assert (found.units, found.judgements) == (len(shared), sum(map(len, shared)))
     levels: list[tuple[Any, Estimate]]
     levels = [("nominal", found.alpha), ("interval", found.alpha_interval)]
@@ -93,7 +92,6 @@ def test_what_the_side_is_worth(shown: Shown) -> None:
         cov_kwds={"groups": experts, "use_correction": False},
     )
     side, groups = shown.results.trust.side, len(np.unique(experts))
-    assert side is not None
     value, error = found.params[-1] * POINTS, found.bse[-1] * POINTS
     assert side.advantage.value == pytest.approx(value, abs=1e-4)
     assert side.standard_error == pytest.approx(error * math.sqrt(groups / (groups - 1)), rel=1e-5)

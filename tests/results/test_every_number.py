@@ -34,22 +34,16 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
     details = [row for row in shown.rows("table") if len(row) == 7]
     for slug, line in shown.lines.items():
         own = [vote.score_of(slug) for vote in shown.main if slug in vote.names]
-        assert (line.wins, line.ties, line.losses) == (
-            own.count(1.0),
-            own.count(0.5),
-            own.count(0.0),
-        )
+        counts = [own.count(points) for points in (1.0, 0.5, 0.0)]
+        assert [line.wins, line.ties, line.losses] == counts
         standing = next(row for row in standings if row[1] == line.name)
         (detail,) = (row for row in details if row[0] == line.name)
-        assert line.lower is not None
-        assert line.upper is not None
-        assert line.rating is not None
         half = (line.upper - line.lower) / 2
         rating, votes = f"{line.rating:.0f}", str(len(own))
         assert standing == [str(line.rank), line.name, rating, "", votes]
         assert detail[1] == f"±{half:.0f}"
         score = f"{round(100 * np.mean(own))} %"
-        assert detail[3:] == [score, *(str(own.count(points)) for points in (1.0, 0.5, 0.0))]
+        assert detail[3:] == [score, *map(str, counts)]
 
 
 def test_ties_and_what_is_left_out(shown: Shown) -> None:
@@ -97,11 +91,8 @@ def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:
     for pair in shown.results.pairs:
         both = frozenset((pair.a, pair.b))
         own = [vote.score_of(pair.a) for vote in shown.main if vote.names == both]
-        assert (pair.wins, pair.ties, pair.losses) == (
-            own.count(1.0),
-            own.count(0.5),
-            own.count(0.0),
-        )
+        counts = [own.count(points) for points in (1.0, 0.5, 0.0)]
+        assert [pair.wins, pair.ties, pair.losses] == counts
         assert pair.planned == shown.planned[both]
         # Never surer than a single test of independent votes with as many degrees as experts.
         a, b = slugs.index(pair.a), slugs.index(pair.b)
@@ -110,7 +101,6 @@ def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:
         assert adjusted[both] >= 2 * t.sf(size, 1000) - 1e-9
     assert len(np.unique(experts)) >= 5
     above = shown.results.board.above
-    assert above is not None
     assert {frozenset(pair) for pair in above} == {
         pair for pair, p in adjusted.items() if p <= 0.05
     }

@@ -74,6 +74,19 @@ def edit(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
     file.write_text(json.dumps(document))
 
 
+def add_copy(folder: Path, slug: str, **changes: object) -> None:
+    """Add the scenario of the folder once more, with other fields."""
+    file = folder / f"scenarios/{slug}.json"
+    shutil.copy(folder / "scenarios/parked-car.json", file)
+    edit(file, lambda it: it.update(slug=slug, **changes))
+
+
+def add_avenue(folder: Path) -> None:
+    """Add the scene of the folder once more."""
+    shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
+    edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
+
+
 def augment(scenario: Scenario) -> None:
     job = GenerationJob.objects.create(name="first")
     contestant, _ = Contestant.objects.get_or_create(slug="ada", name="Ada", kind="human")
@@ -176,7 +189,7 @@ def test_a_scene_that_was_augmented_stays_as_stored_and_is_named(folder: Path) -
     assert BaseScene.objects.get().provenance != "other"
 
 
-def _move_to(at_m: float, entry: dict[str, Any]) -> None:
+def _move_to(at_m: object, entry: dict[str, Any]) -> None:
     entry["reference"]["add"][0]["x_m"] = at_m
 
 
@@ -201,9 +214,7 @@ def test_an_intent_where_there_was_none_is_new_to_who_practises(
 def test_what_is_in_use_stays_and_its_file_becomes_a_new_version(
     folder: Path, use: Callable[[Scenario], None]
 ) -> None:
-    then = folder / "scenarios/then.json"
-    shutil.copy(folder / "scenarios/parked-car.json", then)
-    edit(then, lambda it: it.update(slug="then", follows="parked-car"))
+    add_copy(folder, "then", follows="parked-car")
     load_catalogue(folder=folder)
     first = Scenario.objects.get(slug="parked-car")
     before = Scenario.objects.values().get(pk=first.pk)
@@ -217,7 +228,6 @@ def test_what_is_in_use_stays_and_its_file_becomes_a_new_version(
         newest = Scenario.objects.get(slug=f"parked-car{version}")
         assert (newest.origin, newest.catalogue_set) == (first.origin, "paper")
         reference = LoadedScenario(newest).reference
-        assert reference is not None
         assert reference.added[0].x_m == at_m
         assert Scenario.objects.get(slug=f"then{version}").follows == newest
         assert resolve_scenarios(["catalogue"]) == [newest.slug, f"then{version}"]
@@ -234,19 +244,14 @@ def test_what_is_in_use_stays_and_its_file_becomes_a_new_version(
 
 
 def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Path) -> None:
-    shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
-    edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
+    add_avenue(folder)
     for slug, place in (("beside", "street"), ("far", "avenue")):
-        copy = folder / f"scenarios/{slug}.json"
-        shutil.copy(folder / "scenarios/parked-car.json", copy)
-        edit(copy, partial(dict.update, slug=slug, scene=place, instruction=slug))
+        add_copy(folder, slug, scene=place, instruction=slug)
     load_catalogue(folder=folder)
     augment(Scenario.objects.get(slug="parked-car"))
     for name in ("street", "avenue"):
         edit(folder / f"scenes/{name}.json", lambda it: it.update(provenance="newer"))
-    new = folder / "scenarios/new.json"
-    shutil.copy(folder / "scenarios/beside.json", new)
-    edit(new, lambda it: it.update(slug="new", instruction="anew"))
+    add_copy(folder, "new", instruction="anew")
     out = StringIO()
     call_command("load_catalogue", "--folder", str(folder), stdout=out)
     assert "scenes: 0 added, 1 changed, 0 unchanged" in out.getvalue()
@@ -269,12 +274,9 @@ def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
 
 def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path) -> None:
     shutil.copy(folder / "scenes/street.json", folder / "scenes/other.json")
-    broken = folder / "scenarios/broken.json"
-    shutil.copy(folder / "scenarios/parked-car.json", broken)
-    edit(broken, lambda it: it["reference"]["add"][0].update(x_m="far"))
-    lost = folder / "scenarios/lost.json"
-    shutil.copy(folder / "scenarios/parked-car.json", lost)
-    edit(lost, lambda it: it.update(slug="lost", scene="nowhere"))
+    add_copy(folder, "broken")
+    edit(folder / "scenarios/broken.json", partial(_move_to, "far"))
+    add_copy(folder, "lost", scene="nowhere")
     with pytest.raises(InvalidDocument) as caught:
         load_catalogue(folder=folder)
     assert [path for path, _ in caught.value.problems] == [
@@ -288,8 +290,7 @@ def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path)
 def test_a_conflict_late_in_the_folder_undoes_everything(folder: Path) -> None:
     load_catalogue(folder=folder)
     Scenario.objects.update(catalogue_set="")
-    shutil.copy(folder / "scenes/street.json", folder / "scenes/avenue.json")
-    edit(folder / "scenes/avenue.json", lambda it: it.update(name="avenue"))
+    add_avenue(folder)
     with pytest.raises(Conflict):
         load_catalogue(folder=folder)
     assert [row.slug for row in BaseScene.objects.all()] == ["street"]

@@ -1,19 +1,24 @@
 """Displacement of stored rows; the street's reference has cones at (20, 0.5) and (25, -0.5)."""
 
+import math
+
 import pytest
 from pytest_django import DjangoAssertNumQueries
 
+from augment.metrics.displacement import MISS_M, displacement
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, recording_to_document
 from augment.scene.entities import Modification
 from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotion, Trigger
 from augment.services.judging.analyses import augmentation_lines
 from augment.services.judging.displacement import By, Group, MissingReason, groups, of_job
-from augment.services.judging.metric_scores import metric_scores
+from augment.services.judging.metric_scores import MetricScores, metric_scores
+from tests.drives import driven
 from tests.jobs import rows
 from tests.metrics.test_over_time import recorded_at, starts
 from tests.scene.test_planned_motion import two_lanes, with_motion
 from tests.scenes import cone, vehicle
+from tests.study_rows import contestant, picture, scenario
 
 pytestmark = pytest.mark.django_db
 
@@ -51,7 +56,6 @@ def test_a_job_is_summed_up_per_contestant() -> None:
     assert (group.heading, group.contestant.slug) == ("ann", "ann")
     assert (group.summary.augmentations, group.summary.n) == (2, 2)
     assert (group.summary.missing, group.summary.surplus) == (2, 0)
-    assert group.summary.box is not None
     assert group.summary.box.mean_m == pytest.approx(1.5)
 
 
@@ -96,8 +100,6 @@ def test_what_moves_is_followed_beside_the_recorded_ego_whose_scene_is_read_once
     with django_assert_num_queries(9):  # read from the store
         found = of_job(job)
     over_time = [line.displacement.over_time for line in found if line.displacement is not None]
-    assert over_time[0] is not None
-    assert over_time[1] is not None
     assert over_time[0].average_m == pytest.approx(0.0)
     # 5 (t - 3.9) from 3.9 s on.
     assert over_time[1].average_m == pytest.approx(0.5 * sum(range(22)) / 61)
@@ -117,3 +119,63 @@ def test_a_motion_that_its_scene_cannot_carry_is_not_measured() -> None:
     )
     ended(job, one, rows.add_kind("ann"), change=Modification(added=(odd,)))
     assert [found.why_not for found in of_job(job)] == [MissingReason.UNFIT_MOTION]
+
+
+REFERENCE = Modification(added=(vehicle("Agent2", 20.0, 0.0), cone("Agent3", 30.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("made", "error_m"),
+    [
+        (REFERENCE, 0.0),
+        (Modification(added=(vehicle("Agent2", 21.0, 0.0), cone("Agent3", 33.0, 0.0))), 2.0),
+        (
+            Modification(added=(vehicle("Agent2", 90.0, 0.0), cone("Agent3", 30.0, 0.0))),
+            MISS_M / 2,
+        ),
+        (Modification(added=(vehicle("Agent2", 20.0, 0.0),)), MISS_M / 2),
+        (Modification(added=(*REFERENCE.added, cone("Agent4", 9.0, 0.0))), MISS_M / 3),
+        (None, MISS_M),
+    ],
+    ids=["same", "off", "far", "missing", "surplus", "unreadable"],
+)
+def test_one_number_says_how_far_a_change_is_off(
+    made: Modification | None, error_m: float
+) -> None:
+    assert displacement(made, REFERENCE).error_m == pytest.approx(error_m)
+    assert displacement(Modification(), Modification()).error_m == 0.0
+
+
+@pytest.mark.django_db
+def test_more_is_better_and_what_is_unknown_is_missing() -> None:
+    place = scenario("place")
+    place.reference = modification_to_document(REFERENCE)
+    place.save()
+    rows = {slug: picture(place, contestant(slug)) for slug in ("good", "bad", "none")}
+    rows["reference"] = picture(place, contestant("reference", Contestant.Kind.REFERENCE))
+    twice = Modification(added=(vehicle("Agent2", 25.0, 0.0), vehicle("Agent3", 25.5, 0.0)))
+    changes = {"good": REFERENCE, "bad": twice, "reference": REFERENCE}
+    for slug, change in changes.items():
+        document = modification_to_document(change)
+        Augmentation.objects.filter(pk=rows[slug].pk).update(modification=document)
+    Augmentation.objects.filter(pk=rows["none"].pk).update(
+        state=Augmentation.State.UNREADABLE, modification=None
+    )
+    driven(rows["good"].job, after=0.25)
+    rows["good"].simulations.update(interplan_score=0.75)
+
+    found = {scores.name: scores for scores in metric_scores([row.pk for row in rows.values()])}
+
+    def of(metric: str, slug: str) -> float | None:
+        scores: MetricScores = found[metric]
+        return scores.by_code.get(str(rows[slug].code))
+
+    assert of("Displacement", "good") == 0.0
+    assert of("Displacement", "none") == -MISS_M
+    assert of("Displacement", "reference") is None
+    good, bad = of("Checks", "good"), of("Checks", "bad")
+    assert good > bad
+    assert of("Checks", "none") == -math.inf
+    assert of("Driving score (nuPlan)", "good") == -0.25
+    assert of("Driving score (interPlan)", "good") == -0.75
+    assert of("Driving score (nuPlan)", "none") is None

@@ -106,7 +106,6 @@ def test_an_agent_is_put_on_the_centreline(
 ) -> None:
     here = add_scenario("street", reference=None)
     found = check_edit(here, document(agent), snapped="Added1").modification
-    assert found is not None
     [snapped] = found["add"]
     assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
     turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
@@ -119,7 +118,6 @@ def test_an_agent_is_given_a_motion_by_name_and_loses_it_again() -> None:
     wish = {"agent_id": "Added1", "preset": "pull_out", "within_m": 12.0, "number": 6.0}
     found = check_edit(here, change, preset=wish)
     assert found.presets == {"Added1": {"preset": "pull_out", "within_m": 12.0, "number": 6.0}}
-    assert found.modification is not None
     (agent,) = found.modification["add"]
     assert agent["motion"]["path"]["lane_ids"] == ["Lane1"]
     # 12 m away: 30 - sqrt(144 - 9) = 18.4 m at 8 m/s, so it stands at 2 s and is off at 3 s.
@@ -137,7 +135,6 @@ def test_a_door_comes_as_an_object_of_its_own_and_once() -> None:
     wish = {"agent_id": "Added1", "preset": "door_opening"}
     once = check_edit(here, document(PARKED), preset=wish)
     again = check_edit(here, once.modification, preset=wish | {"within_m": 9.0})
-    assert again.modification is not None
     assert [one["id"] for one in again.modification["add"]] == ["Added1", "Added1-door"]
     assert again.presets["Added1-door"]["within_m"] == 9.0
 
@@ -164,10 +161,8 @@ def test_a_drawn_reference_is_kept_drawn_and_told() -> None:
     set_reference(here, document(CAR), actor=ada)
     here.refresh_from_db()
     kept = LoadedScenario(here).reference
-    assert kept is not None
     assert kept.added == (replace(CAR, lane_id="Lane1"),)
     event = Event.objects.get()
-    assert event.before is not None
     assert (event.actor, event.verb, event.before["reference"]) == (ada, "change", None)
     draw_scenario(here.pk)
     here.refresh_from_db()
@@ -204,7 +199,6 @@ def test_what_is_drawn_says_what_is_asked_for() -> None:
     made = set_reference(here, document(CAR), instruction="", derives=True)
     assert "a parked vehicle 20.0 m ahead of the ego" in made.instruction
     assert (made.instruction_is_generated, made.intent_origin) == (True, "derived")
-    assert made.intent is not None
     assert made.intent["requests"][0]["spot"]["distance"] == {"low_m": 20.0}
     bare = set_reference(made, document(), derives=True)
     assert (bare.reference, bare.intent) == (None, None)
@@ -236,13 +230,10 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     assert default_storage.exists(made.image)
     assert made.image != first.image
     checked, measured = check_augmentation(made), of_augmentation(made)
-    assert checked is not None
     assert checked.findings
-    assert measured.displacement is not None
     assert len(measured.displacement.matches) == 1
     assert Augmentation.objects.filter(pk=first.pk).values().get() == before
     event = Event.objects.get(verb="correct")
-    assert event.after is not None
     assert (event.actor, event.object_code) == (ada, str(first.code))
     assert event.after["contestant"] == "by-hand"
 

@@ -11,7 +11,6 @@ OPENAI = "https://api.openai.com/v1"
 
 def test_a_listed_model_has_a_price_and_a_source() -> None:
     found = find_listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
-    assert found is not None
     price, source = found
     assert (price.prompt_usd, price.completion_usd) == (Decimal("2.5"), Decimal(10))
     assert price.cached_usd == Decimal("1.25")

@@ -9,12 +9,14 @@ import zipfile
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from django.apps import apps
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
+from django.test import override_settings
 
 from arena.management.backups import MANIFEST, take_backup
 from arena.models import Vote
@@ -28,6 +30,7 @@ pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.usefixtures("
 
 
 Mend = Callable[[dict[str, bytes]], None]
+STRANGE = ("media/../../evil", "media/../b", "media/a//b.png", "media/./b.png", "/b.png")
 
 
 def change(path: Path, mend: Mend) -> None:
@@ -53,6 +56,25 @@ def with_member(name: str) -> Mend:
     return add
 
 
+@pytest.fixture(scope="module")
+def taken(django_db_setup: None, django_db_blocker: Any, tmp_path_factory: Any) -> list[bytes]:
+    """Backups of an empty installation and of a full one."""
+    folder: Path = tmp_path_factory.mktemp("backups")
+    names, own = ("empty.zip", "full.zip"), {"MEDIA_ROOT": folder / "media", "VAR_DIR": folder}
+    with django_db_blocker.unblock(), override_settings(**own):
+        for name in names:
+            take_backup(folder / name, now=NOW, say=quiet)
+            a_full_house() if name == "empty.zip" else empty()
+    return [(folder / name).read_bytes() for name in names]
+
+
+@pytest.fixture
+def path(taken: list[bytes], tmp_path: Path) -> Path:
+    """A backup without rows."""
+    (tmp_path / "b.zip").write_bytes(taken[0])
+    return tmp_path / "b.zip"
+
+
 @pytest.mark.parametrize(
     ("mend", "says"),
     [
@@ -63,19 +85,12 @@ def with_member(name: str) -> Mend:
         (lambda found: with_manifest(found, version=2), "version 2"),
         (lambda found: with_manifest(found, format="other"), "its format is not"),
         (lambda found: with_manifest(found, migrations=["arena.0999_x"]), "another release"),
-        *(
-            (with_member(name), "at a place of none")
-            for name in (
-                *("media/../../evil", "media/../b", "media/a//b.png", "media/./b.png", "/b.png"),
-            )
-        ),
+        *((with_member(name), "at a place of none") for name in STRANGE),
     ],
 )
 def test_what_is_no_whole_backup_of_this_release_is_refused(
-    tmp_path: Path, mend: Mend, says: str
+    path: Path, mend: Mend, says: str
 ) -> None:
-    path = tmp_path / "b.zip"
-    take_backup(path, now=NOW, say=quiet)
     change(path, mend)
     with pytest.raises(CommandError, match=says):
         call_command("restore", str(path))
@@ -137,13 +152,10 @@ def no_times(found: dict[str, bytes]) -> None:
     ],
 )
 def test_rows_that_fit_no_table_take_everything_back(
-    tmp_path: Path, mend: Mend, says: str
+    taken: list[bytes], path: Path, mend: Mend, says: str
 ) -> None:
-    a_full_house()
-    path = tmp_path / "b.zip"
-    take_backup(path, now=NOW, say=quiet)
+    path.write_bytes(taken[1])
     change(path, mend)
-    empty()
     with pytest.raises(CommandError, match=says):
         call_command("restore", str(path))
     assert not Vote.objects.exists()
@@ -181,9 +193,7 @@ def break_content(path: Path, member: str) -> None:
         lambda path: spoil(path, MANIFEST, METHOD, 97),
     ],
 )
-def test_what_a_zip_can_not_give_is_said(tmp_path: Path, harm: Callable[[Path], None]) -> None:
-    path = tmp_path / "b.zip"
-    take_backup(path, now=NOW, say=quiet)
+def test_what_a_zip_can_not_give_is_said(path: Path, harm: Callable[[Path], None]) -> None:
     harm(path)
     with pytest.raises(CommandError, match=r"not whole|no backup"):
         call_command("restore", str(path))

@@ -19,6 +19,7 @@ from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
 from augment.models import (
     Benchmark,
+    Endpoint,
     Event,
     JudgeRun,
     PairJudgement,
@@ -61,32 +62,23 @@ def a_drive() -> Work:
 
 
 def a_benchmark_file() -> Work:
-    request = BenchmarkRequest(
-        slug="s", title="S", scenarios=[add_scenario("street").slug], practice=0.0
-    )
+    street = [add_scenario("street").slug]
+    request = BenchmarkRequest(slug="s", title="S", scenarios=street, practice=0.0)
     return BenchmarkFile.objects.create(benchmark=make_benchmark(request))
 
 
+def here() -> Endpoint:
+    return ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
+
+
 def a_reading() -> Work:
-    scenario = add_scenario("street")
-    request = EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1")
-    endpoint = ensure_endpoint(request)
-    return plan_reading(scenario=scenario, endpoint=endpoint, model="m")
+    return plan_reading(scenario=add_scenario("street"), endpoint=here(), model="m")
 
 
 def a_judgement() -> Work:
-    request = EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1")
-    run = JudgeRun.objects.create(endpoint=ensure_endpoint(request), model="m")
+    run = JudgeRun.objects.create(endpoint=here(), model="m")
     left, right = launch(contestants=("one", "other")).augmentations.all()
     return PairJudgement.objects.create(run=run, left=left, right=right)
-
-
-def a_probe() -> Work:
-    return plan_probe(
-        model_at(
-            endpoint=ensure_endpoint(EndpointRequest(label="h", base_url="http://h")), model="m"
-        )
-    )
 
 
 WAITING: dict[str, Callable[[], Work]] = {
@@ -94,7 +86,7 @@ WAITING: dict[str, Callable[[], Work]] = {
     "benchmarkfile": a_benchmark_file,
     "intentreading": a_reading,
     "pairjudgement": a_judgement,
-    "probe": a_probe,
+    "probe": lambda: plan_probe(model_at(endpoint=here(), model="m")),
     "scenariofile": lambda: ScenarioFile.objects.create(job=launch(), format="json"),
     "sceneupload": an_upload,
     "simulation": a_drive,

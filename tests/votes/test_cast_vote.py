@@ -173,17 +173,9 @@ def test_the_database_itself_refuses_two_first_votes_and_a_winner_that_was_not_s
     stored = vote(first)
 
     def copy(**changes: object) -> Vote:
-        row = {
-            "key": uuid.uuid4(),
-            "matchup": first,
-            "expert": first.expert,
-            "shown_left": first.left,
-            "shown_right": first.right,
-            "outcome": "left",
-            "winner": first.left,
-            **changes,
-        }
-        return Vote(**row)
+        row = {"matchup": first, "expert": first.expert, "outcome": "left", "winner": first.left}
+        row |= {"shown_left": first.left, "shown_right": first.right, "key": uuid.uuid4()}
+        return Vote(**row | changes)
 
     twice = copy()
     same_key = copy(key=stored.key, matchup=second)

@@ -49,7 +49,6 @@ def test_eight_threads_store_every_vote_once() -> None:
 
 def test_eight_keys_for_one_matchup_leave_one_vote() -> None:
     matchup = a_study().matchups.select_related("expert").first()
-    assert matchup is not None
     became = Counter(at_once([(matchup, uuid.uuid4(), "equal") for _ in range(THREADS)]))
     assert became == {"equal": 1, "decided: equal": THREADS - 1}
     assert Vote.objects.count() == 1
@@ -57,7 +56,6 @@ def test_eight_keys_for_one_matchup_leave_one_vote() -> None:
 
 def test_one_key_eight_times_is_one_vote() -> None:
     matchup = a_study().matchups.select_related("expert").first()
-    assert matchup is not None
     key = uuid.uuid4()
     assert set(at_once([(matchup, key, "right")] * THREADS)) == {"right"}
     assert Vote.objects.count() == 1

@@ -40,40 +40,31 @@ CHOICES: dict[str, dict[str, object]] = {
 }
 
 
-@pytest.mark.parametrize("choice", CHOICES)
 @pytest.mark.parametrize("allow_simulated", [True, False])
-def test_the_database_gives_the_reasons_of_the_rating(
-    study: Study, choice: str, allow_simulated: bool
-) -> None:
+def test_the_database_gives_the_reasons_of_the_rating(study: Study, allow_simulated: bool) -> None:
     study.allow_simulated = allow_simulated
     study.save()
-    snapshot = rated(study, **CHOICES[choice])
-    marks = Counter(find_votes(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True))
-    for vote in each_vote(snapshot, VoteSearch(mark=EVERY)):
-        if vote.vote is None and vote.mark != "automatic":
-            marks[vote.mark] += 1
-    counted = marks.pop("counted", 0)
-    assert counted == snapshot.votes_counted
-    assert dict(marks) == snapshot.votes_left_out
-    assert total(snapshot) == snapshot.votes_counted
-    assert total(snapshot, mark=LEFT_OUT) == sum(snapshot.votes_left_out.values())
-    for reason, number in snapshot.votes_left_out.items():
-        assert total(snapshot, mark=reason) == number, reason
+    for choice, filters in CHOICES.items():
+        snapshot = rated(study, **filters)
+        every = VoteSearch(mark=EVERY)
+        marks = Counter(find_votes(snapshot, every).values_list(F("mark"), flat=True))
+        for vote in each_vote(snapshot, every):
+            if vote.vote is None and vote.mark != "automatic":
+                marks[vote.mark] += 1
+        assert marks.pop("counted", 0) == total(snapshot) == snapshot.votes_counted, choice
+        left_out = snapshot.votes_left_out
+        assert dict(marks) == left_out, choice
+        assert total(snapshot, mark=LEFT_OUT) == sum(left_out.values()), choice
+        assert {reason: total(snapshot, mark=reason) for reason in left_out} == left_out, choice
 
 
 def test_what_comes_after_a_rating_is_none_of_its_votes(study: Study) -> None:
     before = rated(study)
     held = total(before, mark=EVERY)
     first = Vote.objects.order_by("pk")[0]
-    Vote.objects.create(
-        key=first.matchup.code,
-        matchup=first.matchup,
-        expert=first.expert,
-        outcome="equal",
-        shown_left=first.shown_left,
-        shown_right=first.shown_right,
-        supersedes=first,
-    )
+    shown = {"shown_left": first.shown_left, "shown_right": first.shown_right}
+    who = {"matchup": first.matchup, "expert": first.expert}
+    Vote.objects.create(key=first.matchup.code, outcome="equal", supersedes=first, **shown, **who)
     assert total(before, mark=EVERY) == held
     assert total(before, mark="superseded") == before.votes_left_out["superseded"] == 2
     assert total(rated(study), mark="superseded") == 3
@@ -103,7 +94,6 @@ def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) ->
         repeated, _ = rater.repeats
         assert total(snapshot, part="repeats", **every) == repeated
     kept = snapshot.results.trust.repeats
-    assert kept is not None
     assert total(snapshot, part="repeats", mark=EVERY) == kept.number == 6
 
 
