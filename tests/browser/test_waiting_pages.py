@@ -1,25 +1,33 @@
-"""Pages that wait for workers show themselves anew and lose nothing of what is done on them."""
+"""Pages that wait for workers, an invitation that is accepted, and a board without a network."""
 
 import time
 from pathlib import Path
 
 import pytest
+from django.contrib.auth.models import User
 from django.urls import reverse
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, expect
 from pytest_django import Settings
 
 from arena.models import BenchmarkFile
+from arena.people.links import invite
+from arena.results.exports.board_files import board_folder, write_folder
 from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from augment.models import BaseScene, SceneUpload
 from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.scenarios.pictures import draw_scene
-from tests.browser.booth import Booth
+from tests.board_rows import a_batch, a_board, newcomer, published, voted
+from tests.browser.booth import PHONE, Booth
+from tests.browser.chromium import PATIENCE_MS
+from tests.browser.test_voting_page import faults
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene
 from tests.services.test_benchmarks import add_street
 from tests.web.cast import people
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+
+
 SLOW_S = 2
 """Longer than a person who has been here before needs to choose a file."""
 
@@ -74,3 +82,43 @@ def test_what_was_said_of_a_start_makes_room_for_what_came_of_it(
     BENCHMARK_FILES.perform(BenchmarkFile.objects.get().pk)
     expect(scenes_page.get_by_role("link", name="s-1.zip")).to_be_visible()
     expect(scenes_page.locator(".messages li")).to_have_count(0)
+
+
+def test_the_button_of_an_invitation_leads_to_the_first_pair(booth: Booth) -> None:
+    token = invite(study=booth.study, expert=User.objects.get(username="eva")).token
+    context = booth.browser.new_context(base_url=booth.address, locale="de-DE")
+    context.set_default_timeout(PATIENCE_MS)
+    page = context.new_page()
+    page.goto(reverse("invitation", args=[token]))
+    expect(page.get_by_role("heading", name="Sie sind eingeladen")).to_be_visible()
+    page.get_by_role("button", name="Annehmen und beginnen").click()
+    page.wait_for_url(f"**{reverse('vote', args=[booth.study.code])}")
+    expect(page.get_by_role("button", name="A ist besser")).to_be_visible()
+    context.close()
+
+
+TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+
+
+def test_the_folder_opens_from_a_disk_with_the_network_off(
+    browser: Browser, tmp_path: Path
+) -> None:
+    board = a_board()
+    published(board, 1)
+    newcomer("dot")
+    voted(a_batch(board, "dot"), seed=2)
+    published(board, 2)
+    write_folder(board_folder(board), tmp_path / "site")
+    context = browser.new_context(offline=True, viewport=PHONE, reduced_motion="reduce")
+    page, asked = context.new_page(), list[str]()
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((tmp_path / "site" / "index.html").as_uri())
+    assert page.locator("table.standings tbody tr").count() == 4
+    assert page.locator("img").evaluate("image => image.naturalWidth") > 0
+    assert page.evaluate(TOO_WIDE) <= 0
+    assert faults(page) == []
+    page.get_by_role("link", name="Table 1 of").click()
+    assert page.locator("table.standings tbody tr").count() == 3
+    assert all(address.startswith("file:///") for address in asked)
+    assert not any("<script" in page.read_text() for page in (tmp_path / "site").glob("*.html"))
+    context.close()

@@ -1,11 +1,13 @@
-"""Every message that voters see has a German text, and the catalogue holds no other."""
+"""Messages of voters: marked in their modules alone, and each in German."""
 
+import ast
 import re
 
 import polib
 
 from arena.management.commands.prepare import GERMAN
-from tests.house.messages import marked_messages
+from tests.house.messages import VOTER_MODULES, marked_messages
+from tests.house.source import walked
 
 PLACES = re.compile(r"%\(\w+\)s|\{\w*\}")
 
@@ -23,3 +25,25 @@ def test_every_message_has_a_german_text_with_the_same_places() -> None:
         for text in entry.msgstr_plural.values() or [entry.msgstr]:
             assert text, entry.msgid
             assert set(PLACES.findall(text)) <= wanted, entry.msgid
+
+
+CHOOSING = {"arena.site.language"}
+"""It chooses the language of an answer and marks no text."""
+
+
+def test_only_modules_of_the_catalogue_translate() -> None:
+    known = CHOOSING | {name.removesuffix(".py").replace("/", ".") for name in VOTER_MODULES}
+    found = [
+        f"{name}:{node.lineno}"
+        for name, nodes in walked()
+        if name not in known
+        for node in nodes
+        if isinstance(node, ast.ImportFrom)
+        and (
+            node.module == "django.utils.translation"
+            or (
+                node.module == "django.utils" and "translation" in {one.name for one in node.names}
+            )
+        )
+    ]
+    assert found == []

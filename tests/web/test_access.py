@@ -1,9 +1,12 @@
-"""Every page times every role, as one table."""
+"""Every page times every role, as one table; and who only looks changes nothing."""
 
+import re
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
 from arena.site.urls import urlpatterns
@@ -12,6 +15,7 @@ from tests.web.addresses import STRANGER, address
 from tests.web.cast import people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
+
 
 STAFF, ADMIN = (200, 200, 403), (200, 403, 403)
 """What an admin, a researcher and an expert are answered who take part in nothing."""
@@ -169,3 +173,23 @@ def test_results_open_to_their_experts_and_to_staff_when_the_study_closes() -> N
 def test_an_unknown_code_is_404_even_for_an_admin(name: str) -> None:
     url = reverse(name, kwargs={"code": STRANGER})
     assert signed_in(people()["admin"]).get(url).status_code == 404
+
+
+WRITES = re.compile(r'^(?:INSERT(?: OR \w+)? INTO|UPDATE|DELETE FROM) "(\w+)"')
+ALLOWED = {"django_session"}
+"""What a look may write: that its session goes on."""
+
+
+def test_no_page_of_staff_writes_a_row_when_it_is_read() -> None:
+    """An admin opens whatever a researcher opens."""
+    here, client, wrote = world(), signed_in(people()["admin"]), {}
+    for name in (name for name, answers in PAGES.items() if answers[0] == 200):
+        url = address(name, here)
+        with CaptureQueriesContext(connection) as seen:
+            answer = client.get(url)
+            if answer.streaming:
+                b"".join(answer)
+        written = {found[1] for one in seen if (found := WRITES.match(one["sql"]))}
+        if written - ALLOWED:
+            wrote[name] = written - ALLOWED
+    assert wrote == {}

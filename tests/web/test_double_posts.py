@@ -46,9 +46,9 @@ from tests.jobs.models import Model, add_llama, ran
 from tests.jobs.rows import add_scenario, only_row
 from tests.opening import open_study
 from tests.web.addresses import address
-from tests.web.cast import World, people, signed_in, world
+from tests.web.cast import World, people, world
 from tests.web.test_enrolments import RULES
-from tests.web.test_vote_uploads import FINE as VOTES
+from tests.web.test_studies import FINE as VOTES
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -231,11 +231,6 @@ def cast() -> Cast:
         ),
         upload=upload,
     )
-
-
-@pytest.fixture
-def admin() -> Client:
-    return signed_in(people()["admin"])
 
 
 def as_files(body: Body) -> Body:

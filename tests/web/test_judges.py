@@ -1,27 +1,39 @@
-"""Judge models of a study: started from a page, held against experts, in no rating of anybody."""
+"""Judge models and fault labels: what machines and experts say of the same pictures."""
 
 from collections.abc import Iterator
 from decimal import Decimal
 
 import pytest
+from django.contrib.auth.models import User
 from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 from pytest_django import DjangoCaptureOnCommitCallbacks
 
-from arena.models import Matchup, Study, Vote
+from arena.jobs.services import open_labelling
+from arena.models import FaultLabel, LabellingRound, Matchup, Study, Vote
 from arena.results.queries.judges import judge_preferences, list_judged_pairs, list_models
 from arena.results.services.ratings import rate_now
 from arena.studies.services.opening import close_study
 from augment import tasks
 from augment.fake_llm.server import running
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, JudgeRun
+from augment.models import (
+    Augmentation,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    GenerationJob,
+    JudgeRun,
+    Scenario,
+)
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.running.judge_runs import JUDGEMENTS
 from augment.services.scenarios.pictures import store
 from tests import study_rows
 from tests.brokers import Broker
+from tests.exports.test_displacement import a_job
+from tests.study_rows import expert
 from tests.web.cast import people, png, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -69,8 +81,8 @@ def test_a_judge_is_estimated_started_worked_and_shown(
     endpoint: Endpoint,
     broker: Broker,
     django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
+    admin: Client,
 ) -> None:
-    admin = signed_in(people()["admin"])
     asked = start(admin, study, "fake-good")
     assert "Calls: 12, each pair in both orders" in asked
     assert "Cost: at most 2." in asked
@@ -111,9 +123,8 @@ def test_a_judge_can_be_cancelled_and_is_for_staff_alone(study: Study, endpoint:
 
 
 def test_what_is_refused_is_said_before_anything_is_asked(
-    study: Study, endpoint: Endpoint
+    study: Study, endpoint: Endpoint, admin: Client
 ) -> None:
-    admin = signed_in(people()["admin"])
     EndpointModel.objects.update(vision=False)
     assert "can’t see pictures" in start(admin, study, "fake-good", sure="1")
     assert "Question: Select a valid choice" in start(
@@ -171,3 +182,88 @@ def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:
     assert [list_models(row) for row in (asking, sent, Contestant())] == [
         *(["gpt-4o", "gemini"], ["Llama 3.1"], [])
     ]
+
+
+@pytest.fixture
+def labelled_job() -> GenerationJob:
+    labelled_job = a_job()
+    Scenario.objects.update(original_image=store(png(5)))
+    return labelled_job
+
+
+@pytest.fixture
+def eva() -> User:
+    return expert("eva")
+
+
+@pytest.fixture
+def labelling(labelled_job: GenerationJob, eva: User) -> LabellingRound:
+    return open_labelling(name="Faults", job=labelled_job, experts=["eva"], seed=1)
+
+
+def test_an_expert_labels_by_a_press_and_learns_the_guess_only_afterwards(
+    labelling: LabellingRound, eva: User
+) -> None:
+    client, url = signed_in(eva), reverse("label", args=[labelling.code])
+    page = client.get(url).content.decode()
+    assert "automatic checks" not in page
+    assert "Place a traffic cone" in page
+    task = labelling.tasks.get(position=1)
+    answer = client.post(url, {"task": task.code, "position": "on", "note": "far off"})
+    assert answer.headers["Location"] == url
+    label = FaultLabel.objects.get()
+    assert (label.position, label.heading, label.logic, label.note) == (
+        True,
+        False,
+        False,
+        "far off",
+    )
+    assert "The automatic checks had guessed:" in client.get(url).content.decode()
+
+
+def test_pictures_go_out_to_their_expert_alone(labelling: LabellingRound, eva: User) -> None:
+    task, finn = labelling.tasks.get(position=1), expert("finn")
+    for token in (task.token, task.original_token):
+        url = reverse("matchup-image", args=[token])
+        assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
+        assert signed_in(finn).get(url).status_code == 404
+    assert signed_in(finn).get(reverse("label", args=[labelling.code])).status_code == 404
+
+
+def test_the_scene_before_stays_out_where_it_shows_another_window(
+    labelling: LabellingRound, eva: User
+) -> None:
+    page, task = reverse("label", args=[labelling.code]), labelling.tasks.get(position=1)
+    url = reverse("matchup-image", args=[task.original_token])
+    assert task.original_token in signed_in(eva).get(page).content.decode()
+    Scenario.objects.update(original_image=store(png(6), folder="bev/1-new"))
+    assert task.original_token not in signed_in(eva).get(page).content.decode()
+    assert signed_in(eva).get(url).status_code == 404
+    Augmentation.objects.filter(pk=task.augmentation_id).update(
+        image=store(png(7), folder="bev/1-new")
+    )
+    assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
+
+
+def test_an_admin_opens_a_labelling_that_staff_read(
+    labelled_job: GenerationJob, eva: User
+) -> None:
+    accounts, url = people(), reverse("faults", args=[labelled_job.code])
+    sent = {"name": "Faults", "experts": ["eva"], "seed": "1"}
+    assert signed_in(accounts["researcher"]).post(url, sent).status_code == 403
+    admin = signed_in(accounts["admin"])
+    assert admin.post(url, {**sent, "experts": []}).status_code == 422
+    assert "is open" in admin.post(url, {**sent, "sure": "1"}, follow=True).content.decode()
+    again = admin.post(url, sent)
+    assert (again.status_code, "already" in again.content.decode()) == (422, True)
+    labelling = LabellingRound.objects.get()
+    signed_in(eva).post(
+        reverse("label", args=[labelling.code]), {"task": labelling.tasks.all()[0].code}
+    )
+    shown = signed_in(accounts["researcher"]).get(url).content.decode()
+    assert "Cohen’s kappa" in shown
+    assert "1 of 2" in shown
+    table = signed_in(accounts["researcher"]).get(
+        reverse("job-export", args=[labelled_job.code, "faults", "csv"])
+    )
+    assert table.content.startswith(b"contestant,slug")

@@ -1,17 +1,24 @@
-"""Accounts without a shell: the first admin, links, pauses, roles, and being forgotten."""
+"""Accounts and links without a shell: the first admin, invitations, locks, pauses, roles."""
 
+import logging
 import re
 from collections.abc import Callable
 
 import pytest
 from axes.models import AccessAttempt
+from django.conf import LazySettings
 from django.contrib.auth.models import User
 from django.contrib.sessions.models import Session
-from django.test import Client
+from django.http import HttpResponse
+from django.test import Client, RequestFactory
 from django.urls import reverse
+from django.utils import timezone
 from pytest_django import Settings
 
-from arena.models import Study, Vote
+from arena.api.access import make_api_token
+from arena.config.login import client_address
+from arena.config.logs import HideKeys
+from arena.models import Invitation, Study, Vote
 from arena.people.links import invite
 from arena.people.queries import find_admins
 from arena.people.services import (
@@ -30,6 +37,7 @@ from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
+
 
 PASSWORD = "nine lives of a cat"
 TWICE = {"new_password1": PASSWORD, "new_password2": PASSWORD}
@@ -69,8 +77,7 @@ def test_a_forged_or_old_first_link_opens_nothing(monkeypatch: pytest.MonkeyPatc
     assert first(token) == 410
 
 
-def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
-    admin = signed_in(people()["admin"])
+def test_an_admin_makes_an_account_whose_owner_sets_the_password(admin: Client) -> None:
     answer = admin.post(reverse("people"), {"username": "grace", "role": "researcher"})
     (link,) = re.findall(r"http://testserver(/welcome/[^/\"]+/)", answer.content.decode())
     guest = Client()
@@ -81,8 +88,7 @@ def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
     assert can_sign_in("grace", PASSWORD)
 
 
-def test_several_people_are_pasted_at_once_or_none_of_them() -> None:
-    admin = signed_in(people()["admin"])
+def test_several_people_are_pasted_at_once_or_none_of_them(admin: Client) -> None:
     pasted = "Grace Höpper\tNavy\r\nAda <ada@example.org>; bob, Builder\n\n李雷"
     answer = admin.post(reverse("people"), {"username": pasted, "role": "expert"})
     assert answer.content.decode().count('id="link-') == 4
@@ -231,3 +237,234 @@ def test_ones_own_password_needs_the_old_one() -> None:
     assert here.post(url, {"old_password": "a password", **TWICE}).status_code == 302
     assert here.get(reverse("home")).status_code == 200
     assert there.get(reverse("home")).status_code == 302, "other devices are signed out"
+
+
+@pytest.fixture
+def study() -> Study:
+    return a_study()
+
+
+def invitation_of(study: Study, username: str = "eva") -> str:
+    fresh = invite(
+        study=study,
+        expert=User.objects.get(username=username),
+        actor=User.objects.filter(is_superuser=True).first(),
+    )
+    return reverse("invitation", args=[fresh.token])
+
+
+def who(client: Client) -> str | None:
+    key = client.session.get("_auth_user_id")
+    return User.objects.get(pk=key).username if key else None
+
+
+def text(page: bytes) -> str:
+    return " ".join(page.decode().split())
+
+
+def test_opening_the_link_says_who_invites_to_what_and_signs_nobody_in(study: Study) -> None:
+    admin = people()["admin"]
+    client, url = Client(), invitation_of(study)
+    for answer in (client.get(url), client.head(url)):
+        assert answer.status_code == 200
+        assert answer.headers["Referrer-Policy"] == "strict-origin"
+        assert "no-store" in answer.headers["Cache-Control"]
+    page = text(client.get(url).content)
+    expected = f"{admin.person.pseudonym} invites you to compare edited traffic scenes"
+    assert expected in page
+    assert "“Round 1”" in page
+    assert who(client) is None
+    assert Invitation.objects.get().used_at is None
+
+
+def test_the_button_signs_in_for_thirty_days_and_leads_to_the_first_pair(study: Study) -> None:
+    client = Client()
+    answer = client.post(invitation_of(study))
+    assert answer.headers["Location"] == reverse("vote", args=[study.code])
+    assert who(client) == "eva"
+    assert client.session.get_expiry_age() == 30 * 24 * 3600
+    assert Invitation.objects.get().used_at is not None
+
+
+def test_a_second_device_takes_over_after_a_confirmation(study: Study) -> None:
+    first, second, url = Client(), Client(), invitation_of(study)
+    assert "signs you out on every other device" not in text(first.get(url).content)
+    first.post(url)
+    assert "signs you out on every other device" in text(second.get(url).content)
+    assert first.get(reverse("home")).status_code == 200, "a look signs nobody out"
+    second.post(url)
+    assert [one.get(reverse("home")).status_code for one in (first, second)] == [302, 200]
+
+
+def test_an_expert_from_the_list_of_people_comes_in_without_a_password(
+    study: Study, admin: Client
+) -> None:
+    made = admin.post(reverse("people"), {"username": "grace", "role": "expert"})
+    grace = User.objects.get(username="grace")
+    pages = [made, admin.post(reverse("person-link", args=[grace.person.code]))]
+    older, url = (re.findall(r'"(http://testserver/[^"]+)"', text(x.content))[0] for x in pages)
+    assert Client().get(older).status_code == 410
+    guest = Client()
+    assert guest.post(url)["Location"] == reverse("home")
+    assert not grace.has_usable_password()
+    invitation_of(study)
+    assert Client().get(url).status_code == 200, "another one's changes nothing"
+    token = make_api_token(owner=grace, name="mine", role="expert", days=1).token
+    admin.post(reverse("person-change", args=[grace.person.code]), {"act": "take-back"})
+    token.refresh_from_db()
+    assert token.revoked_at is not None
+    assert guest.get(reverse("home")).status_code == 302
+    assert Client().post(url).status_code == 410
+
+
+def test_another_account_on_the_device_is_named_and_signed_out(
+    study: Study, researcher: Client
+) -> None:
+    url = invitation_of(study)
+    assert "You are signed in as the-researcher" in text(researcher.get(url).content)
+    researcher.post(url)
+    assert who(researcher) == "eva"
+
+
+@pytest.mark.parametrize("column", ["expires_at", "revoked_at"])
+def test_a_link_that_is_over_says_so(study: Study, column: str) -> None:
+    client, url = Client(), invitation_of(study)
+    Invitation.objects.update(**{column: timezone.now()})
+    for answer in (client.get(url), client.post(url)):
+        assert answer.status_code == 410
+        assert "This link is no longer in use" in text(answer.content)
+        assert answer.headers["Referrer-Policy"] == "strict-origin"
+    assert who(client) is None
+
+
+def test_a_made_up_link_is_404(study: Study) -> None:
+    url = reverse("invitation", args=["guessed"])
+    assert Client().get(url).status_code == 404
+    assert Client().post(url).status_code == 404
+
+
+def test_an_admin_invites_once_for_all_and_sees_each_link_once(
+    study: Study, admin: Client
+) -> None:
+    page = reverse("study", args=[study.code])
+    assert "Invite 2 experts" in text(admin.get(page).content)
+    answer = admin.post(reverse("invite", args=[study.code]))
+    assert "no-store" in answer.headers["Cache-Control"]
+    addresses = re.findall(r'value="(http://testserver/invitation/[^"]+)"', text(answer.content))
+    assert len(addresses) == 2
+    expert = Client()
+    expert.post(addresses[0])
+    assert who(expert) == "eva"
+    listed = text(admin.get(page).content)
+    assert "Invite 2" not in listed
+    assert "/invitation/" not in listed
+    again = admin.post(reverse("invite", args=[study.code]), follow=True)
+    assert "Nobody was left to invite" in text(again.content)
+
+
+def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study, admin: Client) -> None:
+    came, url = Client(), invitation_of(study)
+    came.post(url)
+    by_password = signed_in(User.objects.get(username="eva"))
+    answer = admin.post(reverse("revoke", args=[Invitation.objects.get().code]), follow=True)
+    assert "The link was taken back." in text(answer.content)
+    vote = reverse("vote", args=[study.code])
+    assert came.get(vote).status_code == 302
+    assert by_password.get(vote).status_code == 200
+    assert Client().post(url).status_code == 410
+
+
+def test_no_log_line_holds_a_key() -> None:
+    paths = (
+        "/invitation/aB-c_9/",
+        "/welcome/aB-c_9/",
+        "/enrol/aB-c_9/?PROLIFIC_PID=x&SESSION_ID=y",
+    )
+    line = logging.LogRecord("x", logging.INFO, "", 1, "GET %s %s %s", paths, None)
+    assert HideKeys().filter(line)
+    assert line.getMessage() == "GET /invitation/.../ /welcome/.../ /enrol/.../"
+
+
+def attempt(password: str, username: str = "the-expert", **headers: str) -> HttpResponse:
+    sent = {"username": username, "password": password}
+    return Client().post(reverse("login"), sent, **headers)  # type: ignore[arg-type,return-value]
+
+
+def test_five_wrong_passwords_lock_the_account_and_the_page_says_for_how_long() -> None:
+    people()
+    assert [attempt("wrong").status_code for _ in range(5)] == [200, 200, 200, 200, 429]
+    answer = attempt("a password")
+    page = " ".join(answer.content.decode().split())
+    assert answer.status_code == 429
+    assert "Too many wrong passwords" in page
+    assert "for 15 minutes" in page
+
+
+def test_a_name_that_no_account_can_have_is_not_stored() -> None:
+    assert attempt("wrong", 151 * "x").status_code == 200
+    assert not AccessAttempt.objects.exists()
+
+
+def test_others_and_other_places_are_not_locked() -> None:
+    people()
+    for _ in range(5):
+        attempt("wrong")
+    assert attempt("a password", "the-researcher").status_code == 302
+    assert attempt("a password", REMOTE_ADDR="192.0.2.7").status_code == 302
+
+
+def test_a_right_password_wipes_the_count() -> None:
+    people()
+    for _ in range(2):
+        assert [attempt("wrong").status_code for _ in range(4)] == [200] * 4
+        assert attempt("a password").status_code == 302
+
+
+def test_an_address_that_tries_one_account_after_the_other_is_locked_as_a_whole(
+    settings: LazySettings,
+) -> None:
+    people()
+    settings.ADDRESS_FAILURE_LIMIT = 6
+    tried = [attempt("wrong", f"name-{number}").status_code for number in range(6)]
+    assert tried == [200] * 5 + [429]
+    assert attempt("a password").status_code == 429
+    assert attempt("a password", REMOTE_ADDR="192.0.2.7").status_code == 302
+
+
+def test_an_account_of_ones_own_does_not_wipe_the_count_of_the_address(
+    settings: LazySettings,
+) -> None:
+    people()
+    settings.ADDRESS_FAILURE_LIMIT = 6
+    for number in range(5):
+        assert attempt("wrong", f"name-{number}").status_code == 200
+        assert attempt("a password").status_code == 302
+    assert attempt("wrong", "name-5").status_code == 429
+
+
+def test_a_made_up_header_does_not_open_the_lock() -> None:
+    people()
+    for number in range(5):
+        answer = attempt("wrong", HTTP_X_FORWARDED_FOR=f"192.0.2.{number}")
+    assert answer.status_code == 429
+
+
+@pytest.mark.parametrize(
+    ("proxies", "header", "expected"),
+    [
+        (0, "192.0.2.7", "127.0.0.1"),
+        (1, "made up, 192.0.2.7", "192.0.2.7"),
+        (2, "203.0.113.9, 192.0.2.7, 10.0.0.1", "192.0.2.7"),
+        (2, "192.0.2.7", "127.0.0.1"),
+        (1, "", None),
+        (1, "unknown", None),
+        (1, "2001:db8:1:2:3:4:5:6", "2001:db8:1:2::"),
+        (1, "::ffff:192.0.2.7", "192.0.2.7"),
+    ],
+)
+def test_the_address_is_the_one_that_our_own_proxies_saw(
+    settings: LazySettings, proxies: int, header: str, expected: str | None
+) -> None:
+    settings.PROXIES = proxies
+    request = RequestFactory().get("/", HTTP_X_FORWARDED_FOR=header)
+    assert client_address(request) == expected

@@ -1,18 +1,38 @@
-"""Opening, watching and closing a study by its pages."""
+"""Opening, watching, closing and cancelling a study by its pages; votes that come as a file."""
+
+import html
+import re
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from django.contrib.auth.models import User
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.http import HttpResponse
+from django.test import Client
 from django.urls import reverse
 
-from arena.models import Study
+from arena.errors import NoSnapshot, StudyNotOpen
+from arena.jobs.services import open_labelling
+from arena.models import ImportedVote, Study, Vote
+from arena.results.queries.access import snapshot_to_export
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.pages import setup
+from arena.studies.queries import count_progress
+from arena.studies.services.opening import cancel_study, close_study
+from arena.studies.services.outlook import StudyEstimate, prospect
+from arena.studies.services.plan import PRESETS
+from arena.voting.queries.ballots import tallies, voting_progress
+from arena.voting.queries.blinding import ResultsAccess, results_access
 from augment import tasks
-from augment.models import Augmentation
+from augment.errors import Conflict
+from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from tests import study_rows
 from tests.scenes import vehicle
-from tests.web.cast import people, signed_in
+from tests.web.ballots import page as ballot_page
+from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
 
@@ -52,11 +72,10 @@ def test_progress_is_shown_by_expert_and_says_nothing_of_who_leads() -> None:
     assert "finn" not in shown, "researchers know experts by their pseudonyms"
 
 
-def test_closing_rates_the_votes_once_and_shows_the_table() -> None:
+def test_closing_rates_the_votes_once_and_shows_the_table(admin: Client) -> None:
     study = study_rows.a_study()
     for matchup in study_rows.matchups_of(study, "eva")[:2]:
         study_rows.vote(matchup)
-    admin = signed_in(people()["admin"])
     for _ in range(2):
         answer = admin.post(reverse("study-close", args=[study.code]), {"sure": "1"}, follow=True)
         assert answer.redirect_chain[-1][0] == reverse("results", args=[study.code])
@@ -74,9 +93,8 @@ def opened(**rules: object) -> tuple[int, str]:
     return answer.status_code, " ".join(answer.content.decode().split())
 
 
-def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
+def test_an_admin_hands_over_what_an_expert_has_not_judged(admin: Client) -> None:
     study = study_rows.a_study(experts=("eva", "finn", "gus"))
-    admin = signed_in(people()["admin"])
     url = reverse("study-hand-over", args=[study.code])
     given = {"giver": "eva", "takers": ["finn", "gus"], "sure": "1"}
     said = admin.post(url, given, follow=True)
@@ -108,3 +126,247 @@ def test_attention_checks_are_drawn_by_a_worker_with_one_click(
     tasks.draw_checks(*sent)
     drawn = Augmentation.objects.get(contestant__kind="check")
     assert (drawn.scenario.slug, sent) == ("with-reference", [admin.pk])
+
+
+@pytest.fixture
+def study() -> Study:
+    """Open, with three votes and a skip of eva's."""
+    study = study_rows.a_study()
+    first, *rest = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first, "skip", reason="unclear")
+    for matchup in rest[:3]:
+        study_rows.vote(matchup)
+    return study
+
+
+def test_cancelling_needs_the_name_and_says_how_it_differs_from_closing(
+    study: Study, admin: Client
+) -> None:
+    page = reverse("study-cancel", args=[study.code])
+    assert page in admin.get(reverse("study", args=[study.code])).content.decode()
+    asked = text_of(admin.get(page))
+    assert "Cancel the study “Round 1”?" in asked
+    assert "nobody ever sees results" in asked
+    assert "exported as votes: 3." in asked
+    assert "To end it with results, close it instead." in asked
+    for typed in ("", "Round", "round 12"):
+        answer = admin.post(page, {"sure": "1", "typed": typed, "why": "Wrong pictures."})
+        assert answer.status_code == 422, typed
+        assert "That is another name; nothing was done." in text_of(answer)
+        assert "Wrong pictures." in answer.content.decode(), "nothing is lost"
+        assert Study.objects.get().state == "open"
+    answer = admin.post(page, {"sure": "1", "typed": "round-1", "why": "Wrong pictures."})
+    assert answer.headers["Location"] == reverse("study", args=[study.code])
+    event = Event.objects.get(verb="cancel")
+    assert event.after == {"state": "cancelled", "why": "Wrong pictures."}
+    assert event.actor == User.objects.get(username="the-admin")
+    assert admin.get(page).status_code == 302, "there is nothing more to ask"
+
+
+def test_an_expert_reads_a_calm_sentence_and_can_vote_no_more(study: Study) -> None:
+    eva = signed_in(User.objects.get(username="eva"))
+    waiting = study_rows.matchups_of(study, "eva")[5]
+    cancel_study(study=study)
+    shown = text_of(eva.get(reverse("vote", args=[study.code])))
+    assert "This study was cancelled" in shown
+    assert "There is nothing left for you to do. Your 3 answers are saved, thank you." in shown
+    assert "This study was cancelled" in text_of(eva.get("/"))
+    with pytest.raises(StudyNotOpen):
+        study_rows.vote(waiting)
+    assert Vote.objects.count() == 4
+
+
+def test_it_has_no_results_for_anybody_also_where_somebody_rated_early(
+    study: Study, admin: Client
+) -> None:
+    early = rate(study=study, early=True, rounds=20)
+    cancel_study(study=study)
+    study.refresh_from_db()
+    for user in User.objects.all():
+        assert results_access(user=user, study=study) is ResultsAccess.NONE, user
+    for name in ("results", "study-rate"):
+        address = reverse(name, args=[study.code])
+        answer = admin.post(address) if name == "study-rate" else admin.get(address)
+        assert answer.status_code == 403, name
+    with pytest.raises(NoSnapshot):
+        snapshot_to_export(study, early.code)
+    with pytest.raises(Conflict):
+        rate(study=study, early=True, rounds=20)
+    shown = admin.get(reverse("studies")).content.decode()
+    assert "Cancelled" in shown
+    assert reverse("results", args=[study.code]) not in shown
+
+
+def test_closed_and_cancelled_exclude_each_other(study: Study) -> None:
+    for _ in range(2):
+        assert cancel_study(study=study).state == "cancelled"
+    assert Event.objects.filter(verb="cancel").count() == 1
+    with pytest.raises(StudyNotOpen, match="is cancelled already"):
+        close_study(study=study)
+    Study.objects.update(state="closed")
+    with pytest.raises(StudyNotOpen, match="is closed"):
+        cancel_study(study=study)
+
+
+def test_the_form_says_what_its_votes_will_tell_and_a_preset_changes_them(admin: Client) -> None:
+    cast = study_rows.cast_of()
+    cast["scenarios"] = ["finished"]
+    sent = {**cast, "votes_per_expert": "9", "repeats": "0", "checks": "0", "overlap": "0"}
+    shown = text_of(admin.post(reverse("study-new"), {**sent, "estimate": "1"}))
+    estimate = StudyEstimate(
+        contestants=3, experts=2, scenarios=6, votes_per_expert=9, repeats=0, checks=0, overlap=0
+    )
+    assert "18 votes 9 from each of 2 experts, about 2 minutes each, on 6 scenarios." in shown
+    assert f"±{prospect(estimate).half_width:.0f} Elo" in shown
+    pressed = text_of(admin.post(reverse("study-new"), {**sent, "preset": "pilot"}))
+    preset = PRESETS["pilot"].quantities
+    votes = int(preset["votes_per_expert"])
+    pilot = replace(estimate, votes_per_expert=votes, overlap=preset["overlap"])
+    assert f"{2 * votes} votes {votes} from each of 2 experts" in pressed
+    assert f"±{prospect(pilot).half_width:.0f} Elo" in pressed
+
+
+def test_a_new_form_is_filled_in_with_what_is_finished() -> None:
+    cast = study_rows.cast_of()
+    study_rows.contestant("late")
+    shown = text_of(signed_in(people()["admin"]).get(reverse("study-new")))
+    assert len(cast["contestants"]) == 3
+    assert "from each of 3 experts" in shown, "the account of the cast of pages is one, too"
+    assert "on 6 scenarios" in shown
+
+
+def text_of(answer: Any) -> str:
+    plain = re.sub(r"<[^>]+>", " ", html.unescape(answer.content.decode()))
+    return " ".join(plain.split())
+
+
+def hidden_of(answer: Any) -> dict[str, list[str]]:
+    """What the page sends along, as a browser would."""
+    sent: dict[str, list[str]] = {}
+    pattern = r'<input type="hidden" name="([^"]+)" value="([^"]*)">'
+    for name, value in re.findall(pattern, answer.content.decode()):
+        if name != "csrfmiddlewaretoken":
+            sent.setdefault(name, []).append(html.unescape(value))
+    return sent
+
+
+def admin_of() -> Client:
+    return signed_in(people()["admin"])
+
+
+def test_closing_a_study_asks_and_says_what_will_be_missing() -> None:
+    study = study_rows.a_study()
+    first, second, *rest = study_rows.matchups_of(study, "eva")
+    study_rows.vote(first, "skip", reason="unclear")
+    for matchup in (second, *rest):
+        study_rows.vote(matchup)
+    admin, page = admin_of(), reverse("study-close", args=[study.code])
+    assert page in admin.get(reverse("study", args=[study.code])).content.decode()
+    for asked in (admin.get(page), admin.post(page)):
+        assert asked.status_code == 200
+        shown = text_of(asked)
+        assert "Close the study “Round 1”?" in shown
+        assert "Votes given: 8. Pairs skipped: 1. Still planned: 9." in shown
+        study.refresh_from_db()
+        assert study.state == "open"
+    admin.post(page, {"sure": "1"})
+    study.refresh_from_db()
+    assert study.state == "closed"
+    assert admin.get(page).status_code == 302, "a closed one asks nothing"
+
+
+def test_every_question_is_for_admins_alone_and_no_crawler_acts(researcher: Client) -> None:
+    study = study_rows.a_study()
+    job = GenerationJob.objects.all()[0]
+    labelling = open_labelling(name="F", job=job, experts=["eva"], seed=1)
+    for name, row in (("study-close", study), ("job-cancel", job), ("labelling-close", labelling)):
+        page = reverse(name, args=[row.code])
+        assert researcher.get(page).status_code == 403
+        assert researcher.post(page, {"sure": "1"}).status_code == 403
+    admin = signed_in(User.objects.get(username="the-admin"))
+    admin.get(reverse("study-close", args=[study.code]), {"sure": "1"})
+    study.refresh_from_db()
+    assert study.state == "open", "a GET never acts"
+
+
+def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() -> None:
+    study = study_rows.a_study(votes_per_expert=3)
+    first, second, third = study_rows.matchups_of(study, "eva")
+    skipped = study_rows.vote(first, "skip", reason="unclear")
+    study_rows.vote(second, "skip", reason="unclear")
+    study_rows.vote(third)
+    before = study_rows.vote(study_rows.matchups_of(study, "finn")[0])
+    study_rows.vote(before.matchup, "skip", reason="other", supersedes=before.key)
+
+    def counted() -> tuple[object, ...]:
+        (line,), eva = count_progress([study]), tallies(study)[0]
+        (own,) = count_progress([study], first.expert)
+        return (
+            (line.voted, line.skipped, line.left),
+            (eva.voted, eva.skipped, eva.left),
+            (own.voted, own.skipped, own.left),
+        )
+
+    assert counted() == ((1, 3, 2), (1, 2, 0), (1, 2, 0))
+    state = voting_progress(study=study, expert=first.expert)
+    assert (state.voted, state.skipped, state.left) == (1, 2, 0)
+    shown = signed_in(people()["researcher"]).get(reverse("study", args=[study.code]))
+    text = " ".join(re.sub(r"<[^>]+>", " ", shown.content.decode()).split())
+    assert "1 of 6 votes, 1 of 2 experts done; 3 pairs skipped" in text
+    study_rows.vote(first, "left", supersedes=skipped.key)
+    assert counted() == ((2, 2, 2), (2, 1, 0), (2, 1, 0))
+
+
+def test_a_skipped_pair_is_found_again_and_its_vote_stands_in_place_of_the_skip() -> None:
+    here = world()
+    eva, finn = signed_in(here.expert), signed_in(User.objects.get(username="finn"))
+    mine = study_rows.matchups_of(here.study, "eva")
+    skip = study_rows.vote(mine[0], "skip", reason="unclear", comment="Which lane?")
+    for matchup in [*mine[1:], *(study_rows.shown_again(one) for one in mine[1:5])]:
+        study_rows.vote(matchup)  # more than the page's last ten
+    address = reverse("vote-skipped", args=[here.study.code])
+    listed = eva.get(address).content.decode()
+    assert "Pair 1" in listed
+    assert "Instruction unclear" in listed
+    assert "Which lane?" in listed
+    assert f"?change={skip.key}" in listed
+    assert str(skip.key) not in finn.get(address).content.decode()
+    again = f"{ballot_page(here)}?change={skip.key}"
+    assert f'"change": {{"key": "{skip.key}"' in eva.get(again).content.decode()
+    assert '"change": null' in finn.get(again).content.decode()
+    study_rows.vote(mine[0], "right", supersedes=skip.key)
+    assert "You have skipped no pair" in eva.get(address).content.decode()
+
+
+FINE = b"model_a,model_b,winner,judge,item\nann,bob,model_a,j1,i1\nbob,ann,tie,j2,i2\n"
+
+
+def _send(content: bytes, *, file: str = "votes.csv", name: str = "Elsewhere") -> HttpResponse:
+    admin = people()["admin"]
+    sent = {"name": name, "file": SimpleUploadedFile(file, content)}
+    answer = signed_in(admin).post(reverse("import-votes"), sent)
+    assert isinstance(answer, HttpResponse)
+    return answer
+
+
+def test_a_file_becomes_a_closed_study_of_whoever_sent_it() -> None:
+    answer = _send(FINE)
+    study = Study.objects.get()
+    assert answer.headers["Location"] == reverse("results", args=[study.code])
+    assert (study.name, study.state, ImportedVote.objects.count()) == ("Elsewhere", "closed", 2)
+    event = Event.objects.get(verb="import votes")
+    assert event.actor is not None
+    assert event.actor.username == "the-admin"
+
+
+def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(setup, "MOST_MB", 0)
+    answer = _send(FINE)
+    assert answer.status_code == 422
+    assert "Send a smaller one" in answer.content.decode()
+    assert not Study.objects.exists()
+
+
+def test_a_name_that_climbs_out_of_its_folder_stays_in_it() -> None:
+    _send(b"model_a,model_b,winner\nann,bob,tie\n", file="../../etc/passwd")
+    assert Study.objects.get().vote_file.name == "passwd"

@@ -16,17 +16,12 @@ from arena.studies.services.planning import frozen_rules
 from arena.studies.services.taking_part import forget_identity
 from tests import study_rows
 from tests.opening import open_study
-from tests.web.cast import people, signed_in
-from tests.web.test_questions import hidden_of, text_of
+from tests.web.cast import signed_in
+from tests.web.test_studies import hidden_of, text_of
 
 pytestmark = pytest.mark.django_db
 
 NEW = "/studies/new/"
-
-
-@pytest.fixture
-def admin() -> Client:
-    return signed_in(people()["admin"])
 
 
 def page_of(draft: StudyDraft) -> str:

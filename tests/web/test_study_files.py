@@ -1,6 +1,7 @@
-"""Files of a study by buttons of its page: a worker writes each, for whoever may have it."""
+"""Files of studies and benchmarks by buttons: a worker writes each, for whoever may have it."""
 
 import io
+import json
 import zipfile
 from pathlib import Path
 
@@ -12,15 +13,17 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import Settings
 
-from arena.models import EarlyLook, Study, StudyFile
+from arena.models import BenchmarkFile, EarlyLook, Study, StudyFile
 from arena.results.exports.study_folder import STUDY_FILES
 from arena.results.services.ratings import rate_now as rate
+from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
 from arena.studies.services.opening import cancel_study, close_study
-from augment.models import Augmentation, Event, GenerationJob
-from augment.scene.codec import modification_to_document
+from augment.models import Augmentation, Benchmark, Event, GenerationJob
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
 from tests.exports.test_study_folder import export
 from tests.scenes import vehicle
+from tests.services.test_benchmarks import add_street
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, png, signed_in
 
@@ -62,9 +65,8 @@ def shown(client: Client, study: Study) -> str:
 
 
 def test_a_worker_writes_the_folder_of_the_command_as_one_zip(
-    closed: Study, tmp_path: Path
+    closed: Study, tmp_path: Path, admin: Client
 ) -> None:
-    admin = signed_in(people()["admin"])
     address = reverse("study-file", args=[closed.code, "study"])
     assert reverse("study-write", args=[closed.code, "study"]) in shown(admin, closed)
     admin.post(reverse("study-write", args=[closed.code, "study"]))
@@ -82,8 +84,7 @@ def test_a_worker_writes_the_folder_of_the_command_as_one_zip(
     assert Event.objects.get(verb="ask for a file").after == {"file": "study"}
 
 
-def test_a_making_that_fails_says_why(closed: Study) -> None:
-    admin = signed_in(people()["admin"])
+def test_a_making_that_fails_says_why(closed: Study, admin: Client) -> None:
     GenerationJob.objects.update(state=GenerationJob.State.RUNNING)
     assert write(admin, closed, "study").state == "failed"
     assert "of this study still runs" in shown(admin, closed)
@@ -94,8 +95,7 @@ def test_a_making_that_fails_says_why(closed: Study) -> None:
     assert StudyFile.objects.get().state == "ready", "and the failed one is gone"
 
 
-def test_a_worker_writes_the_zip_of_the_newest_rating(closed: Study) -> None:
-    admin = signed_in(people()["admin"])
+def test_a_worker_writes_the_zip_of_the_newest_rating(closed: Study, admin: Client) -> None:
     assert write(admin, closed, "rating").state == "ready"
     address = reverse("results-export", args=[closed.code, "all", "zip"])
     assert content_of(admin, closed, "rating") == admin.get(address).content
@@ -144,3 +144,62 @@ def test_what_became_impossible_meanwhile_is_not_written(closed: Study) -> None:
     STUDY_FILES.perform(row.pk)
     row.refresh_from_db()
     assert (row.state, "cancelled" in row.reason) == ("failed", True)
+
+
+FORM = {**{"title": "Streets", "scenarios": "street-*"}, **{"practice": "40", "seed": "1"}}
+
+
+def test_it_is_counted_made_written_and_got(settings: Settings, tmp_path: Path) -> None:
+    settings.MEDIA_ROOT = tmp_path
+    for number in range(1, 6):
+        add_street(number)
+    cast = people()
+    admin, researcher = signed_in(cast["admin"]), signed_in(cast["researcher"])
+    counted = admin.post(reverse("benchmark-new"), FORM | {"title": "", "estimate": "1"})
+    counts = {line.label: (line.practice, line.test) for line in counted.context["counts"]}
+    assert counts == {"Easy": (2, 3), "Medium": (0, 0), "Hard": (0, 0), "All": (2, 3)}
+    assert not Benchmark.objects.exists()
+    made = admin.post(reverse("benchmark-new"), FORM)
+    row = Benchmark.objects.get()
+    assert made["Location"] == reverse("benchmark", args=[row.code])
+    waiting = researcher.get(made["Location"]).content.decode()
+    assert all(text in waiting for text in ("It waits for a worker", 'id="live" data-live'))
+    assert researcher.get(reverse("benchmark-file", args=[row.code])).status_code == 404
+    BENCHMARK_FILES.perform(BenchmarkFile.objects.get().pk)
+    page = researcher.get(made["Location"]).content.decode()
+    assert all(text in page for text in (row.checksum, "streets-1.zip", "5 tasks", "street-3"))
+    assert "data-live" not in page
+    answer = researcher.get(reverse("benchmark-file", args=[row.code]))
+    check_no_test_reference(row, b"".join(answer), page)
+    researcher.post(reverse("benchmark-retired", args=[row.code]))
+    row.refresh_from_db()
+    assert row.retired_at is None, "that is for admins"
+    admin.post(reverse("benchmark-retired", args=[row.code]))
+    assert "retired" in admin.get(reverse("benchmarks")).content.decode()
+
+
+def check_no_test_reference(row: Benchmark, content: bytes, page: str) -> None:
+    """No document of a reference of the test is in the zip or on the page, nor a number of it."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    practice = {item.scenario.slug for item in row.items.filter(split="practice")}
+    assert len(practice) == 2
+    references = {name for name in files if name.startswith("references/")}
+    assert references == {f"references/{slug}.json" for slug in practice}
+    for item in row.items.select_related("scenario"):
+        (agent,) = modification_from_document(item.scenario.reference).added
+        where = {name for name, written in files.items() if str(agent.x_m).encode() in written}
+        slug = item.scenario.slug
+        assert where == ({f"references/{slug}.json"} if slug in practice else set())
+        whole = json.dumps((item.scenario.reference or {})["add"]).encode()
+        assert not [name for name, written in files.items() if whole in written and not where]
+        assert str(agent.x_m) not in page
+
+
+def test_what_is_wrong_is_told_at_its_field(admin: Client) -> None:
+    answer = admin.post(reverse("benchmark-new"), FORM | {"title": ""})
+    assert answer.status_code == 422
+    assert list(answer.context["form"].errors) == ["title"]
+    answer = admin.post(reverse("benchmark-new"), FORM | {"scenarios": "no", "estimate": "1"})
+    assert answer.status_code == 200
+    assert "Unknown scenario" in answer.content.decode()

@@ -21,6 +21,8 @@ from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
+
+
 NEW = "/submissions/new/"
 
 
@@ -146,11 +148,10 @@ def test_a_program_sends_one_and_gets_its_report(benchmark: Benchmark) -> None:
     assert enno.post("/api/v1/submissions", body | {"benchmark": "none"}).status_code == 422
 
 
-def test_its_card_stands_in_results_and_their_files_alone() -> None:
+def test_its_card_stands_in_results_and_their_files_alone(admin: Client) -> None:
     study = a_study()
     Contestant.objects.filter(slug="ann").update(kind="submission", card=CARD)
     vote(study.matchups.earliest("pk"), "left")
-    admin = signed_in(people()["admin"])
     here = reverse("study", args=[study.code])
     assert "A. Author" not in admin.get(here).content.decode()
     close_study(study=study)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from botocore.client import BaseClient
 from django.core.files.storage import default_storage
+from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 from PIL import Image, UnidentifiedImageError
@@ -24,7 +25,7 @@ from augment.services.scenarios.thumbnails import find_box, shrink
 from tests import scenes
 from tests.buckets import Bucket, bucket
 from tests.jobs.rows import add_scenario
-from tests.web.cast import people, png, signed_in
+from tests.web.cast import png
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +85,10 @@ def test_old_charts_of_a_bucket_are_found_by_one_request(
 
 
 @pytest.mark.django_db
-def test_pages_ask_for_the_width_that_they_show(picture: bytes) -> None:
+def test_pages_ask_for_the_width_that_they_show(picture: bytes, researcher: Client) -> None:
     scenario = add_scenario("street")
     scenario.original_image = store(picture)
     scenario.save()
-    researcher = signed_in(people()["researcher"])
     address = reverse("picture", args=["original", scenario.code])
     sizes = {
         query: Image.open(io.BytesIO(b"".join(researcher.get(address + query)))).width

@@ -1,14 +1,56 @@
-"""The voting page: one vote per decision, nothing of who made what."""
+"""The voting page: one vote per decision, films, drives and practice; not who made what."""
 
+import gzip
+import json
 import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
+from django.conf import settings
+from django.contrib.auth.models import User
+from django.test import Client
 from django.urls import reverse
 
+from arena.models import Matchup, PracticePair, Study, Vote
+from arena.people.links import accept, invite
 from arena.studies.services.opening import close_study
+from arena.voting.queries.ballots import voting_progress
+from arena.voting.queries.showings import as_shown
+from arena.voting.services.practice import is_due, practice_pairs
+from augment.models import Augmentation, Scenario
+from augment.render.bev import draw, draw_empty
+from augment.render.camera import camera_for
+from augment.render.film import make_film
+from augment.scene.codec import modification_to_document
+from augment.scene.entities import AgentType, Modification
+from augment.scene.planned_motion import AtTime, PlannedMotion
+from augment.services.scenarios.pictures import (
+    draw_checks,
+    draw_scenario,
+    film_document,
+    redraw,
+    store,
+)
 from tests import study_rows
+from tests.drives import drive_pictures
+from tests.moving import a_moving_study, cutting_in
+from tests.opening import open_study
+from tests.recorded import recorded
+from tests.scenes import vehicle
+from tests.study_rows import (
+    KINDS,
+    Cast,
+    a_study,
+    cast_of,
+    contestant,
+    matchups_of,
+    picture,
+    scenario,
+)
 from tests.web.ballots import following, page
-from tests.web.cast import names_of_contestants, people, signed_in, status, world
+from tests.web.cast import World, names_of_contestants, people, png, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
 
@@ -76,3 +118,312 @@ def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
     assert signed_in(here.expert).get(theirs).status_code == 404
     assert status(people()["admin"], theirs) == 200
     assert signed_in(here.expert).get(reverse("matchup-image", args=["x"])).status_code == 404
+
+
+BASE = Path(settings.BASE_DIR)
+NUMBERS = ("one", "many")
+
+
+def given_to_the_script(here: World) -> dict[str, Any]:
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    found = re.search(r'<script id="given" [^>]*>(.*?)</script>', shown)
+    assert found is not None
+    given: dict[str, Any] = json.loads(found.group(1))
+    return given
+
+
+def test_the_script_gets_the_pair_on_the_page_and_four_more() -> None:
+    here = world()
+    given = given_to_the_script(here)
+    mine = study_rows.matchups_of(here.study, "eva")[:5]
+    assert [pair["matchup"] for pair in given["pairs"]] == [str(one.code) for one in mine]
+    assert (given["saved"], given["total"], given["last"]) == (0, 9, [])
+
+
+def test_the_script_gets_the_last_ten_votes_the_latest_first() -> None:
+    here = world()
+    for matchup in study_rows.matchups_of(here.study, "eva")[:3]:
+        study_rows.vote(matchup, "equal")
+    given = given_to_the_script(here)
+    assert [vote["position"] for vote in given["last"]] == [3, 2, 1]
+    assert {vote["outcome"] for vote in given["last"]} == {"E"}
+    assert given["last"][0]["shown"]["matchup"] in {
+        str(one.code) for one in study_rows.matchups_of(here.study, "eva")
+    }
+
+
+def test_the_outbox_of_two_people_or_studies_is_never_the_same() -> None:
+    here = world()
+    given = given_to_the_script(here)
+    assert str(here.study.code) in given["outbox"]
+    assert str(here.expert.person.code) in given["outbox"]
+
+
+def test_every_text_that_the_script_says_is_on_the_page() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(page(here)).content.decode()
+    offered = set(re.findall(r'data-text="([\w-]+)"', shown))
+    scripts = "".join(path.read_text() for path in (BASE / "static/js").glob("vote*.js"))
+    said = set(re.findall(r'(?<!\.)\b(?:text|note|say)\("([\w-]+)"', scripts))
+    said |= {f"{name}-{n}" for name in re.findall(r'counted\("(\w+)"', scripts) for n in NUMBERS}
+    said |= {f"{name}-{n}" for name in re.findall(r'data-kept="(\w+)"', shown) for n in NUMBERS}
+    assert said <= offered
+
+
+STATIC = Path(settings.BASE_DIR) / "static"
+
+
+MOST_BYTES = 40 * 1024
+
+
+@pytest.mark.django_db
+def test_the_voting_page_loads_at_most_40_kb_and_names_every_module_of_its_script() -> None:
+    here = world()
+    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
+    loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
+    assert {"js/vote.js", "css/vote.css"} <= loaded
+    sizes = {name: len(gzip.compress((STATIC / name).read_bytes())) for name in sorted(loaded)}
+    assert sum(sizes.values()) <= MOST_BYTES, sizes
+    named = set(re.findall(r'modulepreload" href="/static/js/([\w-]+\.js)"', shown))
+    imported: set[str] = set()
+    for script in ("vote.js", *named):
+        text = (STATIC / "js" / script).read_text()
+        imported |= set(re.findall(r'from "\./([\w-]+\.js)"', text))
+    assert named == imported
+
+
+@pytest.fixture
+def moving() -> Study:
+    return a_moving_study(scenarios=2, votes=6)
+
+
+@pytest.fixture
+def filmed(moving: Study) -> Client:
+    return signed_in(moving.experts.get())
+
+
+def sides(matchup: Matchup) -> dict[str, str]:
+    """The addresses of both pictures, by who made them."""
+    shown = as_shown(study_rows.matchups_of(matchup.study, "eva")[matchup.position - 1])
+    assert shown["is_filmed"]
+    return {matchup.left.contestant.slug: shown["a"], matchup.right.contestant.slug: shown["b"]}
+
+
+def read(client: Client, address: str) -> dict[str, Any]:
+    answer = client.get(address, {"film": ""})
+    assert answer.headers["Cache-Control"] == "private, max-age=31536000, immutable"
+    assert not {"ETag", "Last-Modified", "Content-Disposition"} & set(answer.headers)
+    document: dict[str, Any] = json.loads(answer.content)
+    # Where the picture beneath lies: at the same token.
+    ground = document.pop("ground")
+    assert ground.partition("?")[0] == address
+    assert b"".join(client.get(ground)).startswith(b"\x89PNG")
+    return document
+
+
+def test_both_sides_have_films_of_one_form_and_who_does_the_same_has_the_same(
+    moving: Study, filmed: Client
+) -> None:
+    films: dict[str, list[dict[str, Any]]] = {"ann": [], "bob": [], "cid": []}
+    for matchup in moving.matchups.all():
+        for slug, address in sides(matchup).items():
+            films[slug].append(read(filmed, address))
+    # Also bob's, whose car stands beside those that move.
+    for shown in films.values():
+        assert len(shown) > 1
+        assert all(one == shown[0] for one in shown)
+        assert shown[0].keys() == films["ann"][0].keys()
+    assert films["ann"][0] != films["cid"][0]
+    said = json.dumps(films["ann"])
+    assert not any(word in said for word in ("ann", "New1", "Agent", "place"))
+
+
+def test_strangers_and_stills_have_no_film(moving: Study, researcher: Client) -> None:
+    matchup = moving.matchups.all()[0]
+    (address, *_) = sides(matchup).values()
+    finn = signed_in(study_rows.expert("finn"))
+    assert finn.get(address, {"film": ""}).status_code == 404
+    still = study_rows.scenario("still")
+    redraw(still)
+    assert film_document(still.original_image) is None
+    picture = reverse("picture", args=["original", still.code])
+    assert researcher.get(picture, {"film": ""}).status_code == 404
+
+
+def test_where_one_begins_to_move_every_picture_is_drawn_anew_with_a_film() -> None:
+    place = study_rows.scenario("place")
+    rows = [study_rows.picture(place, study_rows.contestant(name)) for name in ("ann", "bob")]
+    study_rows.write_changes()
+    redraw(place)
+    assert not any("film" in row.image for row in place.augmentations.all())
+    moving = modification_to_document(Modification(added=(cutting_in(1.0),)))
+    Augmentation.objects.filter(pk=rows[0].pk).update(modification=moving)
+    redraw(place)
+    films = [film_document(row.image) for row in place.augmentations.order_by("pk")]
+    assert all(films)
+    assert films[0] != films[1] == film_document(place.original_image)
+
+
+def test_a_reference_that_moves_has_a_film_on_its_scenarios_page(
+    moving: Study, researcher: Client
+) -> None:
+    cut_in = modification_to_document(Modification(added=(cutting_in(1.0),)))
+    Scenario.objects.update(reference=cut_in)
+    place = Scenario.objects.all()[0]
+    draw_scenario(place.pk)
+    page = researcher.get(reverse("scenario", args=[place.code])).content.decode()
+    assert page.count("?film") == 2
+    assert page.count("film-bar") == 1
+    assert read(researcher, reverse("picture", args=["reference", place.code]))["steps"] == 61
+
+
+@pytest.mark.realdata
+def test_a_moving_pair_of_a_busy_street_takes_less_than_300_kb(realdata: Path) -> None:
+    scene, recording = recorded(realdata)
+    cars = [one for one in scene.agents if one.type is AgentType.VEHICLE][:3]
+    motion = PlannedMotion(speeds=((2.0, 5.0),), start=AtTime())
+    change = Modification(moved=tuple(replace(car, motion=motion) for car in cars))
+    camera = camera_for(scene, change, expect=lambda *_: recording)
+    side = len(draw(scene, change, camera, recording))
+    side += len(make_film(scene, change, camera, recording))
+    before = len(draw(scene, Modification(), camera, recording))
+    assert 2 * side + before + len(draw_empty(scene, camera)) < 300_000
+
+
+def a_driven_cast(**cast: object) -> Cast:
+    made = cast_of(**cast)  # type: ignore[arg-type]
+    drive_pictures(Augmentation.objects.select_related("contestant", "scenario"))
+    return made
+
+
+def a_replayed_study(**cast: object) -> Study:
+    made = a_driven_cast(**cast)
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, allow_replay=True, **made)
+
+
+def ballot(study: Study) -> str:
+    return reverse("vote", args=[study.code])
+
+
+def loaded(shown: str) -> set[str]:
+    return set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
+
+
+def test_a_study_without_them_has_no_trace_of_them() -> None:
+    study = a_study()
+    eva = signed_in(User.objects.get(username="eva"))
+    for address in (ballot(study), f"{ballot(study)}help/"):
+        shown = eva.get(address).content.decode()
+        for trace in ("replay", "film.css", "Drives", "planner", "<kbd>D</kbd>"):
+            assert trace not in shown, (address, trace)
+
+
+def test_the_answer_says_nothing_of_where_it_comes_from() -> None:
+    first = matchups_of(a_replayed_study(), "eva")[0]
+    address = reverse("replay", args=[first.code])
+    answer = signed_in(User.objects.get(username="eva")).get(address)
+    assert set(answer.json()) == {"a", "b"}
+    assert set(answer.json()["a"]) == {
+        "format",
+        "version",
+        "step_s",
+        "steps",
+        "ego",
+        "road",
+        "objects",
+    }
+    assert answer["Cache-Control"] == "private, no-store"
+    assert not {"ETag", "Last-Modified", "Content-Disposition"} & set(answer.headers)
+    assert signed_in(User.objects.get(username="finn")).get(address).status_code == 404
+
+
+def opened(*, outside: int = 6, **options: object) -> Study:
+    """Six scenarios in the study and some outside of it, all with something to practise on."""
+    cast = cast_of()
+    for number in range(outside):
+        scenario(f"elsewhere-{number}")
+    right = modification_to_document(Modification(added=(vehicle("car", 12.0, 1.0),)))
+    Scenario.objects.update(reference=right)
+    reference = contestant("reference", KINDS.REFERENCE)
+    for place in Scenario.objects.all():
+        picture(place, reference)
+    draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
+    for number, row in enumerate(Augmentation.objects.all()):
+        Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
+    study = open_study(**{"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast, **options})
+    accept(token=invite(study=study, expert=the_eva()).token)
+    return study
+
+
+def the_eva() -> User:
+    return User.objects.get(username="eva")
+
+
+def practice(study: Study) -> str:
+    return reverse("vote-practice", args=[study.code])
+
+
+def pairs_page(study: Study) -> str:
+    return reverse("vote", args=[study.code])
+
+
+def answer(client: Client, study: Study, pair: PracticePair, *, well: bool) -> str:
+    """The page that follows."""
+    outcome = "left" if pair.good_is_left == well else "right"
+    sent = {"pair": pair.position, "outcome": outcome}
+    return client.post(practice(study), sent, follow=True).content.decode()
+
+
+def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote() -> None:
+    study = opened()
+    client = signed_in(the_eva())
+    assert client.get(pairs_page(study)).headers["Location"] == practice(study)
+    pairs = practice_pairs(study, the_eva())
+    assert len(pairs) == 5
+    for number, pair in enumerate(pairs, start=1):
+        shown = client.get(practice(study)).content.decode()
+        assert f"Practice {number} of 5." in shown
+        assert "carries out the instruction, " not in shown, "the answer comes afterwards"
+        told = answer(client, study, pair, well=number != 2)
+        assert ("Right." in told) == (number != 2)
+        assert ("Not quite." in told) == (number == 2)
+        good, broken = ("A", "B") if pair.good_is_left else ("B", "A")
+        assert f"{good} carries out the instruction, {broken} does not." in told
+    assert "Start voting" in told
+    assert client.get(pairs_page(study)).status_code == 200
+    assert not Vote.objects.exists()
+    assert voting_progress(study=study, expert=the_eva()).voted == 0
+
+
+def test_only_who_came_by_a_link_practises_where_the_rules_say_so() -> None:
+    study, finn = opened(), User.objects.get(username="finn")
+    invite(study=study, expert=finn)
+    assert [is_due(study, one) for one in (the_eva(), finn)] == [True, False]
+    del study.rules["practice_for"]  # as studies that were opened before
+    assert is_due(study, finn)
+
+
+def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:
+    study = opened(outside=3)
+    slugs = [pair.scenario.slug for pair in practice_pairs(study, the_eva())]
+    assert [slug.startswith("elsewhere") for slug in slugs] == [True] * 3 + [False] * 2
+    assert len(set(slugs)) == 5
+
+
+def test_a_second_answer_to_a_pair_changes_nothing() -> None:
+    study = opened()
+    client = signed_in(the_eva())
+    first = practice_pairs(study, the_eva())[0]
+    answer(client, study, first, well=True)
+    assert "Right." in answer(client, study, first, well=False)
+    first.refresh_from_db()
+    assert first.is_right
+
+
+def test_a_study_with_nothing_to_practise_on_has_no_practice() -> None:
+    assert not open_study(name="Round 0", votes_per_expert=9, **cast_of()).practice
+
+
+@pytest.mark.parametrize(("said", "practises"), [({}, True), ({"practice": False}, False)])
+def test_a_study_has_practice_unless_it_is_said(said: dict[str, bool], practises: bool) -> None:
+    assert opened(**said).practice == practises

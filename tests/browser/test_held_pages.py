@@ -1,21 +1,26 @@
-"""The page on which changes are drawn, and what it makes of answers that come late."""
+"""Pages whose server is the test: late answers, clicks on a map, rows, double presses."""
 
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from django.urls import reverse
 from playwright.sync_api import Browser, Page, expect
 
+from augment.models import SceneUpload, UploadMoment
 from augment.services.scenarios.pictures import draw_scene
 from tests.browser.held import Held, hold
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene
-from tests.web.cast import people, signed_in
+from tests.web.cast import people, png, signed_in
+from tests.web.test_jobs import large_job
 
 pytestmark = [pytest.mark.browser, pytest.mark.django_db]
+
+
 LATER_MS = 1_000
 """Longer than the page waits before it asks what a change is worth."""
 
@@ -132,3 +137,106 @@ def test_what_is_no_modification_is_told_and_leaves_the_picture(
     assert desk.page.input_value("[name=modification]") == json.dumps(change)
     desk.page.locator("svg.stage").press("Shift+ArrowUp")
     assert desk.y_m == 1.0
+
+
+PLACES = {"1,-1": [[10.0, 100.0, 450.0], [12.0, 110.0, 450.0]], "1,1": [[10.0, 100.0, 415.0]]}
+
+
+def test_a_click_sends_the_nearest_place_and_none_far_from_every_lane(browser: Browser) -> None:
+    path = reverse("upload", args=[upload_of("@1,1,50").code])
+    html = signed_in(people()["researcher"]).get(path).content
+    picture = png(width=1200, height=900)
+    with hold(browser, path, html) as held:
+        held.page.route(
+            "**/pictures/**", lambda route: route.fulfill(body=picture, content_type="image/png")
+        )
+        held.page.reload()
+        shown = held.page.locator("#chosen")
+        held.page.wait_for_function("document.getElementById('chosen').naturalWidth === 1200")
+        shown.evaluate("image => image.scrollIntoView()")
+        box = shown.bounding_box()
+        assert box is not None
+        for x, y in ((600, 450), (108, 445)):
+            scale = box["width"] / 1200
+            held.page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
+        sent = parse_qs(held.post(0).request.post_data or "")
+        assert (sent["place"], sent["put"]) == (["1,-1,12"], ["1"])
+        assert len(held.posted) == 1
+
+
+def test_another_moment_brings_its_own_place(browser: Browser) -> None:
+    upload = upload_of("@1,1,50", "@1,-1,10")
+    path, researcher = reverse("upload", args=[upload.code]), signed_in(people()["researcher"])
+    pages = [
+        researcher.get(f"{path}?moment={moment.code}").content.decode()
+        for moment in upload.moments.order_by("pk")
+    ]
+    with hold(browser, path, pages[0].encode()) as held:
+        held.page.route("**/*moment=*", lambda route: route.fulfill(body=pages[1]))
+        place = held.page.locator("#place")
+        expect(place).to_have_value("1,1,50")
+        held.page.locator("[name=stop]:not(:checked)").first.check()
+        expect(place).to_have_value("1,-1,10")
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def upload_of(*items: str) -> SceneUpload:
+    """A map of which each place has been drawn."""
+    stops = [{"item": item, "frame": 0, "time_s": None} for item in items]
+    upload = SceneUpload.objects.create(
+        name="roads.xodr",
+        size_bytes=1,
+        state="read",
+        format="opendrive",
+        tracks=[{"name": items[0], "stops": stops}],
+    )
+    for item in items:
+        UploadMoment.objects.create(
+            upload=upload, item=item, state="drawn", picture="map.png", report={"places": PLACES}
+        )
+    return upload
+
+
+ROWS = 9
+
+
+def test_rows_follow_as_one_scrolls(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("arena.jobs.queries.CELLS", 4)
+    job, reader = large_job(scenarios=ROWS, contestants=2), signed_in(people()["researcher"])
+    path = reverse("job-tab", args=[job.code, "grid"])
+    pages = {f"row={n}": reader.get(f"{path}?row={n}").content for n in range(2, ROWS // 2 + 2)}
+    with hold(browser, path, reader.get(path).content) as held:
+        page, rows = held.page, held.page.locator(".grid tbody tr")
+        assert rows.count() == 2, "what could not be fetched leaves the link"
+        page.route(
+            "**/grid/?row=*",
+            lambda route: route.fulfill(
+                body=pages[urlsplit(route.request.url).query], content_type="text/html"
+            ),
+        )
+        page.locator(".frozen").dispatch_event("scroll")
+        expect(rows).to_have_count(ROWS)
+        expect(page.locator("#more [rel=next]")).to_have_count(0)
+        name = rows.nth(5).locator("a.cell").first.get_attribute("id")
+        page.locator(f"#{name}").click()
+        page.go_back()
+        assert page.url.endswith(f"{path}?row=3#{name}")
+
+
+BETWEEN_MS = 300
+"""So much later that the browser itself does not take them for one press."""
+
+
+def test_a_form_is_sent_once(browser: Browser) -> None:
+    path = reverse("api-tokens")
+    html = signed_in(people()["admin"]).get(path).content
+    with hold(browser, path, html) as held:
+        held.page.fill("[name=name]", "mine")
+        box = held.page.get_by_role("button", name="Make the token").bounding_box()
+        assert box is not None
+        for _ in range(3):
+            held.page.mouse.click(box["x"] + 5, box["y"] + 5)
+            held.page.wait_for_timeout(BETWEEN_MS)
+        assert len(held.posted) == 1
