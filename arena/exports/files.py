@@ -51,15 +51,19 @@ def write_once(path: Path, content: bytes) -> None:
 @contextmanager
 def _beside(path: Path, pieces: Iterable[bytes]) -> Iterator[Path]:
     """A file of these pieces in the folder of path, for its owner only; gone afterwards."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    name = ""
     try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         with os.fdopen(handle, "wb") as file:
             file.writelines(pieces)
             file.flush()
             os.fsync(file.fileno())
         yield Path(name)
+    except OSError as error:  # a full disk has no name, and the file on its way another
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
-        Path(name).unlink(missing_ok=True)
+        if name:
+            Path(name).unlink(missing_ok=True)
 
 
 @contextmanager

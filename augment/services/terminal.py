@@ -43,8 +43,7 @@ class TerminalCommand(BaseCommand):
     Attributes:
         arguments: What argparse's `add_argument` takes, by the argument's name or flag.
         request: A dataclass of inputs, each of which becomes an option; None for none.
-        failure: What that sentence begins with, such as "Nothing was restored."; a command that
-            sets it reports errors of the file system as well.
+        failure: What that sentence begins with, such as "Nothing was restored.".
     """
 
     arguments: Mapping[str, Mapping[str, Any]] = {}
@@ -69,16 +68,17 @@ class TerminalCommand(BaseCommand):
     def execute(self, *args: Any, **options: Any) -> str | None:
         """Run the command; an AugmentError ends it as a CommandError with the same sentence.
 
-        So does a database that is full, locked or not there.
+        So does a file or a disk that can't be used, and a database that is full, locked or gone.
         """
-        foreseen = (AugmentError, OSError) if self.failure else AugmentError
         try:
             return super().execute(*args, **options)
-        except foreseen as error:
-            raise CommandError(f"{self.failure} {error}".lstrip()) from error
-        except OperationalError as error:
-            text = f"{self.failure} The database: {error}; `manage.py doctor` looks at all parts."
-            raise CommandError(text.lstrip()) from error
+        except (AugmentError, OSError, OperationalError) as error:
+            text = str(error)
+            if isinstance(error, OperationalError):
+                text = f"The database: {error}; `manage.py doctor` looks at all parts."
+            elif isinstance(error, OSError) and error.strerror:
+                text = f"{error.filename or 'A file'}: {error.strerror}."
+            raise CommandError(f"{self.failure} {text}".lstrip()) from error
 
 
 def _wrap(stream: OutputWrapper) -> TerminalOutput:

@@ -1,6 +1,7 @@
 import unicodedata
 from io import StringIO
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from django.core.management import CommandError, call_command
@@ -58,12 +59,24 @@ def test_a_name_in_an_error_of_a_command_is_escaped(
     assert CLEAR not in printed
 
 
-def test_a_database_that_fails_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
-        raise OperationalError("database or disk is full")
-
-    monkeypatch.setattr("arena.management.commands.prepare._lock_database", fail)
-    with pytest.raises(CommandError, match=r"^The database: .* is full; `manage.py doctor`"):
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        (
+            OperationalError("database or disk is full"),
+            "The database: .* full; `manage.py doctor`",
+        ),
+        (OSError(28, "No space left on device"), "A file: No space left on device.$"),
+        (OSError(13, "Permission denied", "b.csv"), "b.csv: Permission denied.$"),
+    ],
+)
+def test_what_fails_outside_is_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, says: str
+) -> None:
+    monkeypatch.setattr(
+        "arena.management.commands.prepare._lock_database", Mock(side_effect=error)
+    )
+    with pytest.raises(CommandError, match=f"^{says}"):
         call_command("prepare")
 
 

@@ -28,7 +28,7 @@ from arena.results.services.boards import board_named
 from arena.results.services.ratings import log_early_look
 from arena.scenarios.exports.benchmarks import write_benchmark
 from arena.studies.queries import study_named
-from augment.errors import AugmentError, Conflict, check_names
+from augment.errors import Conflict, check_names
 from augment.models import BaseScene
 from augment.services import TerminalCommand
 from augment.services.benchmarks import find_benchmark
@@ -324,6 +324,7 @@ class Command(TerminalCommand):
     """One subcommand per kind of result."""
 
     help = "Write results to files; the same snapshot or job always gives the same bytes."
+    failure = "Nothing was exported."
 
     def add_arguments(self, parser: CommandParser) -> None:
         """Add the kinds of export, the study or job, and the target."""
@@ -349,18 +350,15 @@ class Command(TerminalCommand):
             written = KINDS[options["what"]].write(options, self.stderr.write)
             self._deliver(written, options["out"])
             return
-        try:
-            if options["what"] == "benchmark":
-                row = find_benchmark(options["benchmark"])
-                for warning in write_benchmark(row, Path(options["out"])):
-                    self.stderr.write(f"Warning: {warning}")
-            elif options["what"] == "board":
-                write_folder(board_folder(board_named(options["board"])), Path(options["out"]))
-            else:
-                study = study_named(options["study"])
-                write_study(study, Path(options["out"]), say=self.stderr.write)
-        except (AugmentError, OSError) as error:
-            raise CommandError(f"Nothing was exported. {error}") from error
+        if options["what"] == "benchmark":
+            row = find_benchmark(options["benchmark"])
+            for warning in write_benchmark(row, Path(options["out"])):
+                self.stderr.write(f"Warning: {warning}")
+        elif options["what"] == "board":
+            write_folder(board_folder(board_named(options["board"])), Path(options["out"]))
+        else:
+            study = study_named(options["study"])
+            write_study(study, Path(options["out"]), say=self.stderr.write)
         self.stderr.write(f"Wrote {options['out']}.")
 
     def _deliver(self, written: ExportedFile, out: str) -> None:
@@ -369,13 +367,9 @@ class Command(TerminalCommand):
                 raise CommandError(f"A {written.suffix} file can't go to a terminal: name a file.")
             self.stdout.write_data(written.content.decode())
             return
-        path, failure = Path(out), f"{out} can't be made a folder"
-        try:
-            if written.name and path.suffix != f".{written.suffix}":
-                path.mkdir(parents=True, exist_ok=True)
-                path /= written.name
-            failure = f"{path} can't be written"
-            write_whole(path, written.content)
-        except OSError as error:
-            raise CommandError(f"{failure}: {error.strerror}.") from error
+        path = Path(out)
+        if written.name and path.suffix != f".{written.suffix}":
+            path.mkdir(parents=True, exist_ok=True)
+            path /= written.name
+        write_whole(path, written.content)
         self.stderr.write(f"Wrote {path}.")

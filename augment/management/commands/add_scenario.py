@@ -81,11 +81,7 @@ class Command(TerminalCommand):
         if superfluous:
             raise CommandError(f"--file says all of it; it goes without {', '.join(superfluous)}.")
         file: Path = options["file"]
-        try:
-            content = file.read_bytes()
-        except OSError as fault:
-            raise CommandError(f"{file} can't be read: {fault.strerror}.") from None
-        slugs = add_rows(file.name, content)
+        slugs = add_rows(file.name, file.read_bytes())
         for slug in slugs:
             self.stdout.write(f"Added scenario {slug}.")
         self.stdout.write(f"{len(slugs)} scenarios.")
