@@ -114,9 +114,7 @@ def renamed(scene: Scene) -> Scene:
 
 
 @given(changes())
-def test_without_names_whoever_is_where_he_was_stays_and_the_new_are_found(
-    change: Modification,
-) -> None:
+def test_without_names_who_is_where_he_was_stays_and_new_are_found(change: Modification) -> None:
     """Who is only added is told from all others, however the file calls them."""
     change = replace(change, moved=(), removed=())
     found, notes = find_difference(street(), renamed(apply(street(), change)), shown(street()))

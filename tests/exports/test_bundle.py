@@ -32,9 +32,7 @@ def snapshot() -> Snapshot:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("drawn_anew")
-def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
-    snapshot: Snapshot,
-) -> None:
+def test_the_zip_is_the_same_twice_its_manifest_true_and_nobody_named(snapshot: Snapshot) -> None:
     packed = zip_bytes(bundle_files(Snapshot.objects.get(pk=snapshot.pk)))
     again = zip_bytes(bundle_files(snapshot))
     assert (packed == again) is True  # of bytes a difference would take minutes to show

@@ -56,7 +56,7 @@ def test_a_file_becomes_a_closed_study_that_is_rated(tmp_path: Path) -> None:
         (f"{'x' * 201},y,tie,j0,i0", "line 38: model_a has 201 signs, 200 are allowed"),
     ],
 )
-def test_a_fault_is_named_with_its_line_and_nothing_is_kept(
+def test_a_fault_has_its_line_and_keeps_nothing(
     tmp_path: Path, faulty: str, sentence: str
 ) -> None:
     with pytest.raises(CommandError, match=sentence):

@@ -102,9 +102,7 @@ def test_a_later_run_replaces_and_a_broken_one_changes_nothing(
     assert NuplanResult.objects.count() == 1
 
 
-def test_an_augmentation_that_is_gone_is_named(
-    job: GenerationJob, tokens: Path, tmp_path: Path
-) -> None:
+def test_a_lost_augmentation_is_named(job: GenerationJob, tokens: Path, tmp_path: Path) -> None:
     first, _ = names(tokens, "ann")
     job.augmentations.all().delete()
     said = run(tokens, write_experiment(tmp_path / "a", [scored(first, 0.5)]))

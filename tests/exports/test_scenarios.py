@@ -68,9 +68,7 @@ def manifest_of(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("form", sorted(WRITERS))
-def test_every_format_comes_as_one_zip_with_its_manifest(
-    form: str, job: GenerationJob, tmp_path: Path
-) -> None:
+def test_each_format_is_a_zip_with_manifest(form: str, job: GenerationJob, tmp_path: Path) -> None:
     said = export("--format", form, "--out", str(tmp_path / "new" / "folder"))
     (file,) = (tmp_path / "new" / "folder").iterdir()
     assert file.name == f"round-1-{form}-non-commercial.zip"
@@ -111,9 +109,7 @@ def page_of(client: Client, job: GenerationJob) -> str:
     return client.get(reverse("job-tab", args=[job.code, "files"])).content.decode()
 
 
-def test_a_worker_writes_the_zip_that_the_jobs_page_offers(
-    job: GenerationJob, admin_client: Client
-) -> None:
+def test_a_worker_writes_the_zip_of_a_jobs_page(job: GenerationJob, admin_client: Client) -> None:
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     for form in WRITERS:
         assert reverse("scenarios-write", args=[job.code, form]) in page_of(admin_client, job)

@@ -169,9 +169,7 @@ def test_export_import_and_export_give_the_same_folder(
     assert {expert.username for expert in study.experts.all()} == {"expert-0001", "expert-0002"}
 
 
-def test_films_travel_and_play_over_what_they_played_over(
-    tmp_path: Path, settings: Settings
-) -> None:
+def test_films_travel_and_play_over_what_they_did(tmp_path: Path, settings: Settings) -> None:
     made = a_moving_study(scenarios=1, votes=3)
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     close_study(study=made)

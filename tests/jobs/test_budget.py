@@ -274,9 +274,7 @@ def test_when_the_place_of_a_dead_worker_is_free(age: timedelta, is_free: bool) 
     ("age", "wait_s"),
     [(client.MINUTE - INSTANT, 1e-6), (client.MINUTE, None), (client.MINUTE + INSTANT, None)],
 )
-def test_when_a_start_no_longer_counts_for_its_minute(
-    age: timedelta, wait_s: float | None
-) -> None:
+def test_when_a_start_counts_no_more_for_its_minute(age: timedelta, wait_s: float | None) -> None:
     endpoint = Endpoint.objects.create(
         label="x", base_url="http://x/v1", max_concurrency=9, requests_per_minute=1
     )

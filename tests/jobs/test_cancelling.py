@@ -30,9 +30,7 @@ def cancel() -> None:
     jobs.cancel(GenerationJob.objects.get())
 
 
-def test_a_call_in_flight_ends_with_its_job_and_gives_its_place_back(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_call_in_flight_frees_its_place_with_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
     job = llama_job(price="2")
     looks: list[int] = []
 

@@ -146,9 +146,7 @@ def test_which_variables_may_hold_a_key(settings: Any, variable: str, may: bool)
 
 
 @pytest.mark.parametrize("variable", SECRETS)
-def test_a_variable_that_is_not_for_keys_is_never_read(
-    monkeypatch: pytest.MonkeyPatch, variable: str
-) -> None:
+def test_no_other_variable_is_ever_read(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
     monkeypatch.setenv(variable, "the-crown-jewels")
     row = only_row(llama_job())
     with recorder() as server:

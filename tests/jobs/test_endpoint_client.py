@@ -57,9 +57,7 @@ class Asking:
             return conversation.send(ModelRole.MODIFIER, request, "v1").text
 
 
-def test_a_refused_parameter_is_dropped_logged_and_remembered(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_refused_parameter_is_dropped_and_remembered(caplog: pytest.LogCaptureFixture) -> None:
     with picky("temperature", "seed", "max_completion_tokens") as server:
         assert Asking(server).ask() == "Hi"
         assert [sorted(body) for body in server.bodies][-1] == ["max_tokens", "messages", "model"]

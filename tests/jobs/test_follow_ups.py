@@ -103,9 +103,7 @@ def run(*waiting: Augmentation) -> None:
         row.refresh_from_db()
 
 
-def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
-    server: Scripted,
-) -> None:
+def test_a_job_first_runs_the_contestants_own_answer_and_goes_on_from_it(server: Scripted) -> None:
     two_steps()
     add(server, "ann")
     server.script = [car(20.0), car(24.0, type="BUS")]
@@ -126,9 +124,7 @@ def test_a_job_first_runs_the_contestants_own_answer_and_then_goes_on_from_it(
     assert [step.pk for step in steps_to(second)] == [first.pk, second.pk]
 
 
-def test_a_worker_that_has_done_the_first_sends_the_follow_up(
-    server: Scripted, broker: Broker
-) -> None:
+def test_who_has_done_the_first_sends_the_follow_up(server: Scripted, broker: Broker) -> None:
     first, second = two_waiting(server)
     tasks.enqueue_job(first.job_id)
     assert len(broker) == 1
@@ -203,9 +199,7 @@ def test_a_fault_of_the_first_is_one_of_the_second_and_both_run_again(server: Sc
     assert second.state == State.DONE
 
 
-def test_somebody_says_what_to_change_and_may_go_back_and_say_something_else(
-    server: Scripted,
-) -> None:
+def test_somebody_says_what_to_change_and_may_go_back_and_say_it_anew(server: Scripted) -> None:
     first, _ = two_waiting(server, car(20.0), car(22.0), car(18.0))
     run(first)
     further = ask_follow_up(first, FollowUpRequest(instruction="Further.", cap_calls=3))
@@ -250,9 +244,7 @@ def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
         add_scenario(new)
 
 
-def test_the_stand_in_answers_follow_ups_and_the_careless_one_does_not_leave_the_rest_alone() -> (
-    None
-):
+def test_the_stand_in_answers_follow_ups_and_the_careless_one_changes_the_rest() -> None:
     two_steps()
     with running(known=find_stored_tasks) as stand_in:
         request = EndpointRequest(label="fake", base_url=stand_in.url, is_simulated=True)
@@ -280,9 +272,7 @@ def test_a_message_with_calls_comes_back_as_it_was_written() -> None:
     assert tuple(message_from_document(one.to_document()) for one in said) == said
 
 
-def test_the_page_the_api_and_the_command_say_what_comes_next(
-    server: Scripted, broker: Broker
-) -> None:
+def test_page_api_and_command_say_what_comes_next(server: Scripted, broker: Broker) -> None:
     bus = answer(block(agent(type="BUS", y_m=1.0), agent(id="Agent3")))
     first, second = two_waiting(server, car(20.0), bus)
     run(first, second)

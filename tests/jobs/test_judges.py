@@ -174,9 +174,7 @@ def test_a_cap_stops_the_run_and_the_next_one_pays_for_no_answer_twice() -> None
         assert (again.spent_calls, len(server.bodies)) == (1, 2)
 
 
-def test_a_worker_that_is_killed_leaves_what_was_answered_to_the_next(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_who_is_killed_leaves_its_answers_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     kept = calls.CallTranscript.sending
 
     def die_at_the_second(self: calls.CallTranscript, number: int) -> None:

@@ -58,9 +58,7 @@ def test_a_row_that_was_taken_back_gets_a_second_attempt() -> None:
 
 
 @pytest.mark.parametrize("is_given_back", [True, False])
-def test_a_row_under_way_of_a_cancelled_job_is_cancelled_when_it_comes_back(
-    is_given_back: bool,
-) -> None:
+def test_a_row_under_way_of_a_cancelled_job_is_cancelled_once_back(is_given_back: bool) -> None:
     job = launch()
     row = only_row(job)
     held = leased(row)

@@ -119,9 +119,7 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
     assert [(call["temperature"], call["seed"]) for call in sent] == [(1.0, 7), (1.0, 8), (1.0, 9)]
 
 
-def test_the_command_takes_every_option_and_keeps_contestants_apart(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_command_takes_every_option(capsys: pytest.CaptureFixture[str]) -> None:
     with serving(Scripted()) as server:
         asked = ["--variant=fc+tqa", "--endpoint=here", "--model=m", f"--base-url={server.url}"]
         options = [
@@ -238,9 +236,7 @@ def shapes(server: Scripted) -> set[tuple[str, ...]]:
     ],
     ids=lambda later: "+".join(later),
 )
-def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
-    later: dict[str, object],
-) -> None:
+def test_what_is_learnt_after_the_first_run_changes_nothing_sent(later: dict[str, object]) -> None:
     with serving(Scripted("Sorry?")) as server:
         job_at(server)
         run_on("first")

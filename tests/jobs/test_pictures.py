@@ -24,7 +24,7 @@ def read(name: str) -> bytes:
         return bytes(file.read())
 
 
-def test_workers_with_the_same_picture_never_meet_half_of_it(
+def test_workers_with_one_picture_never_meet_half_of_it(
     settings: Settings, tmp_path: Path
 ) -> None:
     settings.MEDIA_ROOT = tmp_path

@@ -66,9 +66,7 @@ def test_a_wish_for_nothing_that_can_be_placed_is_read_so() -> None:
     assert reading('{"requests": []}', '{"requests": []}').state == State.FAILED
 
 
-def test_a_reading_that_is_interrupted_is_left_to_no_worker(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_interrupted_reading_is_left_to_no_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -89,9 +87,7 @@ def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
     assert (failed.state, failed.document) == (State.FAILED, None)
 
 
-def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_cap_ends_a_reading_before_the_call_that_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(intent_readings, "MOST_CALLS", 1)
     made = reading("no block")
     assert (made.state, made.calls.count()) == (State.FAILED, 1)

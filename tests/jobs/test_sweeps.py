@@ -175,9 +175,7 @@ def test_a_number_of_the_intent_is_placed_anew_and_kept_with_its_intent() -> Non
 
 
 @pytest.mark.parametrize("now", [cones(60.0, 1, Shape.LINE), parked_car(20.0)])
-def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_by_now(
-    now: Intent,
-) -> None:
+def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_now(now: Intent) -> None:
     scenario = rows.add_scenario("cones", intent=intent_to_document(cones(20.0, 2, Shape.LINE)))
     sweep = plan_sweep(
         scenario=scenario, request=asked(number="requests[0].count", low=1.0, high=2.0)

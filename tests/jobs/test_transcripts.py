@@ -29,9 +29,7 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 
-def test_the_document_holds_the_whole_record_and_is_a_line_of_its_jobs_file(
-    tmp_path: Path,
-) -> None:
+def test_the_document_holds_the_whole_record_and_is_a_line_of_a_jobs_file(tmp_path: Path) -> None:
     row = ran(only_row(llama_job(price="2")), Model(after_a_second_look))
     document = json.loads(json.dumps(full_transcript(row)))
     assert (document["format"], document["version"]) == ("scenario-arena/transcript", 3)
@@ -140,9 +138,7 @@ def note_calls(row: Augmentation, attempt: int, *calls: tuple[bool, bool]) -> No
 
 
 @pytest.mark.django_db(transaction=True)
-def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_calls_are_counted_per_contestant_everywhere(capsys: pytest.CaptureFixture[str]) -> None:
     job = launch(scenarios=2, contestants=("one", "other"))
     first, second = Augmentation.objects.filter(contestant__slug="one").order_by("scenario__slug")
     note_calls(first, 1, (False, False), (False, False))  # broke, and was tried again

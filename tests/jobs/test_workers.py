@@ -44,9 +44,7 @@ def long_ago(worker: Worker, column: str, seconds: float) -> None:
 
 
 @pytest.mark.parametrize(("silent_s", "count"), [(0, 1), (15, 1), (25, 0)])
-def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
-    silent_s: float, count: int
-) -> None:
+def test_a_worker_silent_too_long_is_dead_since_its_last_word(silent_s: float, count: int) -> None:
     worker = living()
     long_ago(worker, "seen_at", silent_s)
     found = workforce()
@@ -66,7 +64,7 @@ def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
         MemoryError(),
     ],
 )
-def test_no_fault_ends_the_rounds_and_each_is_told(
+def test_faults_are_told_and_end_nothing(
     fault: Exception, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail() -> None:

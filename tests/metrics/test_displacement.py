@@ -157,9 +157,7 @@ def test_the_order_of_the_objects_changes_nothing(
 
 
 @given(generated=changes(), reference=changes())
-def test_no_other_matching_has_a_smaller_sum(
-    generated: Modification, reference: Modification
-) -> None:
+def test_no_matching_has_a_smaller_sum(generated: Modification, reference: Modification) -> None:
     """Every matching is tried, class by class."""
     found = displacement(generated, reference)
     for name in set(CLASS_OF.values()):

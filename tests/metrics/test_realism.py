@@ -122,9 +122,7 @@ def test_random_placement_keeps_what_is_placed_and_follows_its_seed() -> None:
 
 
 @pytest.mark.parametrize("slugs", [SLUGS, HARD_SLUGS], ids=["paper", "hard"])
-def test_recorded_traffic_is_above_references_and_these_above_random_places(
-    slugs: list[str],
-) -> None:
+def test_recorded_traffic_is_above_references_and_these_above_chance(slugs: list[str]) -> None:
     scenes = [*SCENES, *HARD_SCENES]
     recorded = {name: measure_recorded(Ground.of(whole_scene(name))) for name in scenes}
     counts = {name: count_recorded(objects) for name, objects in recorded.items()}

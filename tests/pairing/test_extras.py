@@ -68,9 +68,7 @@ def small(**rules: object) -> PlanRules:
         ({"check_share": -0.1}, "share of attention checks"),
     ],
 )
-def test_rules_that_can_not_be_met_are_refused_with_numbers(
-    rules: dict[str, object], sentence: str
-) -> None:
+def test_rules_that_can_not_be_met_are_refused(rules: dict[str, object], sentence: str) -> None:
     with pytest.raises(NothingToPlan, match=sentence):
         plan(small(**rules))
 

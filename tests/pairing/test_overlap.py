@@ -93,7 +93,7 @@ def test_it_is_honoured_wherever_there_are_votes_enough(
 
 
 @pytest.mark.parametrize(("votes", "share"), [(20, 0.3), (40, 0.1)])
-def test_experts_of_whom_each_has_scenarios_and_pairs_of_their_own_share_some(
+def test_experts_with_scenarios_and_pairs_of_their_own_share_some(
     votes: int, share: float
 ) -> None:
     """Two on ninety scenarios: no exchange within their quotas brings anything together."""

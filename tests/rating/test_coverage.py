@@ -71,9 +71,7 @@ def test_a_table_that_rests_on_few_experts_or_scenarios_says_so(
 
 
 @pytest.mark.parametrize(("experts", "shown"), [(3, False), (4, False), (5, True)])
-def test_no_pair_is_marked_where_experts_are_too_few_to_judge_all_at_once(
-    experts: int, shown: bool
-) -> None:
+def test_no_pair_is_marked_where_experts_are_too_few_for_all(experts: int, shown: bool) -> None:
     world = World(ratings=np.linspace(700.0, 1300.0, 5), experts=experts, votes_per_expert=60)
     board = rate(world.votes(np.random.default_rng(1)), rounds=100)
     assert (board.told_apart is not None) == shown

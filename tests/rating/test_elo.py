@@ -31,7 +31,7 @@ def by_kind(votes: Comparisons) -> Comparisons:
 
 @pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
 @pytest.mark.parametrize(("size", "rounds"), [(307, 130), (5003, 3), (5, 1)])
-def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
+def test_every_round_replays_votes_drawn_with_replacement(
     size: int, rounds: int, k: float
 ) -> None:
     """Few votes and many, in one go and in several with a remainder."""

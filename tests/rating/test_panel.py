@@ -59,8 +59,6 @@ SURE = evidence(9.0, 9.0)
         ({"evidence": SURE, "left": Estimate(value=0.69), "votes": 999}, "reliable", ""),
     ],
 )
-def test_a_judgement_changes_at_its_threshold(
-    more: dict[str, Any], standing: str, reason: str
-) -> None:
+def test_judgements_change_at_thresholds(more: dict[str, Any], standing: str, reason: str) -> None:
     found, why = judged(**more)
     assert (found, reason in why) == (standing, True), why

@@ -39,9 +39,7 @@ def of(design: StudyEstimate, votes: int) -> Prospect:
 @pytest.mark.parametrize(
     ("effects", "votes"), [((0.0, 0.0), 200), ((100.0, 40.0), 200), ((0.0, 80.0), 40)]
 )
-def test_half_widths_are_those_of_simulated_studies(
-    effects: tuple[float, float], votes: int
-) -> None:
+def test_half_widths_are_those_of_simulations(effects: tuple[float, float], votes: int) -> None:
     world = World(
         ratings=np.asarray(1000.0 + 15.0 * np.arange(9), dtype=np.float64),
         scenario_sd=effects[0],

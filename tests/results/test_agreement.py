@@ -71,9 +71,7 @@ def test_a_simulated_study_that_was_cut_short_is_gone_on_with(
     assert hold_study() == rating.study
 
 
-def test_displacement_and_the_experts_are_as_counted_from_the_rows_and_in_every_file(
-    rating: Snapshot,
-) -> None:
+def test_displacement_and_experts_are_as_counted_from_rows_and_in_files(rating: Snapshot) -> None:
     lines, votes = lines_of(rating), list(decided(rating))
     slugs = [(won.contestant.slug, lost.contestant.slug) for won, lost in votes]
     known = [pair for pair in slugs if RATED[0] not in pair]

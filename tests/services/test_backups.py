@@ -37,9 +37,7 @@ from tests.services.backup_rows import (
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.usefixtures("own_folders")]
 
 
-def test_a_backup_goes_into_an_empty_installation_alone_and_comes_out_the_same(
-    tmp_path: Path,
-) -> None:
+def test_a_backup_goes_into_an_empty_installation_and_comes_out_the_same(tmp_path: Path) -> None:
     a_full_house()
     first, second = tmp_path / "first.zip", tmp_path / "second.zip"
     take_backup(first, now=NOW, say=quiet)

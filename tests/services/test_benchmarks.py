@@ -247,9 +247,7 @@ def test_what_is_handed_out_stays_until_the_benchmark_is_retired(streets: list[S
         services.delete(streets[0])
 
 
-def test_intents_of_practice_tasks_are_handed_out_since_they_count(
-    streets: list[Scenario],
-) -> None:
+def test_intents_of_practice_tasks_are_handed_out_as_they_count(streets: list[Scenario]) -> None:
     row = make_benchmark(asked())
     found = benchmark_set(row)
     assert all(task.intent for task in found.tasks)
@@ -262,9 +260,7 @@ def test_intents_of_practice_tasks_are_handed_out_since_they_count(
 
 
 @pytest.mark.parametrize("split", Split)
-def test_rows_that_changed_nevertheless_no_longer_fit(
-    split: Split, streets: list[Scenario]
-) -> None:
+def test_rows_that_changed_nevertheless_do_not_fit(split: Split, streets: list[Scenario]) -> None:
     row = make_benchmark(asked())
     slug = row.items.filter(split=split).values_list("scenario__slug", flat=True)[0]
     chosen = Scenario.objects.filter(slug=slug)

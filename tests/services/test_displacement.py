@@ -139,9 +139,7 @@ REFERENCE = Modification(added=(vehicle("Agent2", 20.0, 0.0), cone("Agent3", 30.
     ],
     ids=["same", "off", "far", "missing", "surplus", "unreadable"],
 )
-def test_one_number_says_how_far_a_change_is_off(
-    made: Modification | None, error_m: float
-) -> None:
+def test_a_number_says_how_far_a_change_is_off(made: Modification | None, error_m: float) -> None:
     assert displacement(made, REFERENCE).error_m == pytest.approx(error_m)
     assert displacement(Modification(), Modification()).error_m == 0.0
 

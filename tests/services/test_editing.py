@@ -81,9 +81,7 @@ def test_what_is_placed_lies_in_the_picture_where_the_page_says() -> None:
         (scene(lanes=(), ego=replace(EGO, lane_id=None)), (20.0, 0.0, 0.0)),
     ],
 )
-def test_what_is_placed_ahead_stands_on_the_lane(
-    here: Scene, pose: tuple[float, float, float]
-) -> None:
+def test_what_is_added_ahead_is_on_its_lane(here: Scene, pose: tuple[float, float, float]) -> None:
     shown = editor_document(add_scenario("road", scene=here, reference=None))
     assert shown["ahead"] == pytest.approx(pose, abs=0.02)
 

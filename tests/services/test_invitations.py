@@ -100,9 +100,7 @@ def test_only_who_and_what_takes_part_can_be_marked(study: Study, eva: User) -> 
     assert not Event.objects.filter(verb__in=ACTS).exists()
 
 
-def test_taking_back_is_logged_and_doing_it_twice_changes_nothing_more(
-    study: Study, eva: User
-) -> None:
+def test_taking_back_is_logged_and_twice_changes_nothing_more(study: Study, eva: User) -> None:
     for is_author in (True, True, False, False):
         mark_author(study=study, expert=eva, contestant="ann", is_author=is_author)
     assert author_pairs(study) == frozenset()

@@ -88,9 +88,7 @@ def path(taken: list[bytes], tmp_path: Path) -> Path:
         *((with_member(name), "at a place of none") for name in STRANGE),
     ],
 )
-def test_what_is_no_whole_backup_of_this_release_is_refused(
-    path: Path, mend: Mend, says: str
-) -> None:
+def test_what_is_no_whole_backup_of_ours_is_refused(path: Path, mend: Mend, says: str) -> None:
     change(path, mend)
     with pytest.raises(CommandError, match=says):
         call_command("restore", str(path))
@@ -199,7 +197,7 @@ def test_what_a_zip_can_not_give_is_said(path: Path, harm: Callable[[Path], None
         call_command("restore", str(path))
 
 
-def test_no_work_of_a_backup_goes_on_by_itself(
+def test_no_work_of_a_backup_goes_on_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "evil_planner.py").write_text("raise SystemExit('imported')")

@@ -73,9 +73,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert (event.actor, event.after["frame"]) == (ada, 2)
 
 
-def test_of_a_long_recording_the_first_moments_are_offered(
-    log: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_recording_offers_its_start(log: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uploads, "EVERY_S", 0.1)
     monkeypatch.setattr(uploads, "MOST_STOPS", 3)
     row = read(sent(log))
@@ -94,9 +92,7 @@ def test_of_a_long_recording_the_first_moments_are_offered(
         (b'{"format": "scenario-arena/scene"', "scene.json", "scene.json"),
     ],
 )
-def test_what_can_not_be_read_is_told_and_leaves_no_scene(
-    content: bytes, name: str, reason: str
-) -> None:
+def test_what_can_not_be_read_leaves_no_scene(content: bytes, name: str, reason: str) -> None:
     row = read(sent(content, name))
     assert (row.state, row.tracks) == ("failed", [])
     assert reason in row.reason

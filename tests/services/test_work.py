@@ -195,9 +195,7 @@ def test_a_row_that_is_given_back_waits_without_a_message(kind: WorkKind[Any], r
     assert (row.state, row.claim, row.sent_at) == (before, None, None)
 
 
-def test_rows_without_a_message_or_with_an_old_one_are_unsent(
-    kind: WorkKind[Any], row: Work
-) -> None:
+def test_rows_without_a_message_or_an_old_one_are_unsent(kind: WorkKind[Any], row: Work) -> None:
     age = timedelta(minutes=10)
     assert row.pk in kind.find_unsent(now=NOON, older_than=age)
     kind.mark_sent([row.pk], now=NOON - MINUTE)

@@ -147,9 +147,7 @@ def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
         ({"outcome": "left", "aids": ["replay"]}, "aids"),
     ],
 )
-def test_parts_that_do_not_go_together_are_refused_by_name(
-    said: dict[str, Any], field: str
-) -> None:
+def test_parts_that_do_not_go_together_are_refused(said: dict[str, Any], field: str) -> None:
     with pytest.raises(InvalidVote) as refused:
         vote(matchups_of(a_study(), "eva")[0], **said)
     assert list(refused.value.fields) == [field]

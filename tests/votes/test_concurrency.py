@@ -61,9 +61,7 @@ def test_one_key_eight_times_is_one_vote() -> None:
     assert Vote.objects.count() == 1
 
 
-def test_a_browser_that_floods_gets_no_more_through_than_the_pace_allows(
-    settings: Settings,
-) -> None:
+def test_a_browser_that_floods_gets_no_more_through_than_the_pace(settings: Settings) -> None:
     settings.VOTES_PER_S = 1  # five in five seconds: a slow machine floods as well
     settings.VOTE_WAIT_S = 60  # a busy machine may write slowly
     study = a_study(scenarios=8, votes_per_expert=24)

@@ -70,9 +70,7 @@ def test_a_name_that_is_taken_is_refused(job: GenerationJob, eva: User) -> None:
         open_labelling(name="Faults", job=job, experts=[eva.username], seed=2)
 
 
-def test_a_label_keeps_any_faults_a_note_and_what_the_checks_had_guessed(
-    job: GenerationJob, eva: User
-) -> None:
+def test_a_label_keeps_faults_a_note_and_what_was_guessed(job: GenerationJob, eva: User) -> None:
     first, second = tasks_of(opened(job, "eva"), eva)
     label = save(first, P, L, note=" in the kerb ")
     assert (label.position, label.heading, label.logic) == (True, False, True)
@@ -90,9 +88,7 @@ def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
         labelling_progress(expert=finn, code=labelling.code)
 
 
-def test_the_database_takes_one_label_per_expert_and_a_whole_guess(
-    job: GenerationJob, eva: User
-) -> None:
+def test_the_database_takes_a_label_each_and_a_whole_guess(job: GenerationJob, eva: User) -> None:
     first, second = tasks_of(opened(job, "eva"), eva)[:2]
     label = save(first)
     half = {"task": second, "augmentation": second.augmentation, "guessed_logic": None}
@@ -148,9 +144,7 @@ def test_marks_on_ballots_of_closed_studies_are_labels_of_who_made_them() -> Non
     assert out.getvalue() == FORMATS["latex"].write(table).decode()
 
 
-def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(
-    job: GenerationJob, eva: User
-) -> None:
+def test_a_closed_labelling_takes_and_asks_for_nothing(job: GenerationJob, eva: User) -> None:
     labelling = opened(job, "eva")
     first, second = tasks_of(labelling, eva)
     label = save(first, P)
