@@ -28,40 +28,42 @@ EGO = entities.TrafficAgent(
 _LINES = ("centerline", "left_boundary", "right_boundary")
 
 
-def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> entities.TrafficAgent:
-    return entities.TrafficAgent(
-        id=name,
-        type=entities.AgentType.VEHICLE,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        width_m=2.0,
-        length_m=4.8,
-    )
+def vehicle(
+    name: str, x_m: float, y_m: float, heading_rad: float = 0.0, **parts: Any
+) -> entities.TrafficAgent:
+    """A parked car; its parts may be others, as those of whatever is below."""
+    made: dict[str, Any] = {"id": name, "x_m": x_m, "y_m": y_m, "heading_rad": heading_rad}
+    made |= {"type": entities.AgentType.VEHICLE, "width_m": 2.0, "length_m": 4.8}
+    return entities.TrafficAgent(**made | parts)
 
 
-def cone(name: str, x_m: float, y_m: float) -> entities.TrafficAgent:
-    return replace(
-        vehicle(name, x_m, y_m), type=entities.AgentType.TRAFFIC_CONE, width_m=0.5, length_m=0.5
-    )
+def cone(name: str, x_m: float, y_m: float, **parts: Any) -> entities.TrafficAgent:
+    made: dict[str, Any] = {"type": entities.AgentType.TRAFFIC_CONE}
+    return vehicle(name, x_m, y_m, **made | {"width_m": 0.5, "length_m": 0.5} | parts)
 
 
 def pedestrian(
-    name: str, x_m: float, y_m: float, walk_to_m: tuple[float, float] | None = None
+    name: str, x_m: float, y_m: float, walk_to_m: entities.Point | None = None, **parts: Any
 ) -> entities.TrafficAgent:
     heading = 0.0 if walk_to_m is None else math.atan2(walk_to_m[1] - y_m, walk_to_m[0] - x_m)
-    return replace(
-        vehicle(name, x_m, y_m, heading),
-        type=entities.AgentType.PEDESTRIAN,
-        width_m=0.791,
-        length_m=0.9,
-        walk_to_m=walk_to_m,
-    )
+    made: dict[str, Any] = {"type": entities.AgentType.PEDESTRIAN, "walk_to_m": walk_to_m}
+    made |= {"heading_rad": heading, "width_m": 0.791, "length_m": 0.9}
+    return vehicle(name, x_m, y_m, **made | parts)
 
 
 def lane(name: str, points_m: ArrayLike, **parts: Any) -> entities.Lane:
     """A lane 3.5 m wide."""
     return entities.Lane(id=name, centerline=Polyline(points_m), width_m=3.5, **parts)
+
+
+def connector(
+    name: str, start: str | None, end: str | None, points_m: ArrayLike, **parts: Any
+) -> entities.LaneConnector:
+    """A way from one lane to another, as wide as they are."""
+    line, width_m = Polyline(points_m), parts.pop("width_m", 3.5)
+    return entities.LaneConnector(
+        id=name, from_lane=start, to_lane=end, centerline=line, width_m=width_m, **parts
+    )
 
 
 def lanes(
@@ -125,6 +127,8 @@ def curve(radius_m: float = 40.0) -> entities.Scene:
 
 def junction() -> entities.Scene:
     """Lane1 ends at x = 20 m; connectors lead straight on (Lane2) and to the left (Lane3)."""
+    green, red = entities.TrafficLight.GREEN, entities.TrafficLight.RED
+    turn = entities.TurnType.LEFT
     left = [
         (20.0 + 8.0 * math.sin(a), 8.0 - 8.0 * math.cos(a)) for a in np.linspace(0, 1.5708, 19)
     ]
@@ -136,23 +140,8 @@ def junction() -> entities.Scene:
             lane("Lane3", [(28, 8), (28, 60)]),
         ),
         connectors=(
-            entities.LaneConnector(
-                id="Connector1",
-                from_lane="Lane1",
-                to_lane="Lane2",
-                centerline=Polyline([(20, 0), (36, 0)]),
-                width_m=3.5,
-                traffic_light=entities.TrafficLight.GREEN,
-            ),
-            entities.LaneConnector(
-                id="Connector2",
-                from_lane="Lane1",
-                to_lane="Lane3",
-                centerline=Polyline(left),
-                width_m=3.5,
-                traffic_light=entities.TrafficLight.RED,
-                turn_type=entities.TurnType.LEFT,
-            ),
+            connector("Connector1", "Lane1", "Lane2", [(20, 0), (36, 0)], traffic_light=green),
+            connector("Connector2", "Lane1", "Lane3", left, traffic_light=red, turn_type=turn),
         ),
         areas=(),
     )
