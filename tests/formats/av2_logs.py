@@ -29,18 +29,9 @@ def box(
     sweep: int, track: str, x: float, y: float, heading: float = 0.0, **fields: Any
 ) -> dict[str, Any]:
     """A row of annotations.feather, in the ego frame (rear axle) of its sweep."""
-    row = {
-        "timestamp_ns": START_NS + sweep * STEP_NS,
-        "track_uuid": track,
-        "category": "REGULAR_VEHICLE",
-        "length_m": 4.5,
-        "width_m": 1.9,
-        "height_m": 1.6,
-        "tx_m": x,
-        "ty_m": y,
-        "tz_m": 0.5,
-        "num_interior_pts": 9,
-    }
+    row: dict[str, Any] = {"timestamp_ns": START_NS + sweep * STEP_NS, "track_uuid": track}
+    row |= {"category": "REGULAR_VEHICLE", "num_interior_pts": 9}
+    row |= {"length_m": 4.5, "width_m": 1.9, "height_m": 1.6, "tx_m": x, "ty_m": y, "tz_m": 0.5}
     return row | quaternion(heading) | fields
 
 
@@ -62,12 +53,8 @@ def boxes() -> list[dict[str, Any]]:
 def poses() -> list[dict[str, Any]]:
     """Ego poses at twice the sweeps' rate; the frame is tilted by nothing."""
     return [
-        {
-            "timestamp_ns": START_NS + half * STEP_NS // 2,
-            "tx_m": 100.0,
-            "ty_m": 200.0 + 0.5 * half,
-            "tz_m": 7.0,
-        }
+        {"timestamp_ns": START_NS + half * STEP_NS // 2}
+        | {"tx_m": 100.0, "ty_m": 200.0 + 0.5 * half, "tz_m": 7.0}
         | quaternion(HEADING_RAD)
         for half in range(2 * SWEEPS)
     ]
@@ -80,19 +67,11 @@ def points(*pairs: Point) -> list[dict[str, float]]:
 def segment(
     number: int, left: list[Point], right: list[Point], *after: int, **fields: Any
 ) -> dict[str, Any]:
-    made = {
-        "id": number,
-        "is_intersection": False,
-        "lane_type": "VEHICLE",
-        "left_lane_boundary": points(*left),
-        "right_lane_boundary": points(*right),
-        "left_lane_mark_type": "NONE",
-        "right_lane_mark_type": "NONE",
-        "successors": list(after),
-        "predecessors": [],
-        "left_neighbor_id": None,
-        "right_neighbor_id": None,
-    }
+    made: dict[str, Any] = {"id": number, "is_intersection": False, "lane_type": "VEHICLE"}
+    made |= {"left_lane_boundary": points(*left), "right_lane_boundary": points(*right)}
+    made |= dict.fromkeys(("left_lane_mark_type", "right_lane_mark_type"), "NONE")
+    made |= dict.fromkeys(("left_neighbor_id", "right_neighbor_id"))
+    made |= {"successors": list(after), "predecessors": []}
     return made | fields
 
 
@@ -111,15 +90,11 @@ def city_map() -> dict[str, Any]:
         segment(99, [(98, 900), (98, 950)], [(102, 900), (102, 950)]),
     ]
     square = points((94, 150), (104, 150), (104, 300), (94, 300))
-    crossing = {
-        "id": 5,
-        "edge1": points((94, 226), (104, 226)),
-        "edge2": points((94, 229), (104, 229)),
-    }
+    edges = {f"edge{n}": points((94, y), (104, y)) for n, y in ((1, 226), (2, 229))}
     return {
         "lane_segments": {str(one["id"]): one for one in segments},
         "drivable_areas": {"4": {"id": 4, "area_boundary": square}},
-        "pedestrian_crossings": {"5": crossing},
+        "pedestrian_crossings": {"5": {"id": 5} | edges},
     }
 
 

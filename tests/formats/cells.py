@@ -26,13 +26,14 @@ from augment.scene.planned_motion import (
     PlannedMotion,
     PointPath,
 )
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording
 from augment.simulation.expected import expect_recording
 from tests.scene.test_planned_motion import two_lanes
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
+from tests.simulation.worlds import track
 
 OF_EACH_TYPE = tuple(
-    replace(vehicle(f"Agent{number}", 10.0 * number, 3.5, 3.0), type=kind, speed_mps=0.0)
+    vehicle(f"Agent{number}", 10.0 * number, 3.5, 3.0, type=kind, speed_mps=0.0)
     for number, kind in enumerate(
         (kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE), start=20
     )
@@ -41,23 +42,12 @@ OF_EACH_TYPE = tuple(
 
 def cell(before: Scene | None = None, **changes: Any) -> Cell:
     """A street with a parked car, two cones and somebody who crosses."""
-    added = changes.pop(
-        "added",
-        (
-            vehicle("Agent2", 30.25, 0.5, 0.1),
-            cone("Agent3", 20.0, -1.0),
-            cone("Agent4", 22.5, -1.2),
-            pedestrian("Agent5", 70.0, -4.0, (70.0, 8.0)),
-        ),
-    )
-    given: dict[str, Any] = {
-        "name": "street by rule",
-        "stem": "street--rule",
-        "scene": scene() if before is None else before,
-        "type": ScenarioType.NUDGE,
-        "modification": Modification(added=added),
-    }
-    return Cell(**(given | changes))
+    cones = cone("Agent3", 20.0, -1.0), cone("Agent4", 22.5, -1.2)
+    walker = pedestrian("Agent5", 70.0, -4.0, (70.0, 8.0))
+    added = changes.pop("added", (vehicle("Agent2", 30.25, 0.5, 0.1), *cones, walker))
+    given: dict[str, Any] = {"name": "street by rule", "stem": "street--rule"}
+    given |= {"scene": before or scene(), "type": ScenarioType.NUDGE}
+    return Cell(**(given | {"modification": Modification(added=added)} | changes))
 
 
 def moving() -> Cell:
@@ -71,7 +61,7 @@ def moving() -> Cell:
             *(0.0, PointPath(points_m=((60.0, 1.0), (64.0, 5.0))), ((0.0, 1.0), (1.0, 3.0))),
             AtPlace(agent_id="Agent2", x_m=44.0, y_m=3.5, within_m=1.0),
         ),
-        replace(vehicle("Agent4", 10.0, -2.0), type=AgentType.GENERIC_OBJECT): (
+        vehicle("Agent4", 10.0, -2.0, type=AgentType.GENERIC_OBJECT): (
             *(0.0, PointPath(points_m=((10.0, -1.0),), keeps_heading=True), ((0.0, 1.0),)),
             AtTime(after_s=1.05),
         ),
@@ -95,14 +85,20 @@ def ruled() -> Cell:
     """By interPlan's rules: a car that speeds up, one inside the ego, a walk at t0, a late one."""
     before = replace(scene(), options=SceneOptions(interplan=InterplanRules()))
     added = (
-        replace(vehicle("Agent2", 30.0, 0.3), speed_mps=5.0, lane_id="Lane1"),
-        replace(vehicle("Agent3", 2.0, 0.0), speed_mps=5.0, lane_id="Lane1"),
+        vehicle("Agent2", 30.0, 0.3, speed_mps=5.0, lane_id="Lane1"),
+        vehicle("Agent3", 2.0, 0.0, speed_mps=5.0, lane_id="Lane1"),
         pedestrian("Agent4", 40.0, -4.0, (40.0, 8.0)),
         pedestrian("Agent5", 80.0, -4.0, (80.0, 8.0)),
     )
-    change = Modification(added=added)
-    expected = expect_recording(before, change)
-    return cell(before, modification=change, expected=expected, stem="ruled")
+    expected = expect_recording(before, Modification(added=added))
+    return cell(before, added=added, expected=expected, stem="ruled")
+
+
+AREAS = {
+    AreaKind.CROSSWALK: ((16.0, -4.0), (18.0, -4.0), (18.0, 4.0), (16.0, 4.0)),
+    AreaKind.CARPARK: ((40.0, 3.0), (60.0, 3.0), (60.0, 9.0)),
+    AreaKind.WALKWAY: ((0.0, 3.0), (20.0, 3.0), (20.0, 5.0), (8.0, 5.5), (0.0, 5.0)),
+}
 
 
 def crossing() -> Scene:
@@ -111,29 +107,16 @@ def crossing() -> Scene:
         junction(),
         traffic_side=TrafficSide.LEFT,
         origin=Origin(frame="UTM 48N", x_m=365000.5, y_m=143000.25, heading_rad=1.2),
-        areas=(
-            Area(
-                id="Area1",
-                kind=AreaKind.CROSSWALK,
-                boundary_m=((16.0, -4.0), (18.0, -4.0), (18.0, 4.0), (16.0, 4.0)),
-            ),
-            Area(
-                id="Area2",
-                kind=AreaKind.CARPARK,
-                boundary_m=((40.0, 3.0), (60.0, 3.0), (60.0, 9.0)),
-            ),
-            Area(
-                id="Area3",
-                kind=AreaKind.WALKWAY,
-                boundary_m=((0.0, 3.0), (20.0, 3.0), (20.0, 5.0), (8.0, 5.5), (0.0, 5.0)),
-            ),
+        areas=tuple(
+            Area(id=f"Area{number}", kind=kind, boundary_m=boundary_m)
+            for number, (kind, boundary_m) in enumerate(AREAS.items(), start=1)
         ),
     )
 
 
 def recorded_street() -> tuple[Scene, Recording]:
     """The ego drives on at 8 m/s; one car drives ahead and is lost, another comes after 1 s."""
-    ahead = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=10.0, lane_id="Lane1")
+    ahead = vehicle("Agent2", 20.0, 0.0, speed_mps=10.0, lane_id="Lane1")
     times = np.asarray(np.arange(31) * 0.1, dtype=np.float64)
     flat = np.zeros(31)
 
@@ -144,13 +127,6 @@ def recorded_street() -> tuple[Scene, Recording]:
     gone, late = drives(20.0, 0.0, 0.0, 10.0), drives(80.0, 3.5, np.pi, 6.0)
     gone[20:] = np.nan
     late[:10] = np.nan
-    size = {"length_m": 4.8, "width_m": 2.0, "type": AgentType.VEHICLE}
-    recording = Recording(
-        times_s=times,
-        ego=drives(0.0, 0.0, 0.0, 8.0),
-        tracks=(
-            Track(agent_id="Agent2", states=gone, **size),  # type: ignore[arg-type]
-            Track(agent_id="Agent3", states=late, **size),  # type: ignore[arg-type]
-        ),
-    )
-    return scene(agents=(ahead,)), recording
+    tracks = (track(ahead, gone), track(vehicle("Agent3", 80.0, 3.5), late))
+    ego = drives(0.0, 0.0, 0.0, 8.0)
+    return scene(agents=(ahead,)), Recording(times_s=times, ego=ego, tracks=tracks)

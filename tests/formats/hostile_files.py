@@ -84,22 +84,18 @@ def motion_a_text_told_by_its_difference(root: Path) -> Made:
 
 
 def json_a_scene_of_empty_lists(root: Path) -> Made:
-    file = root / "scene.json"
-    file.write_text(f'{{"format": "{SCENE_FORMAT}", "agents": [' + "[]," * 2_000_000 + "[]]}")
-    return "json", file
+    agents = "[]," * 2_000_000
+    return _text(root, "json", f'{{"format": "{SCENE_FORMAT}", "agents": [{agents}[]]}}')
 
 
 def json_that_is_nested_without_an_end(root: Path) -> Made:
-    file = root / "scene.json"
-    file.write_text("[" * 2_000_000)
-    return "json", file
+    return _text(root, "json", "[" * 2_000_000)
 
 
 def commonroad_that_laughs_a_billion_times(root: Path) -> Made:
     entities = "".join(f'<!ENTITY a{n + 1} "{f"&a{n};" * 10}">' for n in range(12))
-    file = root / "bomb.xml"
-    file.write_text(f'<!DOCTYPE commonRoad [<!ENTITY a0 "ha">{entities}]><commonRoad>&a12;</x>')
-    return "commonroad", file
+    text = f'<!DOCTYPE commonRoad [<!ENTITY a0 "ha">{entities}]><commonRoad>&a12;</x>'
+    return _text(root, "commonroad", text)
 
 
 def commonroad_that_lasts_very_long(root: Path) -> Made:
@@ -108,9 +104,8 @@ def commonroad_that_lasts_very_long(root: Path) -> Made:
         "</point></position><time><exact>{t}</exact></time></initialState></dynamicObstacle>"
     )
     cars = "".join(obstacle.format(n=number, t=9_999) for number in range(20_000))
-    file = root / "long.xml"
-    file.write_text(HEAD.format(version="2020a") + cars + f"{PROBLEM}</commonRoad>")
-    return "commonroad", file
+    head = HEAD.format(version="2020a")
+    return _text(root, "commonroad", f"{head}{cars}{PROBLEM}</commonRoad>")
 
 
 def waymo_a_record_that_claims_two_gigabytes(root: Path) -> Made:
@@ -202,9 +197,7 @@ def nuplan_a_map_of_broken_shapes(root: Path) -> Made:
 
 
 def opendrive_of_a_million_lane_sections(root: Path) -> Made:
-    file = root / "made.xodr"
-    file.write_text(by_hand(lanes='<laneSection s="0"/>' * 1_000_000))
-    return "opendrive", file
+    return _text(root, "opendrive", by_hand(lanes='<laneSection s="0"/>' * 1_000_000))
 
 
 def opendrive_that_laughs_a_billion_times(root: Path) -> Made:
@@ -213,9 +206,7 @@ def opendrive_that_laughs_a_billion_times(root: Path) -> Made:
 
 
 def opendrive_of_widths_that_are_none(root: Path) -> Made:
-    file = root / "made.xodr"
-    file.write_text(by_hand(width=WIDTH.replace("3.5", "NaN")))
-    return "opendrive", file
+    return _text(root, "opendrive", by_hand(width=WIDTH.replace("3.5", "NaN")))
 
 
 def opendrive_of_roads_that_follow_each_other_in_circles(root: Path) -> Made:
@@ -233,9 +224,7 @@ def opendrive_of_roads_that_follow_each_other_in_circles(root: Path) -> Made:
         for a in before
         for b in after
     )
-    file = root / "made.xodr"
-    file.write_text(by_hand(rest=f'{roads}<junction id="9">{links}</junction>'))
-    return "opendrive", file
+    return _text(root, "opendrive", by_hand(rest=f'{roads}<junction id="9">{links}</junction>'))
 
 
 def openscenario_whose_catalogs_lie_elsewhere(root: Path) -> Made:
@@ -269,6 +258,13 @@ def openscenario_of_parameters_that_name_each_other(root: Path) -> Made:
     at = openscenario_files.EGO_AT.replace('"20"', '"$a"')
     text = openscenario_files.scenario(head=head).replace(openscenario_files.EGO_AT, at)
     return "openscenario", openscenario_files.write(root, text)
+
+
+def _text(root: Path, source: str, text: str) -> Made:
+    suffixes = {"json": "json", "commonroad": "xml", "opendrive": "xodr"}
+    file = root / f"made.{suffixes[source]}"
+    file.write_text(text)
+    return source, file
 
 
 def _pickled(root: Path, instructions: bytes) -> Made:

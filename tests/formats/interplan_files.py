@@ -68,37 +68,22 @@ modification_details_dictionary:
 
 
 CONSTRUCTION, ACCIDENT, JAYWALK, NUDGE, OVERTAKE = (
-    "approaching_construction_zone",
-    "avoid_crashed_cars",
-    "jaywalking_pedestrian",
-    "nudge_around_parked_vehicle",
-    "overtake_parked_vehicle",
+    *("approaching_construction_zone", "avoid_crashed_cars", "jaywalking_pedestrian"),
+    *("nudge_around_parked_vehicle", "overtake_parked_vehicle"),
 )
-FIFTY: dict[int, list[tuple[str, str]]] = {
-    0: [  # the base scene with 15 entries
-        *[(OVERTAKE, config) for config in ("dh", "")],
-        (ACCIDENT, ""),
-        *[(NUDGE, "")] * 3,
-        *[(CONSTRUCTION, config) for config in ("dl", "gl")],
-        *[(JAYWALK, "")] * 4,
-        *[(OVERTAKE, config) for config in ("dh", "dm", "a0")],
-    ],
-    1: [
-        (JAYWALK, ""),
-        *[(NUDGE, "")] * 3,
-        *[(CONSTRUCTION, config) for config in ("dl", "gl", "a0")],
-        *[(JAYWALK, "")] * 3,
-    ],
-    2: [*[(ACCIDENT, config) for config in ("gr", "", "")], *[(JAYWALK, "")] * 2],
-    3: [(CONSTRUCTION, config) for config in ("dl", "dl", "dl", "")],
-    4: [(CONSTRUCTION, ""), (ACCIDENT, "gr"), (ACCIDENT, "")],
-    5: [(ACCIDENT, "")] * 3,
-    6: [(NUDGE, ""), (ACCIDENT, ""), (NUDGE, "")],
-    7: [(OVERTAKE, config) for config in ("dh", "dm", "a0")],
-    8: [(NUDGE, "")] * 2,
-    9: [(OVERTAKE, config) for config in ("dh", "a0")],
-}
-"""The structure of interPlan's 50 special scenarios: types and configs by base scene and index."""
+_KINDS = {"C": CONSTRUCTION, "A": ACCIDENT, "J": JAYWALK, "N": NUDGE, "O": OVERTAKE}
+FIFTY = [
+    [(_KINDS[entry[0]], entry[1:]) for entry in entries.split()]
+    for entries in (
+        "Odh O A N N N Cdl Cgl J J J J Odh Odm Oa0",
+        "J N N N Cdl Cgl Ca0 J J J",
+        "Agr A A J J",
+        "Cdl Cdl Cdl C",
+        "C Agr A",
+        *("A A A", "N A N", "Odh Odm Oa0", "N N", "Odh Oa0"),
+    )
+]
+"""The structure of interPlan's 50 special scenarios by base scene: first letters and configs."""
 
 
 def fifty_entries(city: str = CITY) -> dict[str, Any]:
@@ -143,7 +128,7 @@ def fifty_entries(city: str = CITY) -> dict[str, Any]:
                     for index, (kind, config) in enumerate(entries)
                 },
             }
-            for scene, entries in FIFTY.items()
+            for scene, entries in enumerate(FIFTY)
         },
     }
 

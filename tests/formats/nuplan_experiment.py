@@ -8,22 +8,14 @@ import pyarrow as pa
 from pyarrow import parquet
 
 METRICS = ("drivable_area_compliance", "lane_changes_to_goal", "no_ego_at_fault_collisions")
+WHO = {"planner_name": "PDMClosedPlanner", "log_name": "2021.06.03.12.02.06_veh-35_04692_04763"}
 
 
 def scored(scenario: str, score: float, **more: Any) -> dict[str, Any]:
     """A row of the aggregator for one scenario."""
-    parts = dict.fromkeys(METRICS, 1.0) | {"lane_changes_to_goal": None}
-    return {
-        "scenario": scenario,
-        "log_name": "2021.06.03.12.02.06_veh-35_04692_04763",
-        "scenario_type": "jaywalking_pedestrian",
-        "num_scenarios": None,
-        "planner_name": "PDMClosedPlanner",
-        "aggregator_type": "weighted_average",
-        **parts,
-        "score": score,
-        **more,
-    }
+    made: dict[str, Any] = {"scenario": scenario, "score": score, "num_scenarios": None}
+    made |= {"scenario_type": "jaywalking_pedestrian", "aggregator_type": "weighted_average"} | WHO
+    return made | dict.fromkeys(METRICS, 1.0) | {"lane_changes_to_goal": None} | more
 
 
 def summed(scenario_type: str, number: int, score: float) -> dict[str, Any]:
@@ -35,17 +27,9 @@ def summed(scenario_type: str, number: int, score: float) -> dict[str, Any]:
 
 def ran(scenario: str, error: str | None = None) -> dict[str, Any]:
     """A row of the runner's report."""
-    return {
-        "succeeded": error is None,
-        "error_message": error,
-        "start_time": 1.0,
-        "end_time": 61.0,
-        "scenario_name": scenario,
-        "planner_name": "PDMClosedPlanner",
-        "log_name": "2021.06.03.12.02.06_veh-35_04692_04763",
-        "compute_trajectory_runtimes_mean": 0.1,
-        "duration": 60.0,
-    }
+    made = {"succeeded": error is None, "error_message": error, "scenario_name": scenario} | WHO
+    times = {"start_time": 1.0, "end_time": 61.0, "duration": 60.0}
+    return made | times | {"compute_trajectory_runtimes_mean": 0.1}
 
 
 def write_experiment(

@@ -5,6 +5,7 @@ The ego's rear axle starts at EAST, NORTH of its city's zone and drives east at 
 Degrees come from metres by the inverse of a local projection, found by bisection.
 """
 
+import math
 import sqlite3
 import struct
 from pathlib import Path
@@ -98,35 +99,18 @@ def write_map(root: Path, city: str) -> Path:
         "lane_group_fid, lane_index, left_boundary_fid, right_boundary_fid, speed_limit_mps, "
         "from_edge_fid, to_edge_fid, lane_type_fid, width",
         (1, shape(strip(-40, 40, 0), polygon=True), 90, 1, 2, 3, 13.4, None, None, 0, None),
-        (
-            2,
-            shape(strip(-40, 40, 4), polygon=True),
-            90,
-            0,
-            1,
-            2,
-            float("nan"),
-            None,
-            None,
-            0,
-            None,
-        ),
+        (2, shape(strip(-40, 40, 4), polygon=True), 90, 0, 1, 2, math.nan, None, None, 0, None),
         (3, shape(strip(55, 120, 0), polygon=True), 91, 0, 4, 5, None, None, None, 0, None),
         (4, shape(strip(-40, 40, -3), polygon=True), 90, 2, 3, 6, None, None, None, 1, None),
     )
     line = "boundary_type_fid"
-    layer(
-        "boundaries",
-        line,
-        (1, shape([(-40, 6), (40, 6)]), 2),
-        (2, shape([(40, 2), (-40, 2)]), 0),
-        (3, shape([(-40, -2), (40, -2)]), 2),
-        (4, shape([(55, 2), (120, 2)]), 2),
-        (5, shape([(55, -2), (120, -2)]), 2),
-        (6, shape([(-40, -4), (40, -4)]), 2),
-        (7, shape([(40, 2), (55, 2)]), 2),
-        (8, shape([(40, -2), (55, -2)]), 2),
+    edges = (
+        *(((-40, 6), (40, 6), 2), ((40, 2), (-40, 2), 0), ((-40, -2), (40, -2), 2)),
+        *(((55, 2), (120, 2), 2), ((55, -2), (120, -2), 2), ((-40, -4), (40, -4), 2)),
+        *(((40, 2), (55, 2), 2), ((40, -2), (55, -2), 2)),
     )
+    rows = [(n, shape([start, end]), kind) for n, (start, end, kind) in enumerate(edges, start=1)]
+    layer("boundaries", line, *rows)
     layer(
         "baseline_paths",
         "lane_fid, lane_connector_fid",
@@ -151,10 +135,8 @@ def write_map(root: Path, city: str) -> Path:
     layer("lane_group_connectors", line, (30, None, 0))
     layer("intersections", line, (70, shape(strip(40, 55, 0, 8), polygon=True), 0))
     layer("walkways", line, (71, shape(strip(-40, 40, -8), polygon=True), 0))
-    layer("crosswalks", line)
-    layer("carpark_areas", line)
-    layer("generic_drivable_areas", line)
-    layer("road_segments", line)
+    for empty in ("crosswalks", "carpark_areas", "generic_drivable_areas", "road_segments"):
+        layer(empty, line)
     base.commit()
     base.close()
     return file

@@ -4,10 +4,11 @@ The road is 400 m long along x, with the lanes -1 and -2 that way and 1 back, 3.
 """
 
 from pathlib import Path
+from typing import Any
 
 from augment.formats.openscenario.scenario import OpenScenario
 from augment.formats.reading import Reading
-from augment.scene.motion import Motion, find_motion
+from augment.scene.motion import Motion, Movement, find_motion
 from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 
 ROADS = by_hand(outer=f'<lane id="-2" type="driving">{WIDTH}</lane>').replace("100", "400")
@@ -129,6 +130,24 @@ def read(file: Path, item: str | None = None) -> Reading:
 
 def moves(reading: Reading) -> Motion:
     return find_motion(reading.scene, recording=reading.recording, with_later=True)
+
+
+def move_other(folder: Path, *events: str, mps: object = 4, **parts: Any) -> Movement:
+    """What the other does that drives at that speed at first."""
+    text = scenario(*events, other_does=(speed(mps),), **parts)
+    return moves(read(write(folder, text))).others[0]
+
+
+def follow(shape: str, times: str = "<None/>") -> str:
+    """Along a shape, or a line of vertices."""
+    line = FOLLOW.format(shape if "<Vertex" in shape else "", times)
+    return line if "<Vertex" in shape else line.replace("<Polyline></Polyline>", shape)
+
+
+def vertices(*places: tuple[object, object], y: float = -1.75) -> str:
+    """By time and x."""
+    at = '<Position><WorldPosition x="{}" y="{}" h="0"/></Position>'
+    return "".join(f'<Vertex time="{time}">{at.format(x, y)}</Vertex>' for time, x in places)
 
 
 def route(*waypoints: tuple[int, float], roads: str = "11") -> str:

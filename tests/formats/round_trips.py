@@ -111,7 +111,6 @@ def _of_walk(was: TrafficAgent, found: TrafficAgent) -> Iterator[Change]:
 
 def _same_motion(movement: Movement, reading: Reading, name: str | None) -> bool:
     recording = reading.recording
-    assert recording is not None
     if name is None:
         return _same_states(movement, recording.ego)
     (track,) = (one for one in recording.tracks if one.agent_id == name)

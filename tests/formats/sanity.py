@@ -10,33 +10,14 @@ from typing import Any
 
 import numpy as np
 
-FIRST_LEVEL = {
-    "id",
-    "version",
-    "length",
-    "metadata",
-    "tracks",
-    "dynamic_map_states",
-    "map_features",
-}
+FIRST_LEVEL = {"id", "version", "length", "metadata", "tracks"}
+FIRST_LEVEL |= {"dynamic_map_states", "map_features"}
 METADATA = {"metadrive_processed", "coordinate", "ts"}
 OBJECT_TYPES = {
-    "VEHICLE",
-    "PEDESTRIAN",
-    "CYCLIST",
-    "OTHER",
-    "TRAFFIC_LIGHT",
-    "TRAFFIC_BARRIER",
-    "TRAFFIC_CONE",
-    "TRAFFIC_OBJECT",
+    *("VEHICLE", "PEDESTRIAN", "CYCLIST", "OTHER"),
+    *("TRAFFIC_LIGHT", "TRAFFIC_BARRIER", "TRAFFIC_CONE", "TRAFFIC_OBJECT"),
 }
-LANES = {
-    "LANE_SURFACE_STREET",
-    "LANE_SURFACE_UNSTRUCTURE",
-    "LANE_UNKNOWN",
-    "LANE_BIKE_LANE",
-    "LANE_FREEWAY",
-}
+LANE_KINDS = ("SURFACE_STREET", "SURFACE_UNSTRUCTURE", "UNKNOWN", "BIKE_LANE", "FREEWAY")
 PLAIN = (int, float, str, bool, np.ndarray, dict, list, tuple, type(None), set)
 OLD_NAMES = {
     ("numpy.core.multiarray", "_reconstruct"): ("numpy._core.multiarray", "_reconstruct"),
@@ -62,13 +43,11 @@ def check_sanity(scenario: Any) -> None:
     assert set(scenario) >= FIRST_LEVEL
     _check_plain(scenario)
     length = scenario["length"]
-    for name, track in scenario["tracks"].items():
-        _check_object(name, track, length, with_valid=True)
-        assert {"position", "heading"} <= set(track["state"])
-    for name, light in scenario["dynamic_map_states"].items():
-        _check_object(name, light, length, with_valid=True)
+    for name, thing in (scenario["tracks"] | scenario["dynamic_map_states"]).items():
+        _check_object(name, thing, length)
+    assert all({"position", "heading"} <= set(one["state"]) for one in scenario["tracks"].values())
     for feature in scenario["map_features"].values():
-        if feature["type"] in LANES:
+        if feature["type"].removeprefix("LANE_") in LANE_KINDS:
             assert isinstance(feature["polyline"], np.ndarray | list | tuple)
     assert set(scenario["metadata"]) >= METADATA
     assert scenario["metadata"]["ts"].shape == (length,)
@@ -86,7 +65,7 @@ def _check_plain(value: Any) -> None:
             _check_plain(item)
 
 
-def _check_object(name: str, thing: Any, length: int, *, with_valid: bool) -> None:
+def _check_object(name: str, thing: Any, length: int) -> None:
     assert {"type", "state", "metadata"} <= set(thing)
     assert thing["type"] in OBJECT_TYPES
     assert thing["metadata"]["object_id"] == name
@@ -95,9 +74,8 @@ def _check_object(name: str, thing: Any, length: int, *, with_valid: bool) -> No
         assert len(values) == length
         if not isinstance(values, np.ndarray):
             continue
-        assert values.ndim in (1, 2)
-        assert values.ndim == 1 or values.shape[1] != 0
-        if not with_valid or "valid" not in thing["state"]:
+        assert values.ndim == 1 or (values.ndim == 2 and values.shape[1] != 0)
+        if "valid" not in thing["state"]:
             continue
         if key == "valid":
             assert values.sum() >= 1

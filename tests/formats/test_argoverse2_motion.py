@@ -38,7 +38,6 @@ def test_t0_is_the_last_observed_step_and_the_future_is_kept(folder: Path) -> No
     assert (scene.origin.pose.x_m, scene.origin.pose.y_m) == pytest.approx((100.0, 201.42))
     assert scene.ego.lane_id is not None
     assert scene.ego.speed_mps == 10.0
-    assert recording is not None
     assert len(recording.times_s) == 61
     assert recording.times_s[-1] == pytest.approx(6.0)
     assert recording.ego[-1, :2].tolist() == pytest.approx([60.0, 0.0])
@@ -85,9 +84,7 @@ def test_folder_and_file_are_recognised(folder: Path) -> None:
         ({"track_id": "9"}, "Of two boxes of one object at one step the first counts."),
     ],
 )
-def test_a_broken_row_is_left_out_with_a_note(
-    tmp_path: Path, change: dict[str, Any], said: str
-) -> None:
+def test_a_broken_row_is_noted(tmp_path: Path, change: dict[str, Any], said: str) -> None:
     table = [*rows(), row("10", "vehicle", 49, 100.0, 250.0) | change]
     reading = read(write_scenario(tmp_path / "made", table=table))
     assert said in " ".join(reading.notes)

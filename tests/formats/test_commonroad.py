@@ -95,7 +95,6 @@ def fault_of(path: Path, text: str, item: str | None = None) -> str:
 def test_a_planning_problem_is_an_ego_without_a_drive(tmp_path: Path) -> None:
     reading = read(tmp_path, newer())
     scene, recording = reading.scene, reading.recording
-    assert recording is not None
     assert np.isnan(recording.ego[1:]).all()
     assert (scene.ego.speed_mps, scene.ego.lane_id) == (3.0, "Lane1")
     assert set(ASSUMED) <= set(reading.notes)
@@ -109,7 +108,6 @@ def test_a_planning_problem_is_an_ego_without_a_drive(tmp_path: Path) -> None:
 
 def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     reading = read(tmp_path, newer(more=""), "70", 1)
-    assert reading.recording is not None
     assert reading.recording.ego[:, 0].tolist() == [0.0, 0.5]
     assert not set(ASSUMED) & set(reading.notes)
     assert read(tmp_path, newer(more="")).moment.item == "70"
@@ -136,10 +134,8 @@ def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("direction", "step", "state"),
     [
-        ("all", 0, TrafficLight.GREEN),
-        ("all", 2, TrafficLight.RED),
-        ("straight", 2, TrafficLight.RED),
-        ("leftStraight", 2, TrafficLight.RED),
+        *(("all", 0, TrafficLight.GREEN), ("all", 2, TrafficLight.RED)),
+        *(("straight", 2, TrafficLight.RED), ("leftStraight", 2, TrafficLight.RED)),
         ("left", 2, TrafficLight.NONE),
     ],
 )
@@ -193,12 +189,8 @@ BACK = "<point><x>0</x><y>60</y></point>"
         ("<x>-1.5</x><y>40", "<x>-1<b>5</b></x><y>40", "lanelets (2); first lan", (1, 0, 2)),
         (">5.0<", "> 5<b>1</b> <", "objects (1); first dynamicObstacle 70.vel", (2, 1, 1)),
         ('ref="3"', 'ref="three"', "a whole number, got 'three'", (2, 1, 2)),
-        (
-            "<exact>2</exact>",
-            "<exact>1e7</exact>",
-            "states (1); first dynamicObstacle 70",
-            (2, 1, 2),
-        ),
+        ("<exact>2</exact>", "<exact>1e7</exact>", "states (1); first dynamicObstacle 70",
+         (2, 1, 2)),
         ("<y>90.0</y>", "<y>40.0</y>", "first lanelet 3: a line needs", (1, 1, 2)),
         (">11.5<", ">fast<", "speed limits (1); first trafficSign 40", (2, 1, 2)),
         ("<length>4.4</length>", "", "shapes (2); first dynamicObstacle 70.le", (2, 1, 2)),
@@ -208,38 +200,19 @@ BACK = "<point><x>0</x><y>60</y></point>"
         ("<y>90.0</y></point>", f"<y>90.0</y></point>{BACK}", "lanelet.3: folds back", (1, 1, 2)),
         ('id="3"', 'id="2"', "Of two lanelets with one id the last counts", (1, 1, 2)),
         ("<exact>2</exact>", "<exact>1</exact>", "Of two states with one id the last", (2, 1, 2)),
-        (
-            'trafficSignRef ref="40"',
-            'trafficSignRef ref="41"',
-            "A sign that is named is n",
-            (2, 1, 2),
-        ),
-        (
-            "<laneletType>sidewalk<",
-            "<userOneWay>bicycle</userOneWay><laneletType>urban<",
-            "left out: bicycle lanes",
-            (2, 1, 2),
-        ),
-        (
-            "<laneletType>sidewalk<",
-            "<userBidirectional>car</userBidirectional><laneletType>urban<",
-            "that cars use both ways",
-            (3, 1, 2),
-        ),
-        (
-            "<laneletType>sidewalk<",
-            "<userOneWay>yeti</userOneWay><laneletType>urban<",
-            "users of lanelets (1); first lanelet 4: unknown 'yeti'",
-            (3, 1, 2),
-        ),
-        (
-            "</staticObstacle>",
-            f"<trajectory>{state(2, 31, 0)}</trajectory></staticObstacle>",
-            "The motion of what is static was left out",
-            (2, 1, 2),
-        ),
+        ('trafficSignRef ref="40"', 'trafficSignRef ref="41"', "A sign that is named is n",
+         (2, 1, 2)),
+        ("<laneletType>sidewalk<", "<userOneWay>bicycle</userOneWay><laneletType>urban<",
+         "left out: bicycle lanes", (2, 1, 2)),
+        ("<laneletType>sidewalk<",
+         "<userBidirectional>car</userBidirectional><laneletType>urban<",
+         "that cars use both ways", (3, 1, 2)),
+        ("<laneletType>sidewalk<", "<userOneWay>yeti</userOneWay><laneletType>urban<",
+         "users of lanelets (1); first lanelet 4: unknown 'yeti'", (3, 1, 2)),
+        ("</staticObstacle>", f"<trajectory>{state(2, 31, 0)}</trajectory></staticObstacle>",
+         "The motion of what is static was left out", (2, 1, 2)),
     ],
-)
+)  # fmt: skip
 def test_one_bad_part_is_left_out_with_a_note(
     tmp_path: Path, good: str, odd: str, said: str, left: tuple[int, int, int]
 ) -> None:
@@ -270,11 +243,8 @@ def test_a_limit_is_what_its_sign_and_unit_say(
         ("successorsStraight", "outgoingStraight", TrafficLight.GREEN),
         ('<successorsStraight ref="2"/>', "", TrafficLight.GREEN),
         ("intersection", "junction", TrafficLight.GREEN),
-        (
-            '<trafficLightRef ref="50"/>',
-            '<stopLine><trafficLightRef ref="50"/></stopLine>',
-            "green",
-        ),
+        ('<trafficLightRef ref="50"/>', '<stopLine><trafficLightRef ref="50"/></stopLine>',
+         "green"),
         ("<direction>all<", "<direction>diagonal<", TrafficLight.GREEN),
         ("</trafficLight>", "<active>false</active></trafficLight>", TrafficLight.UNKNOWN),
         ("cycle", "circle", TrafficLight.UNKNOWN),
@@ -283,7 +253,7 @@ def test_a_limit_is_what_its_sign_and_unit_say(
         ('<trafficLightRef ref="50"/>', "", TrafficLight.NONE),
         ('<trafficLightRef ref="50"/>', '<trafficLightRef ref="L"/>', TrafficLight.UNKNOWN),
     ],
-)
+)  # fmt: skip
 def test_every_way_to_name_a_light_gives_it_to_what_it_governs(
     tmp_path: Path, good: str, odd: str, light: str
 ) -> None:
@@ -315,17 +285,14 @@ SPEEDS = "<velocity><intervalStart>4</intervalStart><intervalEnd>6</intervalEnd>
         (POINT, "<velocity>3</velocity><velocityY>4</velocityY>", (11, 0, 0.9273, 5)),
         (POINT, SPEED, (11, 0, 1.5708, 5)),
         (POINT, UP, (11, 0, 1.5708, 10)),
-        (
-            f"<rectangle>{BOX}<center><x>1</x><y>12</y></center></rectangle>",
-            f"<velocity>-5</velocity>{UP}",
-            (12, 1, 1.5708, 5),
-        ),
+        (f"<rectangle>{BOX}<center><x>1</x><y>12</y></center></rectangle>",
+         f"<velocity>-5</velocity>{UP}", (12, 1, 1.5708, 5)),
         (DISC, SPEEDS + UP, (12, 0, 1.5708, 5)),
         (f"<polygon>{TRIANGLE}</polygon>", SPEED + UP, (12, 0, 1.5708, 5)),
         ("<lanelet ref='2'/>", SPEED + UP, (30, 0, 1.5708, 5)),
         (POINT, SPEED + OVER_THE_END, (11, 0, math.pi, 5)),
     ],
-)
+)  # fmt: skip
 def test_a_state_may_be_given_in_every_way_of_the_format(
     tmp_path: Path, position: str, values: str, expected: tuple[float, ...]
 ) -> None:
@@ -333,7 +300,6 @@ def test_a_state_may_be_given_in_every_way_of_the_format(
     text = f"<state><position>{position}</position><time><exact>1</exact></time>{values}</state>"
     made = re.sub("<trajectory>.*</trajectory>", f"<trajectory>{text}</trajectory>", newer())
     recording = read(tmp_path, made).recording
-    assert recording is not None
     x, y, heading, speed = recording.tracks[0].states[1]
     assert (x, y, heading, speed) == pytest.approx(
         (expected[0], -expected[1], expected[2] - math.pi / 2, expected[3]), abs=0.01
@@ -360,9 +326,7 @@ def test_shapes_of_an_obstacle_become_the_box_around_them(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("country", "side"), [("GBR", "left"), ("C-JPN", "left"), ("ZAM", "right"), ("bmu", "left")]
 )
-def test_the_country_tells_the_side_where_the_lanes_do_not(
-    tmp_path: Path, country: str, side: str
-) -> None:
+def test_a_country_tells_the_side_if_no_lane_does(tmp_path: Path, country: str, side: str) -> None:
     made = newer().replace("<commonRoad ", f'<commonRoad benchmarkID="{country}_Test-1_1_T-1" ')
     assert read(tmp_path, made).scene.traffic_side == side
 

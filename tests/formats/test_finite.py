@@ -16,6 +16,7 @@ from augment.scene.codec import recording_from_document
 from augment.scene.recording import Recording
 from tests.formats.cells import cell, crossing, recorded_street
 from tests.formats.sanity import loaded
+from tests.properties import examples
 from tests.scenes import curve, junction, scene, vehicle
 
 SCENES = (scene(), curve(), junction(), crossing())
@@ -41,6 +42,7 @@ def check_finite_files(written: Output) -> None:
 
 
 @pytest.mark.parametrize("form", sorted(WRITERS))
+@examples(25)
 @given(data=st.data())
 def test_no_file_says_nan_whatever_of_the_ego_and_the_others_was_recorded(
     form: str, data: st.DataObject
@@ -84,6 +86,5 @@ def test_a_drive_that_nobody_recorded_is_not_in_our_own_json() -> None:
     recording.ego[1:] = np.nan
     made = cell(before, recording=recording, added=())
     written = writer_named("json")([made]).files[f"{made.stem}.recording.json"]
-    assert (
-        recording_from_document(json.loads(written)).ego_is_seen.tolist() == [True] + [False] * 30
-    )
+    is_seen = recording_from_document(json.loads(written)).ego_is_seen.tolist()
+    assert is_seen == [True] + [False] * 30

@@ -1,6 +1,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import yaml
@@ -35,13 +36,10 @@ def write(cells: Sequence[Cell]) -> tuple[str, tuple[Loss, ...]]:
 def cell(slug: str, *added: TrafficAgent, keeps_traffic: bool = False) -> Cell:
     """A scenario of the catalogue with its reference, or with these agents instead."""
     scene = shown_scene(slug)
-    return Cell(
-        name=slug,
-        scene=scene if keeps_traffic else without_traffic(scene),
-        type=ScenarioType(entry(slug).type),
-        modification=Modification(added=added or tellable(slug)),
-        keeps_traffic=keeps_traffic,
-    )
+    change = Modification(added=added or tellable(slug))
+    rest: dict[str, Any] = {"modification": change, "keeps_traffic": keeps_traffic}
+    shown = scene if keeps_traffic else without_traffic(scene)
+    return Cell(name=slug, scene=shown, type=ScenarioType(entry(slug).type), **rest)
 
 
 def tellable(slug: str) -> tuple[TrafficAgent, ...]:
@@ -150,18 +148,16 @@ modification_details_dictionary:
 
 
 ODD = {
-    "box": replace(vehicle("Agent9", 30.0, 0.5, 0.1), length_m=5.2),
-    "velocity": replace(vehicle("Agent9", 30.0, 0.5), speed_mps=3.0),
-    "class": replace(vehicle("Agent9", 30.0, 0.5), length_m=9.0),
-    "missing": replace(cone("Agent9", 30.0, 0.5), type=AgentType.BARRIER),
-    "heading": replace(cone("Agent9", 30.0, 0.5), heading_rad=0.5),
+    "box": vehicle("Agent9", 30.0, 0.5, 0.1, length_m=5.2),
+    "velocity": vehicle("Agent9", 30.0, 0.5, speed_mps=3.0),
+    "class": vehicle("Agent9", 30.0, 0.5, length_m=9.0),
+    "missing": cone("Agent9", 30.0, 0.5, type=AgentType.BARRIER),
+    "heading": cone("Agent9", 30.0, 0.5, heading_rad=0.5),
     "walk": pedestrian("Agent9", 30.0, -4.0),
-    "short walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, -3.0)), speed_mps=1.0 / 15.0),
-    "fast walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), speed_mps=2.0),
-    "askew walk": replace(
-        pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), heading_rad=1.5, speed_mps=0.8
-    ),
-    "hurried worker": replace(pedestrian("Agent9", 30.0, -4.0), speed_mps=1.0),
+    "short walk": pedestrian("Agent9", 30.0, -4.0, (30.0, -3.0), speed_mps=1.0 / 15.0),
+    "fast walk": pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0), speed_mps=2.0),
+    "askew walk": pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0), heading_rad=1.5, speed_mps=0.8),
+    "hurried worker": pedestrian("Agent9", 30.0, -4.0, speed_mps=1.0),
     "no length": pedestrian("Agent9", 30.0, -4.0, (30.0, -4.0)),
     "another scene": vehicle("Agent9", 1_001.0, 0.5),
 }
@@ -204,12 +200,8 @@ def test_a_fault_costs_its_special_scenario_or_its_base_token_and_no_more() -> N
     }
     file, problems = parse_file(document)
     (details,) = file.modification_details_dictionary.values()
-    assert details.special_scenario is not None
     assert [*details.special_scenario] == ["0"]
     places = [place.removeprefix(f"{TOKENS}.") for place, _ in problems]
-    assert [place.partition(".")[0] for place in places] == [
-        "0123456789abcdef",
-        "fedcba9876543210",
-        "no token",
-    ]
+    named = ["0123456789abcdef", "fedcba9876543210", "no token"]
+    assert [place.partition(".")[0] for place in places] == named
     assert places[0].startswith("0123456789abcdef.special_scenario.1.cones[0]")

@@ -12,7 +12,6 @@ from tests.formats.openscenario_files import (
     BRAKES,
     CAR,
     CHANGE,
-    FOLLOW,
     GAP,
     OF_EGO,
     RIGHT,
@@ -22,21 +21,22 @@ from tests.formats.openscenario_files import (
     by_time,
     catalog,
     event,
+    follow,
     fork,
     init,
+    move_other,
     moves,
     read,
     route,
     scenario,
     speed,
+    vertices,
     write,
 )
 
 
 @pytest.mark.parametrize(("owner", "conditions"), [("event", ""), ("act", by_time(0))])
-def test_what_has_an_empty_trigger_never_begins(
-    owner: str, conditions: str, tmp_path: Path
-) -> None:
+def test_an_empty_trigger_never_fires(owner: str, conditions: str, tmp_path: Path) -> None:
     text = scenario(event(BRAKES), other_does=(speed(10),))
     trigger = f"<StartTrigger><ConditionGroup>{conditions}</ConditionGroup></StartTrigger>"
     idle = text.replace(trigger, "<StartTrigger/>")
@@ -108,32 +108,11 @@ def test_a_route_that_no_road_leads_along_is_lost_with_its_place(tmp_path: Path)
 def test_a_condition_starts_a_motion_when_a_formula_says(
     condition: str, started_s: float, tmp_path: Path
 ) -> None:
-    reading = read(write(tmp_path, scenario(event(BRAKES, condition), other_does=(speed(4),))))
-    (other,) = moves(reading).others
+    other = move_other(tmp_path, event(BRAKES, condition))
     assert other.started_s == pytest.approx(started_s, abs=0.01)
     # Over 2 s from 4 m/s to a stop.
     x_m = other.states[:, 0] - other.states[0, 0]
     assert x_m[-1] == pytest.approx(4.0 * started_s + 4.0, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("act", "condition", "started_s"),
-    [
-        (by_time(5), by_time(3), 5.0),
-        (by_time(3), by_time(5), 5.0),
-        (by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego"), by_time(2), 3.5),
-        (by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego"),
-         AFTER.replace('"acts"', '"a"').replace("completeState", "runningState").replace(
-             'delay="0"', 'delay="1"'), 4.5),
-    ],
-)  # fmt: skip
-def test_an_event_begins_once_its_act_has(
-    act: str, condition: str, started_s: float, tmp_path: Path
-) -> None:
-    text = scenario(event(BRAKES, condition), other_does=(speed(4),))
-    file = write(tmp_path, text.replace(f"{by_time(0)}</Cond", f"{act}</Cond"))
-    (other,) = moves(read(file)).others
-    assert other.started_s == pytest.approx(started_s, abs=0.01)
 
 
 def test_who_stood_for_so_long_goes_on_faster_than_then(tmp_path: Path) -> None:
@@ -142,8 +121,7 @@ def test_who_stood_for_so_long_goes_on_faster_than_then(tmp_path: Path) -> None:
     target = '<RelativeTargetSpeed entityRef="Other" value="2" speedTargetValueType="delta"/>'
     more = speed(0).replace('<AbsoluteTargetSpeed value="0"/>', target)
     later = event(more, by_time(6), name="more")
-    text = scenario(event(BRAKES, by_time(1)), goes, later, other_does=(speed(4),))
-    (other,) = moves(read(write(tmp_path, text))).others
+    other = move_other(tmp_path, event(BRAKES, by_time(1)), goes, later)
     # It stops after 3 s, and goes on at 6 m/s after 4 s, at 8 m/s after 6 s.
     assert other.states[[39, 59, 69], 3] == pytest.approx([0.0, 6.0, 8.0])
 
@@ -163,8 +141,7 @@ def test_a_speed_is_reached_by_its_dynamics(
 ) -> None:
     dynamics = STEP.replace("step", shape).replace('"time"', f'"{dimension}"')
     action = speed(12, dynamics.replace('"0"', f'"{value}"'))
-    file = write(tmp_path, scenario(event(action, by_time(1)), other_does=(speed(4),)))
-    (other,) = moves(read(file)).others
+    other = move_other(tmp_path, event(action, by_time(1)))
     assert other.states[50, 0] - other.states[0, 0] == pytest.approx(gone_m, abs=0.05)
 
 
@@ -178,8 +155,7 @@ def test_a_lane_change_takes_its_time_or_way(
     target: str, dimension: str, value: int, tmp_path: Path
 ) -> None:
     change = event(CHANGE.format(dimension, value, target), by_time(1))
-    file = write(tmp_path, scenario(change, other_does=(speed(8),)))
-    (other,) = moves(read(file)).others
+    other = move_other(tmp_path, change, mps=8)
     # From the lane of the ego after 1 s; half of it after 1.5 s more, and all of it after 3 s.
     assert other.states[[10, 25, 41], 1] == pytest.approx([0.0, -1.75, -3.5], abs=0.06)
 
@@ -188,8 +164,7 @@ def test_who_drives_on_the_oncoming_lane_changes_onto_the_egos(tmp_path: Path) -
     at = '<LanePosition roadId="1" laneId="1" s="80"><Orientation type="relative" h="3.141593"/>'
     target = OF_EGO.replace("-1", "0")
     change = event(CHANGE.format("time", 3, target), by_time(1))
-    text = scenario(change, other_at=f"{at}</LanePosition>", other_does=(speed(8),))
-    (other,) = moves(read(write(tmp_path, text))).others
+    other = move_other(tmp_path, change, mps=8, other_at=f"{at}</LanePosition>")
     assert other.states[[0, 10, 41], 1] == pytest.approx([3.5, 3.5, 0.0], abs=0.06)
     assert other.states[-1, 0] > other.states[41, 0] + 50.0
 
@@ -199,8 +174,7 @@ def test_events_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
     later = AFTER.replace('delay="0"', 'delay="0.5"')
     second = event(CHANGE.format("time", 2, RIGHT), later, name="changes")
     third = event(BRAKES, by_time(6), name="brakes")
-    file = write(tmp_path, scenario(first, second, third, other_does=(speed(4),)))
-    reading = read(file)
+    reading = read(write(tmp_path, scenario(first, second, third, other_does=(speed(4),))))
     (other,) = moves(reading).others
     x_m, y_m = (other.states[:, :2] - other.states[0, :2]).T
     assert x_m[30] == pytest.approx(4.0 + 16.0, abs=0.01)
@@ -220,8 +194,7 @@ def test_an_event_waits_for_what_an_actor_does_first(tmp_path: Path) -> None:
     )
     started = AFTER.replace('"acts"', '"starts"')
     second = event(brakes, gap + started, name="brakes")
-    file = write(tmp_path, scenario(first, second, other_does=(speed(4),)))
-    reading = read(file)
+    reading = read(write(tmp_path, scenario(first, second, other_does=(speed(4),))))
     (other,) = moves(reading).others
     assert other.started_s == 0.0
     assert other.states[[49, 60], 3] == pytest.approx([12.0, 8.0], abs=0.5)
@@ -234,41 +207,27 @@ def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path)
     ahead = '<Position><RelativeObjectPosition entityRef="Other" dx="-10" dy="0"/></Position>'
     near = f'<DistanceCondition value="20.3" freespace="false" rule="lessThan">{ahead}'
     given = by_entity(f"{near}</DistanceCondition>", "Ego")
-    reading = read(write(tmp_path, scenario(event(BRAKES, given), other_does=(speed(4),))))
-    (other,) = moves(reading).others
+    other = move_other(tmp_path, event(BRAKES, given))
     assert other.started_s == pytest.approx(5.0, abs=0.01)
 
 
 @pytest.mark.parametrize("times_s", [(0, 5), (5, 0), ("", "")])
 def test_times_that_do_not_count_are_not_read(times_s: tuple[object, ...], tmp_path: Path) -> None:
-    at = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75" h="0"/></Position></Vertex>'
-    vertices = "".join(at.format(s, 80 + 40 * n) for n, s in enumerate(times_s))
-    action = event(FOLLOW.format(vertices, "<None/>"))
-    (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
+    line = vertices(*((time_s, 80 + 40 * n) for n, time_s in enumerate(times_s)))
+    other = move_other(tmp_path, event(follow(line)))
     assert other.states[50, 0] - other.states[0, 0] == pytest.approx(20.0, abs=0.02)
 
 
 def test_trajectories_of_one_actor_go_on_from_each_other(tmp_path: Path) -> None:
     place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
     shape = '<Clothoid curvature="{}" curvaturePrime="0" length="40">' + f"{place}</Clothoid>"
-    follow = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    first = event(follow.format(0.01), by_time(2))
-    second = event(follow.format(-0.01), AFTER, name="then")
-    (other,) = moves(read(write(tmp_path, scenario(first, second, other_does=(speed(8),))))).others
+    first = event(follow(shape.format(0.01)), by_time(2))
+    second = event(follow(shape.format(-0.01)), AFTER, name="then")
+    other = move_other(tmp_path, first, second, mps=8)
     # Two bends of 0.4 rad in a radius of 100 m, the other way round. Paths have no headings: the
     # second begins along the way of the middle, up to 0.014 rad more.
     x_m, y_m = 200.0 * math.sin(0.4), 200.0 * (1.0 - math.cos(0.4))
     assert other.states[120, :3] == pytest.approx([58.6 + 16.0 + x_m + 1.4, y_m, 0.0], abs=0.4)
-
-
-def test_after_the_bend_of_a_trajectory_its_actor_goes_straight_on(tmp_path: Path) -> None:
-    place = '<Position><RelativeObjectPosition entityRef="Other"/></Position>'
-    shape = f'<Clothoid curvature="0.05" curvaturePrime="0" length="30">{place}</Clothoid>'
-    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    file = write(tmp_path, scenario(event(action, by_time(0)), other_does=(speed(8),)))
-    (other,) = moves(read(file)).others
-    rest = other.states[42:]
-    assert rest[:, 2] == pytest.approx(np.full(len(rest), 1.5), abs=0.001)
 
 
 LATER = (
@@ -278,9 +237,17 @@ LATER = (
 )
 
 
+ON_THE_WAY = by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego")
+RUNNING = AFTER.replace("completeState", "runningState").replace('"0"', '"1"')
+
+
 @pytest.mark.parametrize(
     ("act", "own", "began_s"),
-    [(by_time(6), AFTER, 6.0), (AFTER, by_time(6), 6.0), (AFTER, "", 2.0), ("", AFTER, 2.0)],
+    [
+        *((by_time(6), AFTER, 6.0), (AFTER, by_time(6), 6.0), (AFTER, "", 2.0), ("", AFTER, 2.0)),
+        (ON_THE_WAY, by_time(2), 3.5),
+        (ON_THE_WAY, RUNNING.replace('"acts"', '"a2"'), 4.5),
+    ],
 )
 def test_an_event_begins_once_both_its_act_and_its_own_conditions_hold(
     act: str, own: str, began_s: float, tmp_path: Path
@@ -292,26 +259,16 @@ def test_an_event_begins_once_both_its_act_and_its_own_conditions_hold(
     faster = other.states[:, 3] > 11.0
     assert faster.argmax() == pytest.approx(10 * began_s + 1, abs=1)
     is_told = any("begins so long after" in note for note in reading.notes)
-    assert is_told == (began_s == 6.0)
+    assert is_told == (began_s > 2.0)
 
 
-def test_a_trajectory_that_is_not_understood_is_noted_once(tmp_path: Path) -> None:
-    vertex = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75"/></Position></Vertex>'
-    action = FOLLOW.format(vertex.format(0, 60) + vertex.format(1, "nan"), TIMING)
-    notes = read(write(tmp_path, scenario(event(action, by_time(0))))).notes
-    assert [note[:50] for note in notes if "Vertex" in note or "WorldPosition" in note] == [
-        "Not understood and left out: events (1); first eve"
-    ]
-
-
-def test_a_time_that_is_none_costs_its_event_alone(tmp_path: Path) -> None:
-    vertex = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75"/></Position></Vertex>'
-    action = FOLLOW.format(vertex.format(0, 60) + vertex.format(1, 68), TIMING)
-    text = scenario(event(action, by_time("soon")), event(speed(12), by_time(2), "then"))
-    reading = read(write(tmp_path, text))
-    (other,) = moves(reading).others
-    assert other.states[-1, 3] == 12.0
-    assert any("got 'soon'" in note for note in reading.notes)
+def test_an_odd_trajectory_costs_its_event_alone_and_is_noted_once(tmp_path: Path) -> None:
+    odd = event(follow(vertices((0, 60), (1, "nan")), TIMING), by_time(0))
+    late = event(follow(vertices((0, 60), (1, 68)), TIMING), by_time("soon"), "late")
+    reading = read(write(tmp_path, scenario(odd, late, event(speed(12), by_time(2), "then"))))
+    assert moves(reading).others[0].states[-1, 3] == 12.0
+    (said,) = (note for note in reading.notes if note.startswith("Not understood and left out: "))
+    assert "events (2); first event late" in said
 
 
 CLOTHOID = (
@@ -329,16 +286,15 @@ def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
     start_s: float, made: str, tmp_path: Path
 ) -> None:
     shape = made.format('<RelativeObjectPosition entityRef="Other" dx="0" dy="0"/>')
-    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    file = write(tmp_path, scenario(event(action, by_time(start_s)), other_does=(speed(8),)))
-    (other,) = moves(read(file)).others
+    other = move_other(tmp_path, event(follow(shape), by_time(start_s)), mps=8)
     # The middle of its box is 1.4 m ahead of the point that goes round in a radius of 50 m.
     since_rad, x_m = 0.02 * 32.0, 58.6 + 8.0 * start_s
     middle = x_m + 50.0 * math.sin(since_rad) + 1.4 * math.cos(since_rad)
     y_m = 50.0 * (1.0 - math.cos(since_rad)) + 1.4 * math.sin(since_rad)
     reached = other.states[int(10 * start_s) + 40, :2]
     assert reached == pytest.approx([middle, y_m], abs=0.03)
-    assert other.states[-1, 3] == 8.0
+    # It goes straight on after the bend.
+    assert other.states[-1, 2:] == pytest.approx([0.8, 8.0], abs=0.001)
 
 
 def test_a_nurbs_that_is_a_circle_is_followed_as_one(tmp_path: Path) -> None:
@@ -351,9 +307,7 @@ def test_a_nurbs_that_is_a_circle_is_followed_as_one(tmp_path: Path) -> None:
     )
     knots = "".join(f'<Knot value="{n}"/>' for n in (0, 0, 0, 1, 1, 1))
     shape = f'<Nurbs order="3">{points}{knots}</Nurbs>'
-    action = FOLLOW.format("", "<None/>").replace("<Polyline></Polyline>", shape)
-    reading = read(write(tmp_path, scenario(event(action, by_time(1)), other_does=(speed(8),))))
-    (other,) = moves(reading).others
+    other = move_other(tmp_path, event(follow(shape), by_time(1)), mps=8)
     away_m = np.hypot(*(other.states[11:80, :2] - [66.6, 40.0]).T)
     assert away_m == pytest.approx(math.hypot(40.0, 1.4), abs=0.02)
 
@@ -407,14 +361,10 @@ def test_forty_actors_with_events_are_read_within_the_sandbox(tmp_path: Path) ->
          by_entity('<TraveledDistanceCondition value="19.9"/>', "Ego")),
     ],
 )  # fmt: skip
-def test_a_trajectory_is_followed_by_its_times_or_speed(
-    times: str, condition: str, tmp_path: Path
-) -> None:
+def test_a_trajectory_has_its_times_or_speed(times: str, condition: str, tmp_path: Path) -> None:
     since_s, scale = (2 if "absolute" in times else 0), (2 if "-1" in times else 1)
-    at = '<Vertex time="{}"><Position><WorldPosition x="{}" y="-1.75" h="0"/></Position></Vertex>'
-    vertices = "".join(at.format((since_s + n + scale - 1) / scale, 88 + 4 * n) for n in range(6))
-    action = event(FOLLOW.format(vertices, times), condition)
-    (other,) = moves(read(write(tmp_path, scenario(action, other_does=(speed(4),))))).others
+    line = vertices(*(((since_s + n + scale - 1) / scale, 88 + 4 * n) for n in range(6)))
+    other = move_other(tmp_path, event(follow(line, times), condition))
     gone_m = other.states[:, 0] - other.states[0, 0]
     # 8 m by then, and 4 m a second: to the last point after 7 s.
     assert gone_m[[10, 20, 30, 60, 70]] == pytest.approx([4.0, 8.0, 12.0, 24.0, 28.0], abs=0.02)

@@ -14,13 +14,14 @@ from augment.formats.reading import Reading
 from tests.formats.opendrive_maps import LANES, ROAD, WIDTH, by_hand
 from tests.formats.openscenario_files import (
     EGO_AT,
-    FOLLOW,
     TIMING,
     event,
+    follow,
     fork,
     on_route,
     read,
     scenario,
+    vertices,
     write,
 )
 
@@ -77,13 +78,10 @@ def test_world_positions_of_carlas_own_frame_are_mirrored(tmp_path: Path) -> Non
 
 
 def test_a_vertex_of_carlas_own_frame_heads_along_the_way(tmp_path: Path) -> None:
-    place = '<Position><WorldPosition x="{}" y="{}"/></Position>'
-    ends = [place.format(60, 1.75), place.format(60, -38.25)]
-    vertices = "".join(f'<Vertex time="{5 * n}">{end}</Vertex>' for n, end in enumerate(ends))
-    text = scenario(event(FOLLOW.format(vertices, TIMING.format("relative"))))
+    line = vertices((0, 60), y=1.75) + vertices((5, 60), y=-38.25)
+    text = scenario(event(follow(line.replace(' h="0"', ""), TIMING.format("relative"))))
     text = text.replace("<FileHeader", '<FileHeader description="CARLA:Crossing"')
     recording = read(write(tmp_path, text)).recording
-    assert recording is not None
     assert recording.tracks[0].states[-1, 2] == pytest.approx(math.pi / 2.0, abs=2e-3)
 
 

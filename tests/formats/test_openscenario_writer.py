@@ -97,12 +97,10 @@ def test_a_lane_lies_between_its_own_edges() -> None:
     )
     _, road_map = files(cell(replace(crossing(), lanes=(lane,), connectors=()), added=()))
     (road,) = road_map.findall("road")
-    offsets = [
-        (float(one.attrib["s"]), float(one.attrib["a"])) for one in road.findall(".//laneOffset")
-    ]
-    widths = [
-        (float(one.attrib["sOffset"]), float(one.attrib["a"])) for one in road.findall(".//width")
-    ]
+    offsets, widths = (
+        [(float(one.attrib[at]), float(one.attrib["a"])) for one in road.findall(f".//{kind}")]
+        for kind, at in (("laneOffset", "s"), ("width", "sOffset"))
+    )
     # On the left the lane lies left of its inner edge, the right one.
     assert offsets[0] == pytest.approx((0.0, -2.0), abs=0.01)
     assert np.array(widths) == pytest.approx(np.array([(0.0, 4.0), (30.0, 4.5)]), abs=0.01)
@@ -121,8 +119,6 @@ def test_places_are_those_of_the_rear_axle_and_boxes_lie_around_the_centre() -> 
     scenario, _ = files(cell())
     position = scenario.find(".//Init//Private[@entityRef='Agent2']//WorldPosition")
     centre = scenario.find(".//ScenarioObject[@name='Agent2']//Center")
-    assert position is not None
-    assert centre is not None
     ahead_m, heading = float(centre.attrib["x"]), float(position.attrib["h"])
     assert ahead_m == pytest.approx(4.8 * REAR_AXLE_SHARE)
     assert heading == pytest.approx(0.1)
@@ -137,7 +133,7 @@ def test_a_walker_sets_out_when_the_ego_is_near() -> None:
     assert near.attrib["entityRef"] == "Agent1"
     assert float(near.attrib["value"]) == pytest.approx(math.hypot(70.0 - 19.339, 4.0), abs=2e-4)
     (walk,) = scenario.findall(".//Trajectory[@name='Agent5 trajectory']")
-    ends = {round(float(one.attrib["time"]), 1): place_of(one) for one in walk.iter("Vertex")}
+    ends = {round(float(one.attrib["time"]), 1): pose_of(one)[:2] for one in walk.iter("Vertex")}
     assert ends[0.0] == pytest.approx((70.0, -4.0))
     assert ends[15.0] == pytest.approx((70.0, 8.0))
 
@@ -149,11 +145,9 @@ def test_recorded_agents_come_drive_and_go() -> None:
     events = {one.attrib["name"]: one for one in scenario.findall(".//Event")}
     assert {"Agent3 comes", "Agent3 goes on", "Agent2 goes on", "Agent2 is gone"} <= set(events)
     vertices = events["Agent2 goes on"].findall(".//Vertex")
-    assert [float(one.attrib["time"]) for one in vertices] == pytest.approx(
-        [0.1 * step for step in range(20)]
-    )
+    times_s = [float(one.attrib["time"]) for one in vertices]
+    assert times_s == pytest.approx([0.1 * step for step in range(20)])
     gone = events["Agent2 is gone"].find(".//SimulationTimeCondition")
-    assert gone is not None
     assert float(gone.attrib["value"]) == pytest.approx(2.0)
 
 
@@ -175,16 +169,10 @@ def scene_of_motions() -> Cell:
     """The moving cast, of whom the first sets out at 3.9 s, and who leaves the map or brakes."""
     leaves = PlannedMotion(path=LanePath(lane_ids=("Lane1",)), start=NearEgo(within_m=5.0))
     late = PlannedMotion(start=AtTime(after_s=5.0))
-    steps = PlannedMotion(
-        path=PointPath(points_m=((64.0, 1.0),)),
-        speeds=((0.0, 2.0),),
-        start=AtPlace(x_m=40.0, y_m=0.0, within_m=3.0),
-    )
-    turns_out = PlannedMotion(
-        path=PointPath(points_m=((100.0, 3.5),)),
-        speeds=((2.0, 5.0),),
-        start=NearEgo(within_m=25.0),
-    )
+    there, aside = (PointPath(points_m=(end_m,)) for end_m in ((64.0, 1.0), (100.0, 3.5)))
+    by_ego = AtPlace(x_m=40.0, y_m=0.0, within_m=3.0)
+    steps = PlannedMotion(path=there, speeds=((0.0, 2.0),), start=by_ego)
+    turns_out = PlannedMotion(path=aside, speeds=((2.0, 5.0),), start=NearEgo(within_m=25.0))
     brakes = PlannedMotion(speeds=((2.0, 0.0),), start=AtTime(after_s=1.05))
     more = (
         with_motion(vehicle("Agent7", 385.0, 0.0), leaves, speed_mps=9.0, lane_id="Lane1"),
@@ -246,15 +234,15 @@ class Player:
 
     def __init__(self, scenario: ET.Element) -> None:
         self.ahead_m = {
-            one.attrib["name"]: float(one.find(".//Center").attrib["x"])  # type: ignore[union-attr]
+            one.attrib["name"]: float(one.find(".//Center").attrib["x"])
             for one in scenario.iter("ScenarioObject")
         }
         self.poses = {
             one.attrib["entityRef"]: pose_of(one)
-            for one in scenario.find(".//Init").iter("Private")  # type: ignore[union-attr]
+            for one in scenario.find(".//Init").iter("Private")
         }
         self.waiting = [
-            (group.find(".//EntityRef").attrib["entityRef"], event)  # type: ignore[union-attr]
+            (group.find(".//EntityRef").attrib["entityRef"], event)
             for group in scenario.iter("ManeuverGroup")
             for event in group.iter("Event")
         ]
@@ -283,10 +271,7 @@ class Player:
         elif (follow := event.find(".//FollowTrajectoryAction")) is not None:
             assert who not in self.running or event.attrib["priority"] == "override"
             rows = [(float(one.attrib["time"]), *pose_of(one)) for one in follow.iter("Vertex")]
-            timing = follow.find(".//Timing")
-            is_relative = (
-                timing is not None and timing.attrib["domainAbsoluteRelative"] == "relative"
-            )
+            is_relative = follow.find(".//Timing[@domainAbsoluteRelative='relative']") is not None
             self.running[who] = event.attrib["name"], now if is_relative else 0.0, np.array(rows)
             self._follow(who, now)
 
@@ -299,7 +284,6 @@ class Player:
 
     def _fires(self, event: ET.Element, now: float) -> bool:
         condition = event.find("StartTrigger//Condition")
-        assert condition is not None
         groups = [*condition.iter("EntityCondition"), *condition.iter("ByValueCondition")]
         (kind,) = (one for group in groups for one in group)
         if kind.tag == "SimulationTimeCondition":
@@ -307,12 +291,9 @@ class Player:
         if kind.tag == "StoryboardElementStateCondition":
             assert kind.attrib["state"] == "endTransition"
             return kind.attrib["storyboardElementRef"] in self.ended
-        who = condition.find(".//EntityRef").attrib["entityRef"]  # type: ignore[union-attr]
-        other = (
-            pose_of(kind)
-            if kind.tag == "DistanceCondition"
-            else self.poses[kind.attrib["entityRef"]]
-        )
+        who = condition.find(".//EntityRef").attrib["entityRef"]
+        is_place = kind.tag == "DistanceCondition"
+        other = pose_of(kind) if is_place else self.poses[kind.attrib["entityRef"]]
         assert (kind.attrib["freespace"], kind.attrib["rule"]) == ("false", "lessOrEqual")
         assert kind.attrib["relativeDistanceType"] == "euclidianDistance"
         return math.dist(self.poses[who][:2], other[:2]) <= float(kind.attrib["value"])
@@ -321,13 +302,8 @@ class Player:
 def pose_of(element: ET.Element) -> tuple[float, float, float]:
     """The first position in an element."""
     position = element.find(".//WorldPosition")
-    assert position is not None
     given = position.attrib
     return float(given["x"]), float(given["y"]), float(given.get("h", "0"))
-
-
-def place_of(element: ET.Element) -> tuple[float, float]:
-    return pose_of(element)[:2]
 
 
 def _sampled(road: ET.Element) -> np.ndarray:
@@ -335,7 +311,6 @@ def _sampled(road: ET.Element) -> np.ndarray:
     found = []
     for geometry in road.findall("planView/geometry"):
         cubic = geometry.find("paramPoly3")
-        assert cubic is not None
         at = np.linspace(0.0, 1.0, 50)[:, None] ** np.arange(4)
         u, v = (at @ [float(cubic.attrib[f"{n}{axis}"]) for n in "abcd"] for axis in "UV")
         heading = float(geometry.attrib["hdg"])

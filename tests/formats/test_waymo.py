@@ -31,7 +31,6 @@ def test_the_scene_is_that_of_the_current_step(file: Path) -> None:
     assert (reading.moment.item, reading.moment.frame) == ("0", 1)
     assert (scene.origin.pose.x_m, scene.ego.speed_mps) == (1001.0, 10.0)
     assert [(a.x_m, a.y_m, a.lane_id) for a in scene.agents] == [(20.0, 0.0, "Lane1")]
-    assert recording is not None
     assert recording.ego[:, 0].tolist() == [0.0, 1.0]
     scene_to_document(scene)
 
@@ -40,7 +39,6 @@ def test_lanes_have_widths_limits_lights_and_turns(file: Path) -> None:
     scene = read(file).scene
     street, after = scene.lanes
     assert (street.width_m, street.speed_limit_mps) == (4.0, 11.176)
-    assert street.left_boundary is not None
     assert street.left_boundary.points_m[:, 1].tolist() == [2.0, 2.0]
     ways = {(c.turn_type, c.from_lane, c.to_lane, c.traffic_light) for c in scene.connectors}
     assert ways == {
@@ -106,21 +104,15 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (
-            track(9, 7, *[state(0, 0, 0, 0)] * 3),
-            "objects (1); first tracks[2].object_type: unknown",
-        ),
+        (track(9, 7, *[state(0, 0, 0, 0)] * 3),
+         "objects (1); first tracks[2].object_type: unknown"),
         (track(9, 1, state(0, 0, 0, 0)), "first tracks[2]: has 1 states for 3 times"),
         (lane(5, (2, 2), *points(8, (990, 503))), "lanes (1); first map_features.5: a line needs"),
         ((8, message((1, 6), (8, message(*points(1, (990, 503), (991, 503)))))), "areas (1)"),
-        (
-            lane(4, (2, 2), *points(8, (1060, 500), (1080, 500))),
-            "Of two lanes with one id the last",
-        ),
-        (
-            lane(4, (2, 2), *points(8, (1060, 500), (1080, 500)), (13, message((3, 77)))),
-            "edges of lanes (1); first map_features.4.boundary_feature_id: unknown '77'",
-        ),
+        (lane(4, (2, 2), *points(8, (1060, 500), (1080, 500))),
+         "Of two lanes with one id the last"),
+        (lane(4, (2, 2), *points(8, (1060, 500), (1080, 500)), (13, message((3, 77)))),
+         "edges of lanes (1); first map_features.4.boundary_feature_id: unknown '77'"),
         *(
             (
                 lane(4, *points(8, (1060, 500), (1080, 500)), (13, message(*ends, (3, 9)))),
@@ -128,15 +120,11 @@ def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, sai
             )
             for ends in ([(1, 0), (2, 2)], [(1, 1), (2, 0)])
         ),
-        (
-            track(8, 1, *[state(1030, 500, 0.0, 0.0)] * 3),
-            "Two objects have one id; both are taken.",
-        ),
+        (track(8, 1, *[state(1030, 500, 0.0, 0.0)] * 3),
+         "Two objects have one id; both are taken."),
     ],
-)
-def test_one_bad_part_is_left_out_with_a_note(
-    tmp_path: Path, more: tuple[int, object], said: str
-) -> None:
+)  # fmt: skip
+def test_a_bad_part_is_left_out_noted(tmp_path: Path, more: tuple[int, object], said: str) -> None:
     reading = read(write(tmp_path / "x.tfrecord", scenario(more)))
     assert said in " ".join(reading.notes)
     assert len(reading.scene.lanes) == 2

@@ -63,13 +63,7 @@ def scenario(*more: tuple[int, object], steps: int = 3, ego: int = 0) -> bytes:
     left = (13, message((1, 0), (2, 1), (3, 9), (4, 1)))
     right = (14, message((1, 0), (2, 1), (3, 8), (4, 1)))
     street = [(1, 25.0), (2, 2), *points(8, (980, 500), (1030, 500)), (10, varint(2) + varint(3))]
-    onward = [
-        (2, 2),
-        *points(8, (1030, 500), (1060, 500)),
-        (9, varint(1)),
-        (3, 1),
-        (10, varint(4)),
-    ]
+    onward = [(2, 2), *points(8, (1030, 500), (1060, 500)), (9, varint(1)), (10, varint(4))]
     bend = [(2, 2), *points(8, (1030, 500), (1040, 503), (1043, 515)), (9, varint(1)), (3, 1)]
     return message(
         *((1, 0.1 * step) for step in range(steps)),
@@ -79,7 +73,7 @@ def scenario(*more: tuple[int, object], steps: int = 3, ego: int = 0) -> bytes:
         (6, ego),
         *((7, message((1, message((1, 2), (2, 6 if step < 2 else 4))))) for step in range(steps)),
         lane(1, *street, left, right),
-        lane(2, *onward),
+        lane(2, *onward, (3, 1)),
         lane(3, *bend),
         lane(4, (2, 2), *points(8, (1060, 500), (1090, 500))),
         (8, message((1, 9), (4, message((1, 2), *points(2, (970, 502), (1040, 502)))))),
@@ -92,12 +86,7 @@ def scenario(*more: tuple[int, object], steps: int = 3, ego: int = 0) -> bytes:
 
 def record(payload: bytes) -> bytes:
     head = struct.pack("<Q", len(payload))
-    return (
-        head
-        + struct.pack("<I", mask_crc32c(head))
-        + payload
-        + struct.pack("<I", mask_crc32c(payload))
-    )
+    return b"".join(part + struct.pack("<I", mask_crc32c(part)) for part in (head, payload))
 
 
 def write(path: Path, *payloads: bytes) -> Path:
