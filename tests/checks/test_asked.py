@@ -30,9 +30,8 @@ MIDDLE = parked(20.0, lateral=CENTRED)
 FACING = parked(20.0, facing=wish.Facing.AGAINST_LANE)
 WALK = walk(20.0, wish.Side.LEFT)
 CRASH = crash(20.0, 2, wish.CrashedCar(turn_deg=40.0))
-ASIDE = wish.Intent(
-    requests=(replace(CRASH.requests[0], spot=spot(20.0, lateral=towards(LEFT_EDGE, 1.2))),)
-)
+_BESIDE = spot(20.0, lateral=towards(LEFT_EDGE, 1.2))
+ASIDE = wish.Intent(requests=(replace(CRASH.requests[0], spot=_BESIDE),))
 LINE = cones(20.0, 3, wish.Shape.LINE, lateral=towards(RIGHT_EDGE), spacing=metres(2.5))
 BUS = parked(35.0, body=wish.Body.BUS)
 DRIVING = parked(30.0, speed_mps=8.0)
@@ -54,7 +53,7 @@ TAPER = (
     pedestrian("Agent5", 25.0, -2.0),
 )
 CONES = tuple(cone(f"Agent{n + 2}", 20.0 + 2.5 * n, -1.5) for n in range(3))
-A_BUS = replace(vehicle("Agent2", 35.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
+A_BUS = vehicle("Agent2", 35.0, 0.0, type=AgentType.BUS, length_m=7.456, width_m=2.079)
 
 
 def faults(
@@ -71,12 +70,9 @@ def faults(
         (CAR, (vehicle("Agent2", 22.0, 0.6, math.radians(10.0)),)),
         (MIDDLE, (vehicle("Agent2", 18.0, 0.9),)),
         (FACING, (vehicle("Agent2", 20.0, 0.0, math.pi),)),
-        (WALK, ACROSS),
-        (CRASH, CARS),
-        (LINE, CONES),
-        (BUS, (A_BUS,)),
+        *((WALK, ACROSS), (CRASH, CARS), (LINE, CONES), (BUS, (A_BUS,))),
         (BUS, (replace(A_BUS, type=AgentType.VEHICLE),)),
-        (DRIVING, (replace(vehicle("Agent2", 30.0, 0.0), speed_mps=9.0),)),
+        (DRIVING, (vehicle("Agent2", 30.0, 0.0, speed_mps=9.0),)),
         (ONCOMING, (vehicle("Agent2", 20.0, 3.5, math.pi),)),
         (FILE, IN_FILE),
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (28.0, -3.0)),)),
@@ -99,13 +95,10 @@ def test_what_is_as_asked_for_has_no_fault(
         (CAR, (vehicle("Agent2", 20.0, -1.2),), FindingKind.ASKED_SIDE),
         (CAR, (vehicle("Agent2", 20.0, 1.2, 0.4),), FindingKind.ASKED_HEADING),
         (CAR, (vehicle("Agent2", 20.0, 1.2, math.pi),), FindingKind.ASKED_HEADING),
-        (CAR, (replace(vehicle("Agent2", 20.0, 1.2), speed_mps=4.0),), FindingKind.ASKED_MOTION),
+        (CAR, (vehicle("Agent2", 20.0, 1.2, speed_mps=4.0),), FindingKind.ASKED_MOTION),
         (CAR, (), FindingKind.ASKED_COUNT),
-        (
-            CAR,
-            (vehicle("Agent2", 20.0, 1.2), vehicle("Agent3", 40.0, 0.0)),
-            FindingKind.ASKED_COUNT,
-        ),
+        (CAR, (vehicle("Agent2", 20.0, 1.2), vehicle("Agent3", 40.0, 0.0)),
+         FindingKind.ASKED_COUNT),
         (CAR, (cone("Agent2", 20.0, 1.2),), FindingKind.ASKED_TYPE),
         (MIDDLE, (vehicle("Agent2", 20.0, 1.2),), FindingKind.ASKED_ACROSS),
         (FACING, (vehicle("Agent2", 20.0, 0.0),), FindingKind.ASKED_HEADING),
@@ -120,11 +113,8 @@ def test_what_is_as_asked_for_has_no_fault(
         (LINE, CONES[:2], FindingKind.ASKED_COUNT),
         (LINE, tuple(replace(one, y_m=1.5) for one in CONES), FindingKind.ASKED_SIDE),
         (LINE, tuple(replace(one, y_m=-2.6) for one in CONES), FindingKind.ASKED_ACROSS),
-        (
-            LINE,
-            tuple(replace(one, x_m=20.0 + 2.0 * (one.x_m - 20.0)) for one in CONES),
-            FindingKind.ASKED_SPACING,
-        ),
+        (LINE, tuple(replace(one, x_m=20.0 + 2.0 * (one.x_m - 20.0)) for one in CONES),
+         FindingKind.ASKED_SPACING),
         (BUS, (replace(A_BUS, type=AgentType.VEHICLE, length_m=4.8),), FindingKind.ASKED_TYPE),
         (DRIVING, (vehicle("Agent2", 30.0, 0.0),), FindingKind.ASKED_MOTION),
         (ONCOMING, (vehicle("Agent2", 20.0, 0.0, math.pi),), FindingKind.ASKED_ACROSS),
@@ -132,13 +122,10 @@ def test_what_is_as_asked_for_has_no_fault(
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), FindingKind.ASKED_DISTANCE),
         (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), FindingKind.ASKED_ACROSS),
         (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=-7.0)), FindingKind.ASKED_SPACING),
-        (
-            cones(20.0, 3, wish.Shape.TAPER, start=wish.Side.LEFT),
-            TAPER[:3],
-            FindingKind.ASKED_SIDE,
-        ),
+        (cones(20.0, 3, wish.Shape.TAPER, start=wish.Side.LEFT), TAPER[:3],
+         FindingKind.ASKED_SIDE),
     ],
-)
+)  # fmt: skip
 def test_what_is_not_as_asked_for_is_the_one_fault(
     intent: wish.Intent, added: tuple[TrafficAgent, ...], kind: FindingKind
 ) -> None:
@@ -150,10 +137,8 @@ def test_what_is_not_as_asked_for_is_the_one_fault(
 @pytest.mark.parametrize(
     ("wrong_way_m", "kind"),
     [
-        (0.44, FindingKind.ASKED_ACROSS),
-        (0.46, FindingKind.ASKED_SIDE),
-        (1.2, FindingKind.ASKED_SIDE),
-        (1.94, FindingKind.ASKED_SIDE),
+        *((0.44, FindingKind.ASKED_ACROSS), (0.46, FindingKind.ASKED_SIDE)),
+        *((1.2, FindingKind.ASKED_SIDE), (1.94, FindingKind.ASKED_SIDE)),
         (1.96, FindingKind.ASKED_ACROSS),
     ],
 )
@@ -235,8 +220,8 @@ def test_what_is_doubtful_is_settled_where_it_was_asked_for() -> None:
 
 
 def test_what_is_open_is_held_against_nothing() -> None:
-    somewhere = wish.Intent(requests=(replace(CAR.requests[0], spot=wish.Spot(), speed_mps=None),))  # type: ignore[arg-type]
-    here = replace(vehicle("Agent2", 47.0, 0.4), speed_mps=3.0)
+    somewhere = wish.Intent(requests=(replace(CAR.requests[0], spot=wish.Spot(), speed_mps=None),))
+    here = vehicle("Agent2", 47.0, 0.4, speed_mps=3.0)
     assert faults(somewhere, here) == set()
 
 
@@ -289,16 +274,10 @@ def cars(*places: tuple[float, float, float]) -> tuple[TrafficAgent, ...]:
     )
 
 
-CHAIN = wish.CrashRequest(
-    spot=SPOT,
-    count=3,
-    others=(wish.CrashedCar(gap=GAP, turn_deg=25.0), wish.CrashedCar(gap=GAP, turn_deg=60.0)),
-)
-BEHIND = wish.CrashRequest(
-    spot=SPOT,
-    count=2,
-    others=(wish.CrashedCar(gap=GAP, bearing=wish.Bearing.BEHIND, turn_deg=40.0),),
-)
+TURNED = tuple(wish.CrashedCar(gap=GAP, turn_deg=turn_deg) for turn_deg in (25.0, 60.0))
+CHAIN = wish.CrashRequest(spot=SPOT, count=3, others=TURNED)
+AFTER = wish.CrashedCar(gap=GAP, bearing=wish.Bearing.BEHIND, turn_deg=40.0)
+BEHIND = wish.CrashRequest(spot=SPOT, count=2, others=(AFTER,))
 PLAIN = wish.CrashRequest(spot=SPOT, count=2)
 FIRST_ACROSS = wish.CrashRequest(spot=SPOT, count=2, facing=wish.Facing.ACROSS)
 AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))

@@ -18,7 +18,7 @@ from tests.scene.test_presets import bend, crossing
 from tests.scenes import lanes, pedestrian, scene, strip, vehicle
 
 WIDE = scene(lanes=lanes(0.0, 3.5, oncoming_m=(7.0, 10.5)), areas=())
-LEADER = replace(vehicle("Agent2", 25.0, 0.0), speed_mps=8.0, lane_id="Lane1")
+LEADER = vehicle("Agent2", 25.0, 0.0, speed_mps=8.0, lane_id="Lane1")
 FOLLOWED = replace(WIDE, agents=(LEADER, pedestrian("Agent3", 30.0, -3.0)))
 STREET = scene(areas=(strip("Area1", AreaKind.DRIVABLE, -5.0, 5.25),))
 PARKED = replace(STREET, agents=(vehicle("Agent2", 30.0, -3.0),))
@@ -34,13 +34,11 @@ def ahead(low_m: float, lane: str = "own") -> dict[str, Any]:
 
 def added(motion: dict[str, Any], *, speed_mps: float = 0.0, **spot: Any) -> Intent:
     request = {"kind": "vehicles", "count": 1, "speed_mps": speed_mps} | spot
-    return intent_from_document(INTENT.frame | {"requests": [request | {"motion": motion}]})
+    return asked(requests=[request | {"motion": motion}])
 
 
 def moved(kind: str, **motion: Any) -> Intent:
-    return intent_from_document(
-        INTENT.frame | {"moves": [{"who": {"kind": kind}, "motion": motion}]}
-    )
+    return asked(moves=[{"who": {"kind": kind}, "motion": motion}])
 
 
 def asked(**parts: Any) -> Intent:
@@ -48,61 +46,26 @@ def asked(**parts: Any) -> Intent:
 
 
 NEAR = {"ego_distance": metres(15.0)}
+LATE = {"preset": "late_pedestrian", "start": NEAR}
+WALK = {"kind": "walk", "count": 1, "start": "right", "motion": LATE}
 WISHES: dict[str, tuple[Scene, Intent]] = {
-    "cut_in": (
-        WIDE,
-        added(
-            {
-                "preset": "cut_in",
-                "start": NEAR,
-                "speed_mps": {"low": 5.0},
-                "duration_s": {"low": 3},
-            },
-            speed_mps=7.0,
-            spot=ahead(25.0, "left"),
-        ),
-    ),
-    "hard_braking": (
-        FOLLOWED,
-        moved(
-            "moving vehicle",
-            preset="hard_braking",
-            start={"after_s": {"low": 2.0}},
-            braking_mps2={"low": 5.0},
-        ),
-    ),
-    "late_pedestrian": (
-        scene(),
-        asked(
-            requests=[
-                {
-                    "kind": "walk",
-                    "count": 1,
-                    "start": "right",
-                    "spot": {"distance": metres(30.0), "relation": "ahead"},
-                    "motion": {"preset": "late_pedestrian", "start": NEAR},
-                }
-            ]
-        ),
-    ),
+    "cut_in": (WIDE, added(
+        {"preset": "cut_in", "start": NEAR, "speed_mps": {"low": 5.0}, "duration_s": {"low": 3}},
+        speed_mps=7.0, spot=ahead(25.0, "left"))),
+    "hard_braking": (FOLLOWED, moved("moving vehicle", preset="hard_braking",
+                                     start={"after_s": {"low": 2.0}}, braking_mps2={"low": 5.0})),
+    "late_pedestrian": (scene(), asked(
+        requests=[WALK | {"spot": {"distance": metres(30.0), "relation": "ahead"}}])),
     "pedestrian of the scene": (FOLLOWED, moved("pedestrian", preset="late_pedestrian")),
-    "door_opening": (
-        PARKED,
-        asked(requests=[{"kind": "door", "spot": {"landmark": {"kind": "parked vehicle"}}}]),
-    ),
+    "door_opening": (PARKED, asked(
+        requests=[{"kind": "door", "spot": {"landmark": {"kind": "parked vehicle"}}}])),
     "u_turn": (WIDE, added({"preset": "u_turn", "start": NEAR}, spot=ahead(30.0))),
-    "red_light": (
-        crossing(),
-        added(
-            {"preset": "red_light", "side": "right", "start": {"after_s": {"low": 1}}}, speed_mps=6
-        ),
-    ),
-    "emergency_stop": (
-        replace(bend(), agents=(replace(LEADER, x_m=9.0),)),
-        moved("moving vehicle", preset="emergency_stop", braking_mps2={"low": 7.0}),
-    ),
+    "red_light": (crossing(), added(
+        {"preset": "red_light", "side": "right", "start": {"after_s": {"low": 1}}}, speed_mps=6)),
+    "emergency_stop": (replace(bend(), agents=(replace(LEADER, x_m=9.0),)), moved(
+        "moving vehicle", preset="emergency_stop", braking_mps2={"low": 7.0})),
     "pull_out": (PARKED, moved("parked vehicle", preset="pull_out", speed_mps={"low": 6.0})),
-}
+}  # fmt: skip
 
 
 def faults(base: Scene, change: Modification, intent: Intent) -> set[FindingKind]:
@@ -119,7 +82,6 @@ def test_the_rule_placer_meets_what_is_asked_of_a_motion(name: str) -> None:
 
 
 def other(agent: TrafficAgent, **parts: Any) -> TrafficAgent:
-    assert agent.motion is not None
     return replace(agent, motion=replace(agent.motion, **parts))
 
 
@@ -130,44 +92,27 @@ def other(agent: TrafficAgent, **parts: Any) -> TrafficAgent:
         ("cut_in", lambda one: other(one, start=NearEgo(within_m=18.0)), FindingKind.ASKED_START),
         ("cut_in", lambda one: other(one, start=AtTime(after_s=1.0)), FindingKind.ASKED_START),
         ("cut_in", lambda one: other(one, speeds=((1.0, 7.0),)), FindingKind.ASKED_MOTION),
-        (
-            "cut_in",
-            lambda one: other(one, path=LanePath(lane_ids=("Lane2", "Lane1"), change_m=60.0)),
-            FindingKind.ASKED_MOTION,
-        ),
-        (
-            "cut_in",
-            lambda one: other(one, path=LanePath(lane_ids=("Lane2",))),
-            FindingKind.ASKED_ACROSS,
-        ),
+        ("cut_in",
+         lambda one: other(one, path=LanePath(lane_ids=("Lane2", "Lane1"), change_m=60.0)),
+         FindingKind.ASKED_MOTION),
+        ("cut_in", lambda one: other(one, path=LanePath(lane_ids=("Lane2",))),
+         FindingKind.ASKED_ACROSS),
         # 8 m/s in 2 s are 4 m/s^2; 5 are asked for, and 0.75 is the tolerance.
         ("hard_braking", lambda one: other(one, speeds=((2.0, 0.0),)), FindingKind.ASKED_MOTION),
         ("hard_braking", lambda one: replace(one, x_m=20.0), FindingKind.ASKED_DISTANCE),
         # At 8 m/s it is past the end of the lanes, at 100 m, by then.
-        (
-            "hard_braking",
-            lambda one: other(one, start=AtTime(after_s=60.0)),
-            FindingKind.ASKED_MOTION,
-        ),
-        (
-            "u_turn",
-            lambda one: other(one, path=None, speeds=((1.0, 4.0),)),
-            FindingKind.ASKED_HEADING,
-        ),
-        (
-            "red_light",
-            lambda one: other(one, path=None, speeds=((1.0, 0.0),)),
-            FindingKind.ASKED_CROSSING,
-        ),
-        (
-            "emergency_stop",
-            lambda one: other(one, start=AtTime(after_s=0.5)),
-            FindingKind.ASKED_DISTANCE,
-        ),
+        ("hard_braking", lambda one: other(one, start=AtTime(after_s=60.0)),
+         FindingKind.ASKED_MOTION),
+        ("u_turn", lambda one: other(one, path=None, speeds=((1.0, 4.0),)),
+         FindingKind.ASKED_HEADING),
+        ("red_light", lambda one: other(one, path=None, speeds=((1.0, 0.0),)),
+         FindingKind.ASKED_CROSSING),
+        ("emergency_stop", lambda one: other(one, start=AtTime(after_s=0.5)),
+         FindingKind.ASKED_DISTANCE),
         ("door_opening", lambda one: other(one, speeds=((1.0, 0.0),)), FindingKind.ASKED_MOTION),
         ("pull_out", lambda one: other(one, path=None), FindingKind.ASKED_ACROSS),
     ],
-)
+)  # fmt: skip
 def test_what_is_off_is_named_by_its_kind(
     name: str, spoil: Callable[[TrafficAgent], TrafficAgent], kind: FindingKind
 ) -> None:
@@ -185,7 +130,6 @@ def test_ranges_are_drawn_by_the_seed() -> None:
 
     def start(seed: int) -> object:
         (agent,) = place(WIDE, intent, seed=seed).modification.added
-        assert agent.motion is not None
         return agent.motion.start
 
     drawn = {start(seed) for seed in range(5)}

@@ -35,8 +35,8 @@ from tests.recorded import recorded_moments
 from tests.scenes import junction, pedestrian, scene, vehicle
 
 PARKED = vehicle("Agent2", 20.0, -1.0)
-DRIVING = replace(vehicle("Agent3", 40.0, 3.5, 3.14159), speed_mps=7.0)
-BICYCLE = replace(vehicle("Added1", 9.0, 0.0), type=AgentType.BICYCLE, speed_mps=3.0)
+DRIVING = vehicle("Agent3", 40.0, 3.5, 3.14159, speed_mps=7.0)
+BICYCLE = vehicle("Added1", 9.0, 0.0, type=AgentType.BICYCLE, speed_mps=3.0)
 KINDS = (
     *(AgentType.VEHICLE, AgentType.TRAFFIC_CONE, AgentType.BUS, AgentType.BARRIER),
     *(AgentType.BICYCLE, AgentType.PEDESTRIAN, AgentType.CONSTRUCTION_SIGN),
@@ -64,12 +64,9 @@ def draw_objects(here: Scene, most: int) -> Iterator[TrafficAgent]:
     for number, pose in enumerate(poses[::step]):
         kind = KINDS[number % len(KINDS)]
         length_m, width_m = LENGTH_WIDTH_M[kind]
-        agent = replace(
-            vehicle(f"Added{number}", pose.x_m, pose.y_m, pose.heading_rad),
-            type=kind,
-            length_m=length_m,
-            width_m=width_m,
-        )
+        size = {"length_m": length_m, "width_m": width_m}
+        place = (pose.x_m, pose.y_m, pose.heading_rad)
+        agent = vehicle(f"Added{number}", *place, type=kind, **size)
         is_free = not any(overlap(agent.box, one.box).depth_m for one in (*here.everyone, *drawn))
         found = findings_on(ground, Modification(added=(agent,))) if is_free else ()
         if is_free and not any(one.is_fault for one in found):
@@ -87,7 +84,6 @@ def place_as_drawn(name: str, here: Scene, most: int) -> list[str]:
     placed = place(here, intent).modification.added
     assert sorted(one.type for one in placed) == sorted(one.type for one in drawn)
     wish = measure_wish(Ground.of(here), Modification(added=drawn), intent)
-    assert wish is not None
     assert (wish.missing, wish.surplus) == (0, ())
     assert max(wish.distances_m) < 0.15, f"{name}: {wish} in “{sentence}”"
     return [
@@ -119,9 +115,7 @@ def test_what_is_drawn_in_the_catalogue_is_placed_again_by_its_own_sentence() ->
 
 @pytest.mark.slow
 @pytest.mark.realdata
-def test_what_is_drawn_on_recorded_moments_is_placed_again_by_its_own_sentence(
-    realdata: Path,
-) -> None:
+def test_what_is_drawn_on_recorded_moments_is_placed_again_by_its_sentence(realdata: Path) -> None:
     moments = list(recorded_moments(realdata, every_s=1.0))
     chosen = [moment for number, moment in enumerate(moments) if number % 7 < 4]
     assert len(chosen) == 20
@@ -137,7 +131,6 @@ def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
             continue
         sentence, intent = describe_change(ScenarioType(given.type), given.reference, here)
         assert sentence.endswith(".")
-        assert intent is not None
         assert intent_to_document(intent)["requests"] is not None
         unanswered |= {slug} if faults_against(here, given.reference, intent) else set()
     assert not unanswered
@@ -146,29 +139,22 @@ def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
 @pytest.mark.parametrize(
     ("change", "words", "statements"),
     [
-        (
-            Modification(added=(vehicle("Added1", 12.0, 0.0),)),
-            "a parked vehicle 12.0 m ahead of the ego along its lane, in the ego's lane",
-            ("vehicle: 12 m ahead of the ego", "vehicle: in the own lane", "vehicle: stands"),
-        ),
+        (Modification(added=(vehicle("Added1", 12.0, 0.0),)),
+         "a parked vehicle 12.0 m ahead of the ego along its lane, in the ego's lane",
+         ("vehicle: 12 m ahead of the ego", "vehicle: in the own lane", "vehicle: stands")),
         (
             Modification(added=(BICYCLE,)),
             "a bicycle 9.0 m ahead of the ego along its lane, in the ego's lane, "
             "in the lane's direction, driving at 3.0 m/s",
             ("bicycle: 9 m ahead of the ego", "bicycle: moves at 3 m/s"),
         ),
-        (
-            Modification(moved=(vehicle("Agent2", 30.0, 0.0),)),
-            "move the nearest parked vehicle ahead of the ego to 30.0 m ahead of the ego",
-            ("parked vehicle 1 ahead of the ego: 30 m ahead of the ego",),
-        ),
-        (
-            Modification(removed=("Agent3",)),
-            "remove the nearest moving vehicle ahead of the ego",
-            ("moving vehicle 1 ahead of the ego: goes",),
-        ),
+        (Modification(moved=(vehicle("Agent2", 30.0, 0.0),)),
+         "move the nearest parked vehicle ahead of the ego to 30.0 m ahead of the ego",
+         ("parked vehicle 1 ahead of the ego: 30 m ahead of the ego",)),
+        (Modification(removed=("Agent3",)), "remove the nearest moving vehicle ahead of the ego",
+         ("moving vehicle 1 ahead of the ego: goes",)),
     ],
-)
+)  # fmt: skip
 def test_what_is_added_moved_and_removed_is_said(
     change: Modification, words: str, statements: tuple[str, ...]
 ) -> None:
@@ -176,7 +162,6 @@ def test_what_is_added_moved_and_removed_is_said(
     sentence, intent = describe_change(None, change, here)
     assert sentence.startswith("Change the scene: ")
     assert words in sentence
-    assert intent is not None
     assert set(statements) <= set(list_statements(intent))
 
 
@@ -205,7 +190,7 @@ def test_a_side_of_the_oncoming_lane_is_that_of_the_ego() -> None:
 
 def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     """The route turns left at x = 20 m, and a barrier stands straight on from there."""
-    barrier = replace(vehicle("Added1", 45.0, 0.6), type=AgentType.BARRIER)
+    barrier = vehicle("Added1", 45.0, 0.6, type=AgentType.BARRIER)
     person = pedestrian("Added2", 40.0, 3.0, walk_to_m=(40.0, -5.0))
     change, base = Modification(added=(barrier, person)), junction()
     here = replace(base, options=replace(base.options, goal=TurnType.LEFT))
@@ -215,7 +200,6 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
         "who walks from 40.0 m ahead of the ego along the way to Lane2, beside Lane2, 3.0 m left",
     ):
         assert words in sentence
-    assert intent is not None
     assert "barrier: 45 m ahead of the ego on the way to Lane2" in list_statements(intent)
     assert faults_against(here, change, intent) == []
     measured = findings_on(Ground.of(here), Modification(added=(replace(barrier, y_m=0.5),)))
@@ -239,7 +223,7 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     ],
 )
 def test_only_who_walks_crosses(walk_to_m: tuple[float, float] | None, lead: str) -> None:
-    person = replace(vehicle("Added1", 12.0, 4.0), type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)
+    person = vehicle("Added1", 12.0, 4.0, type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)
     change = Modification(added=(person,))
     sentence, _ = describe_change(ScenarioType.JAYWALKER, change, scene())
     assert sentence.startswith(lead)
@@ -257,11 +241,8 @@ def test_a_motion_that_was_placed_is_derived_as_it_was_asked_for(name: str) -> N
     base, asked_for = WISHES[name]
     change = place(base, asked_for).modification
     sentence, intent = describe_change(None, change, base)
-    assert intent is not None
     (asked,), (told,) = ([*one.requests, *one.moves] for one in (asked_for, intent))
     wanted, got = (getattr(one, "motion", None) for one in (asked, told))
-    assert wanted is not None
-    assert got is not None
     assert (got.preset, got.side) == (wanted.preset, wanted.side)
     for part in ("start", "speed_mps", "braking_mps2", "duration_s"):
         assert getattr(wanted, part) in (None, getattr(got, part))
@@ -274,5 +255,4 @@ def test_a_motion_that_was_placed_is_derived_as_it_was_asked_for(name: str) -> N
 def test_a_motion_that_is_no_preset_stays_outside_the_fields() -> None:
     car = replace(DRIVING, id="Added1", motion=PlannedMotion(speeds=((3.0, 9.0),)))
     _, intent = describe_change(None, Modification(added=(car,)), scene())
-    assert intent is not None
     assert intent.beyond == ("the motion of Added1",)

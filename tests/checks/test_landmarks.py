@@ -20,9 +20,7 @@ LANDMARK_STREET = whole_scene("terrace-row")
 
 
 def lanes_of(scene_name: str, route: TurnType = TurnType.STRAIGHT) -> LanesAcross:
-    lanes = LanesAcross.of(Ground.of(whole_scene(scene_name)), route)
-    assert lanes is not None
-    return lanes
+    return LanesAcross.of(Ground.of(whole_scene(scene_name)), route)
 
 
 def faults(intent: wish.Intent, modification: Modification) -> list[str]:
@@ -60,15 +58,13 @@ def test_a_junction_begins_where_the_ego_s_lane_ends() -> None:
     assert (start_m, end_m) == pytest.approx((20.0, 52.0), abs=0.01)
     assert find_mark(lanes_of("terrace-row"), wish.MapPlace.JUNCTION_START) is None
     turned_m = find_mark(lanes_of("market-crossing", TurnType.RIGHT), wish.MapPlace.JUNCTION_END)
-    assert turned_m is not None
     assert 30.0 < turned_m < 45.0
 
 
 def test_a_crosswalk_is_counted_by_its_middle() -> None:
     """Authored from 117 to 120.5 m, the ego at 80 m."""
-    assert find_mark(lanes_of("plane-tree-street"), wish.MapPlace.CROSSWALK) == pytest.approx(
-        38.75, abs=0.1
-    )
+    middle_m = find_mark(lanes_of("plane-tree-street"), wish.MapPlace.CROSSWALK)
+    assert middle_m == pytest.approx(38.75, abs=0.1)
     assert find_mark(lanes_of("terrace-row"), wish.MapPlace.CROSSWALK) is None
 
 
@@ -78,18 +74,15 @@ def test_a_distance_from_a_landmark_becomes_one_from_the_ego() -> None:
     level = wish.Spot(landmark=replace(PARKED_LEFT, relation=wish.Relation.BEHIND))
     past = (wish.Setting.AFTER_INTERSECTION,)
     missing = replace(spot, landmark=wish.Pick(kind=wish.Sight.BUS), settings=past)
-    intent = wish.Intent(
-        requests=tuple(wish.VehicleRequest(spot=one) for one in (spot, level, missing))
-    )
+    requests = tuple(wish.VehicleRequest(spot=one) for one in (spot, level, missing))
+    intent = wish.Intent(requests=requests)
     lanes = lanes_of("terrace-row")
     spans = [one.spot.span_m for one in resolve_spots(intent, lanes).requests]
     assert spans[0] == pytest.approx((-2.0, -2.0), abs=0.05)
     assert spans[1] == pytest.approx((-5.1, -5.1), abs=0.05)
     assert spans[2] is None
-    assert list_absent(intent, lanes) == (
-        "bus 1 ahead of the ego",
-        "a place past the intersection",
-    )
+    absent = ("bus 1 ahead of the ego", "a place past the intersection")
+    assert list_absent(intent, lanes) == absent
 
 
 def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
@@ -104,9 +97,7 @@ def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
     x_m, y_m = lanes.route.position(26.0, 0.0)
     wrong = replace(car, x_m=x_m, y_m=y_m)
     assert faults(intent, Modification(moved=(right,))) == []
-    assert any(
-        "; 21 m is asked for" in one for one in faults(intent, Modification(moved=(wrong,)))
-    )
+    assert "; 21 m is asked for" in " ".join(faults(intent, Modification(moved=(wrong,))))
     assert faults(intent, Modification()) == [f"{car.id} is to be moved and is not."]
     elsewhere = faults(intent, Modification(moved=(right, other)))
     assert f"{other.id} is moved; nobody asked for that." in elsewhere
@@ -150,6 +141,5 @@ def test_a_distance_from_another_object_is_added_to_that_ones(
     named = wish.VehicleRequest(spot=bus.spot, name="bus")
     walker = wish.WalkRequest(spot=wish.Spot(anchor="bus", relation=relation, distance=distance))
     lanes = LanesAcross.of(Ground.of(scene()))
-    assert lanes is not None
     resolved = resolve_spots(wish.Intent(requests=(named, walker)), lanes)
     assert resolved.requests[1].spot.span_m == wanted

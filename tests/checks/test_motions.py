@@ -71,10 +71,8 @@ def test_a_car_brakes_and_speeds_up_as_cars_can(
     ("radius_m", "speed_mps", "said"),
     [
         (5.0, 5.0, []),  # 25 / 5 = 5 m/s^2
-        (5.0, 6.2, [(DOUBTFUL, 38.44 / 5.0)]),
-        (5.0, 8.0, [(WRONG, 12.8)]),
-        (4.0, 2.0, [(DOUBTFUL, 4.0)]),
-        (2.2, 2.0, [(WRONG, 2.2)]),
+        *((5.0, 6.2, [(DOUBTFUL, 38.44 / 5.0)]), (5.0, 8.0, [(WRONG, 12.8)])),
+        *((4.0, 2.0, [(DOUBTFUL, 4.0)]), (2.2, 2.0, [(WRONG, 2.2)])),
     ],
 )
 def test_a_bend_is_as_tight_and_as_fast_as_a_car_can_take_it(
@@ -152,7 +150,7 @@ def test_a_door_may_touch_its_car_and_no_other(across_m: float) -> None:
     """The car is at y = 3.5, its right side at 2.5; the door slides 0.9 m towards the ego."""
     path = PointPath(points_m=((30.0, across_m - 0.9),), keeps_heading=True)
     motion = PlannedMotion(path=path, speeds=((0.5, 1.8), (1.0, 0.0)), start=NearEgo(within_m=15))
-    slab = replace(vehicle("Agent2", 30.0, across_m), length_m=1.1, width_m=0.15, motion=motion)
+    slab = vehicle("Agent2", 30.0, across_m, length_m=1.1, width_m=0.15, motion=motion)
     door = replace(slab, type=AgentType.GENERIC_OBJECT)
     base = replace(two_lanes(), agents=(vehicle("Agent9", 30.0, 3.5),))
     assert severities(found_in(base, door)) == set()

@@ -54,10 +54,8 @@ def test_an_ego_off_every_lane_measures_no_distance() -> None:
         (2.3, "Lane1", Severity.DOUBTFUL),
     ],
 )
-def test_the_lane_that_an_agent_names(
-    y_m: float, name: str | None, severity: Severity | None
-) -> None:
-    car = replace(vehicle("Agent2", 30.0, y_m), lane_id=name)
+def test_the_lane_an_agent_names(y_m: float, name: str | None, severity: Severity | None) -> None:
+    car = vehicle("Agent2", 30.0, y_m, lane_id=name)
     found = of_kind(found_in(scene(), car), FindingKind.LANE_NAMED)
     assert [one.severity for one in found] == ([severity] if severity else [])
 
@@ -70,16 +68,13 @@ def test_a_map_without_lanes_has_no_facts_about_lanes() -> None:
 @pytest.mark.parametrize(
     ("turn_deg", "speed_mps", "severity"),
     [
-        (0.0, 8.0, Severity.FACT),
-        (-29.0, 8.0, Severity.FACT),
-        (31.0, 0.0, Severity.DOUBTFUL),
-        (-100.0, 8.0, Severity.DOUBTFUL),
-        (180.0, 0.0, Severity.DOUBTFUL),
+        *((0.0, 8.0, Severity.FACT), (-29.0, 8.0, Severity.FACT), (31.0, 0.0, Severity.DOUBTFUL)),
+        *((-100.0, 8.0, Severity.DOUBTFUL), (180.0, 0.0, Severity.DOUBTFUL)),
         (180.0, 8.0, Severity.WRONG),
     ],
 )
 def test_the_turn_against_the_lane(turn_deg: float, speed_mps: float, severity: Severity) -> None:
-    car = replace(vehicle("Agent2", 30, 0, math.radians(turn_deg)), speed_mps=speed_mps)
+    car = vehicle("Agent2", 30, 0, math.radians(turn_deg), speed_mps=speed_mps)
     (heading,) = of_kind(found_in(scene(), car), FindingKind.HEADING)
     assert heading.severity is severity
     assert abs(heading.measured["turn_deg"]) == pytest.approx(abs(turn_deg))
@@ -132,9 +127,7 @@ def test_a_pedestrian_faces_its_walk(turned_rad: float, walk_m: float, severity:
 
 
 def test_bicycles_stand_at_any_angle() -> None:
-    bicycle = replace(
-        vehicle("Agent2", 30.0, 0.0, 1.2), type=AgentType.BICYCLE, length_m=1.8, width_m=0.6
-    )
+    bicycle = vehicle("Agent2", 30.0, 0.0, 1.2, type=AgentType.BICYCLE, length_m=1.8, width_m=0.6)
     (standing,) = of_kind(found_in(scene(), bicycle), FindingKind.HEADING)
     (riding,) = of_kind(found_in(scene(), replace(bicycle, speed_mps=4.0)), FindingKind.HEADING)
     assert (standing.severity, riding.severity) == (Severity.FACT, Severity.DOUBTFUL)

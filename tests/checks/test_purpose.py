@@ -57,8 +57,8 @@ def test_sight(added: Sequence[TrafficAgent], seen_m: dict[str, float]) -> None:
         ((vehicle("A", 30.0, 0.0), vehicle("B", 40.0, 3.5)), 4.25),
         ((vehicle("A", 30.0, 0.0), vehicle("B", 36.0, 3.5)), 1.9209),  # hypot(1.2, 1.5)
         ((cone("A", 30.0, 1.0), cone("B", 30.0, 3.0)), 2.5),  # 0.75 + 1.75
-        ((replace(vehicle("A", 30.0, 0.0), speed_mps=5.0),), 7.0),  # it drives
-        ((replace(vehicle("A", 30.0, 1.75), width_m=7.0),), 0.0),
+        ((vehicle("A", 30.0, 0.0, speed_mps=5.0),), 7.0),  # it drives
+        ((vehicle("A", 30.0, 1.75, width_m=7.0),), 0.0),
     ],
 )
 def test_passage(added: Sequence[TrafficAgent], passage_m: float) -> None:
@@ -85,13 +85,10 @@ ACROSS = vehicle("A", 30.0, 0.0, 1.0)
         (WIDE, [ACROSS], []),  # that it stands across is nobody's fault: nothing forbids it
         (HIDDEN, [SCREEN, WALKER], []),
         (HIDDEN, [WALKER], ["is hidden from it at first."]),
-        (
-            replace(HIDDEN, purpose=Purpose(sight=Length(low_m=2.0, high_m=9.0))),
-            [SCREEN, WALKER],
-            ["first sees the pedestrian is 9.32 m; 2 to 9 m is asked for."],
-        ),
+        (replace(HIDDEN, purpose=Purpose(sight=Length(low_m=2.0, high_m=9.0))), [SCREEN, WALKER],
+         ["first sees the pedestrian is 9.32 m; 2 to 9 m is asked for."]),
     ],
-)
+)  # fmt: skip
 def test_the_effect_alone_is_held_against_a_purpose(
     intent: Intent, added: list[TrafficAgent], words: list[str]
 ) -> None:
@@ -117,9 +114,7 @@ def test_moving_and_removing_may_serve_a_purpose() -> None:
         ({"braking_mps2": 4.0, "ttc_s": 1.5, "crashes": True}, 1),
     ],
 )
-def test_a_drive_is_held_against_what_a_purpose_says_of_driving(
-    drive: dict[str, Any], faults: int
-) -> None:
+def test_a_drive_is_held_against_what_a_purpose_says(drive: dict[str, Any], faults: int) -> None:
     purpose = Purpose(braking_mps2=Amount(low=3.0, high=8.0), ttc_s=Amount(low=1.0, high=2.5))
     assert sum(one.is_fault for one in check_drive(purpose, "idm", **drive)) == faults
     assert list(check_drive(Purpose(passage=Length(low_m=3.0, high_m=3.0)), "idm", **drive)) == []

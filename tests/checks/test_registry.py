@@ -2,7 +2,6 @@
 
 import math
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -43,14 +42,10 @@ def agents(number: st.SearchStrategy[float], most_m: float) -> st.SearchStrategy
         TrafficAgent,
         id=st.sampled_from(["Agent2", "Agent3", "Agent4"]),
         type=st.sampled_from(PLACEABLE),
-        x_m=number,
-        y_m=number,
-        heading_rad=odd(-6.2, 6.2),
-        width_m=odd(0.1, most_m),
-        length_m=odd(0.1, most_m),
-        speed_mps=odd(0.0, 99.0),
         lane_id=st.sampled_from([None, "Lane1", "Connector1", "Lane77"]),
         walk_to_m=st.none() | st.tuples(number, number),
+        **{"x_m": number, "y_m": number, "heading_rad": odd(-6.2, 6.2)},
+        **{"width_m": odd(0.1, most_m), "length_m": odd(0.1, most_m), "speed_mps": odd(0.0, 99.0)},
     )
 
 
@@ -96,7 +91,7 @@ def test_findings_do_not_ask_where_the_world_lies(
 
 @given(st.floats(1e-320, 1e-3))
 def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
-    speck = replace(vehicle("Agent2", 0.0, 0.0), width_m=size_m, length_m=size_m)
+    speck = vehicle("Agent2", 0.0, 0.0, width_m=size_m, length_m=size_m)
     kinds = {one.kind for one in findings(scene(), Modification(added=(speck,)))}
     assert {FindingKind.SIZE, FindingKind.OVERLAP} <= kinds
 
@@ -135,9 +130,7 @@ DRIVES_MPS = 2.0
 
 
 @pytest.mark.realdata
-def test_most_recorded_vehicles_have_nothing_wrong_and_nobody_is_impossible(
-    realdata: Path,
-) -> None:
+def test_most_recorded_vehicles_have_nothing_wrong_and_none_is_impossible(realdata: Path) -> None:
     totals, faulty, unplaced = Counter[str](), Counter[str](), Counter[str]()
     never = {FindingKind.SIZE, FindingKind.SPEED, FindingKind.LANE_NAMED}
     for frame in (0, 30, 60, 90, 120, 150):

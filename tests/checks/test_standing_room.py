@@ -14,7 +14,7 @@ from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgen
 from tests.checks.worlds import found_in, of_kind, severities
 from tests.scenes import EGO, cone, pedestrian, scene, strip, vehicle
 
-BUS = replace(vehicle("Agent2", 40.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
+BUS = vehicle("Agent2", 40.0, 0.0, type=AgentType.BUS, length_m=7.456, width_m=2.079)
 
 
 def test_where_the_map_has_no_walkways_people_off_it_are_a_fact() -> None:
@@ -46,7 +46,7 @@ def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> 
 
 
 def test_a_moving_car_touches_nobody() -> None:
-    cars = replace(vehicle("Agent2", 30.0, 0.0), speed_mps=5.0), vehicle("Agent3", 34.4, 0.0)
+    cars = vehicle("Agent2", 30.0, 0.0, speed_mps=5.0), vehicle("Agent3", 34.4, 0.0)
     assert (FindingKind.OVERLAP, Severity.WRONG) in severities(found_in(scene(), *cars))
 
 
@@ -79,8 +79,8 @@ def test_what_was_recorded_is_in_the_way_too() -> None:
         (BUS, None, ""),
         (replace(BUS, length_m=2.079, width_m=7.456), Severity.WRONG, "wider than long"),
         (replace(BUS, length_m=24.0), Severity.DOUBTFUL, "unusual for a bus"),
-        (replace(pedestrian("Agent2", 30, 0), length_m=4.8), Severity.WRONG, "for a pedestrian"),
-        (replace(cone("Agent2", 30, 0), width_m=1.2), Severity.DOUBTFUL, "for a traffic cone"),
+        (pedestrian("Agent2", 30, 0, length_m=4.8), Severity.WRONG, "for a pedestrian"),
+        (cone("Agent2", 30, 0, width_m=1.2), Severity.DOUBTFUL, "for a traffic cone"),
     ],
 )
 def test_sizes(agent: TrafficAgent, severity: Severity | None, words: str) -> None:
@@ -106,7 +106,7 @@ def test_speeds(agent: TrafficAgent, speed_mps: float, severity: Severity | None
 
 
 def test_nothing_is_held_against_a_well_parked_car() -> None:
-    car = replace(vehicle("Agent2", 21.5, -0.7, math.radians(2.0)), lane_id="Lane1")
+    car = vehicle("Agent2", 21.5, -0.7, math.radians(2.0), lane_id="Lane1")
     assert severities(found_in(scene(), car)) == set()
 
 
@@ -177,9 +177,7 @@ PARKED = vehicle("Agent3", 31.0, -1.0)
         (vehicle("Agent3", 30.0, -6.0), None),  # behind him
     ],
 )
-def test_a_walk_leads_through_nothing_that_stands(
-    other: TrafficAgent, inside_m: float | None
-) -> None:
+def test_no_walk_leads_through_what_stands(other: TrafficAgent, inside_m: float | None) -> None:
     found = of_kind(found_in(scene(agents=(other,)), WALKER), FindingKind.WALK_BLOCKED)
     assert [one.severity for one in found] == [Severity.DOUBTFUL] * (inside_m is not None)
     for one in found:

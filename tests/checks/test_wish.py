@@ -155,42 +155,21 @@ HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[flo
     (STREET, LINE, file_of_cones((20, 1.75), (22, 1.75), (24, 1.75)), [3.2, 3.2, 3.2]),
     (STREET, ROW, file_of_cones((20, 1.2), (20, 0.0), (20, -1.2)), [0.0, 0.0, 0.0]),
     (STREET, ROW, file_of_cones((21, 1.2), (21, 0.0), (21, -1.2)), [1.0, 1.0, 1.0]),
-    (
-        STREET,
-        TAPER,
-        file_of_cones(*((20 + i * math.sqrt(2.5**2 - 0.75**2), 1.5 - i * 0.75) for i in range(3))),
-        [0.0, 0.0, 0.0],
-    ),
-    (
-        STREET,
-        RING,
-        (
-            *file_of_cones((18.586, 0), (20, -1.414), (21.414, 0), (20, 1.414)),
-            pedestrian("Agent6", 20.0, 2.414),
-        ),
-        [0.0, 0.0, 0.0, 0.0, 1.0],
-    ),
-    (
-        STREET,
-        WORKED,
-        (*file_of_cones((20, 0.5), (20, -0.5)), pedestrian("Agent4", 18.0, 0.0)),
-        [0.0, 0.0, 2.0],
-    ),
+    # 0.75 m across and 2.385 m along are 2.5 m.
+    (STREET, TAPER, file_of_cones(*((20 + 2.385 * n, 1.5 - 0.75 * n) for n in range(3))),
+     [0.0] * 3),
+    (STREET, RING, (*file_of_cones((18.586, 0), (20, -1.414), (21.414, 0), (20, 1.414)),
+                    pedestrian("Agent6", 20.0, 2.414)), [0.0, 0.0, 0.0, 0.0, 1.0]),
+    (STREET, WORKED, (*file_of_cones((20, 0.5), (20, -0.5)), pedestrian("Agent4", 18.0, 0.0)),
+     [0.0, 0.0, 2.0]),
     (STREET, PAIR, (car(20.0, 0.0), car(20.0, 4.0, 3)), [0.0, 0.0]),
     (STREET, PAIR, (car(20.0, 0.0), car(20.0, 4.5, 3)), [0.0, 0.5]),
     # People: where they begin, or where they meet the ego's way.
     (STREET, WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), [0.0]),
     (STREET, WALK, (pedestrian("Agent2", 18.0, 4.0, (22.0, -4.0)),), [0.0]),
     (STREET, WALK, (pedestrian("Agent2", 17.0, 6.0, (17.0, -3.0)),), [3.0]),
-    (
-        STREET,
-        FILE,
-        (
-            pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
-            pedestrian("Agent3", 20.0, 4.4, (20.0, -3.0)),
-        ),
-        [0.0, 0.4],
-    ),
+    (STREET, FILE, (pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
+                    pedestrian("Agent3", 20.0, 4.4, (20.0, -3.0))), [0.0, 0.4]),
     # Named places: the junction lies 20 to 36 m ahead.
     (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(10.0, 0.0),), [0.0]),
     (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(22.0, 0.0),), [2.0]),
@@ -206,7 +185,7 @@ HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[flo
     (ZEBRA, named(wish.Setting.BY_PARKED_RIGHT), (car(30.0, 0.0),), [3.6]),
     (ZEBRA, named(wish.Setting.BY_PARKED_LEFT), (car(30.0, 0.0),), [0.0]),  # nobody is: it is open
     (BEND, named(wish.Setting.IN_BEND), (car(-10.0, 0.0),), [6.0]),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("where", "intent", "added", "distances_m"), HAND_COMPUTED)
@@ -214,7 +193,6 @@ def test_the_distance_is_the_way_to_the_nearest_admitted_placement(
     where: Scene, intent: wish.Intent, added: tuple[TrafficAgent, ...], distances_m: list[float]
 ) -> None:
     found = measure_wish(Ground.of(where), Modification(added=added), intent)
-    assert found is not None
     assert found.distances_m == pytest.approx(distances_m, abs=0.01)
     assert (found.missing, found.surplus) == (0 if added else 1, ())
 
@@ -240,9 +218,7 @@ def shifted(added: Sequence[TrafficAgent], shifts: Sequence[tuple[float, float]]
 
 
 def measured(intent: wish.Intent, change: Modification) -> WishDistance:
-    found = measure_wish(Ground.of(STREET), change, intent)
-    assert found is not None
-    return found
+    return measure_wish(Ground.of(STREET), change, intent)
 
 
 @pytest.mark.parametrize("name", PLACED)
@@ -265,7 +241,6 @@ def test_what_the_rule_placer_places_is_what_was_asked_for(name: str) -> None:
 def test_what_has_a_named_place_alone_is_placed_there(where: Scene, setting: wish.Setting) -> None:
     added = place(where, named(setting), seed=3).modification.added
     found = measure_wish(Ground.of(where), Modification(added=added), named(setting))
-    assert found is not None
     assert found.distances_m == pytest.approx([0.0], abs=0.002)
 
 

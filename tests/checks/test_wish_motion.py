@@ -27,6 +27,7 @@ from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotio
 from augment.simulation.expected import expect_recording
 from tests.checks.worlds import faults_against
 from tests.fixtures.shelf import ROUNDED_M, entry, shown_scene
+from tests.scenes import vehicle
 
 CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
 U_TURN, DOOR, CHILD = "u-turn-quarry-narrows", "door-lime-street", "late-pedestrian-lime-street"
@@ -39,15 +40,8 @@ BACK = ((30.0, -10.2), (-30.0, -10.2))
 
 def agent(x_m: float, y_m: float, heading_rad: float = 0.0, **parts: Any) -> TrafficAgent:
     motion = {name: parts.pop(name) for name in ("path", "speeds", "start") if name in parts}
-    made: dict[str, Any] = {"type": AgentType.VEHICLE, "width_m": 2.0, "length_m": 4.8} | parts
-    return TrafficAgent(
-        id="New1",
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        motion=PlannedMotion(**motion) if motion else None,
-        **made,
-    )
+    parts["motion"] = PlannedMotion(**motion) if motion else None
+    return vehicle("New1", x_m, y_m, heading_rad, **parts)
 
 
 def cutting_in(change_m: float, *speeds: tuple[float, float]) -> TrafficAgent:
@@ -66,13 +60,8 @@ def turning(
 ) -> TrafficAgent:
     arc = [(straight_m + x_m, y_m) for x_m, y_m in ((0.0, 0.0), *ROUND)] if straight_m else []
     path = PointPath(points_m=(*arc, *points_m))
-    car: dict[str, Any] = {
-        "speed_mps": 8.0,
-        "lane_id": "Lane1",
-        "path": path,
-        "speeds": ((takes_s, 5.0),),
-    }
-    return agent(28.0, 0.0, start=AtTime(after_s=after_s), **car)
+    car: dict[str, Any] = {"speed_mps": 8.0, "lane_id": "Lane1", "speeds": ((takes_s, 5.0),)}
+    return agent(28.0, 0.0, start=AtTime(after_s=after_s), path=path, **car)
 
 
 def door(
@@ -129,7 +118,6 @@ def both_readings(intent: Intent) -> Intent:
     """What was asked for of the van: "brakes at 8 m/s² to a standstill, 2 s from now"."""
     (request,) = intent.requests
     assert isinstance(request, VehicleRequest)
-    assert request.motion is not None
     start = StartWish(after_s=Amount(low=2.0, high=2.0), may_end=True)
     motion = replace(request.motion, start=start)
     return replace(intent, requests=(replace(request, motion=motion),))
@@ -142,7 +130,6 @@ def wish_m(slug: str, change: Modification) -> float:
     if slug == BRAKING and change != entry(slug).reference:
         intent = both_readings(intent)
     found = measure_wish(Ground.of(shown_scene(slug)), change, intent)
-    assert found is not None
     assert (found.missing, found.surplus) == (0, ())
     (distance_m,) = [value for value in found.distances_m if value] or [0.0]
     return distance_m
@@ -164,16 +151,13 @@ def test_a_right_answer_is_at_its_wish_and_nothing_is_wrong(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CARELESS)
-def test_a_careless_answer_is_far_off_or_wrong_and_no_further_than_the_reference(
-    name: str,
-) -> None:
+def test_a_careless_answer_is_far_off_or_wrong_no_further_than_the_reference(name: str) -> None:
     slug, made = CARELESS[name]
     distance_m = wish_m(slug, Modification(added=(made,)))
     assert distance_m > 1.0 or is_wrong(slug, made)
     assert distance_m > 0.3
     ground = Ground.of(shown_scene(slug))
     found = displacement(Modification(added=(made,)), entry(slug).reference, ground)
-    assert found.mean_m is not None
     assert distance_m <= found.mean_m + 0.02
 
 
@@ -186,12 +170,10 @@ def test_the_distance_grows_and_stays_below_that_to_the_reference(slug: str) -> 
     last_m = 0.0
     for later_s in (3.0, 4.0, 5.0):
         (mover,) = reference.added
-        assert mover.motion is not None
         motion = replace(mover.motion, start=AtTime(after_s=later_s))
         change = replace(reference, added=(replace(mover, motion=motion),))
         distance_m = wish_m(slug, change)
         found = displacement(change, reference, ground)
-        assert found.mean_m is not None
         assert last_m < distance_m <= found.mean_m + 0.02
         last_m = distance_m
 
@@ -199,7 +181,6 @@ def test_the_distance_grows_and_stays_below_that_to_the_reference(slug: str) -> 
 def moved(slug: str, **parts: Any) -> TrafficAgent:
     """The reference's only agent, with another motion."""
     (made,) = entry(slug).reference.added
-    assert made.motion is not None
     return replace(made, motion=replace(made.motion, **parts))
 
 
@@ -217,9 +198,7 @@ def test_a_door_that_stops_on_its_way_is_as_open_as_it_gets() -> None:
 
 
 @pytest.mark.parametrize(("radius_m", "most_m"), [(4.4, 1.5), (5.0, 0.3), (5.5, 0.0)])
-def test_a_turn_that_is_a_little_too_narrow_is_a_little_off(
-    radius_m: float, most_m: float
-) -> None:
+def test_a_turn_a_little_too_narrow_is_a_little_off(radius_m: float, most_m: float) -> None:
     slug = "u-turn-station-cross"
     turns = [math.pi / 2.0 + step * math.pi / 6.0 for step in range(7)]
     circle = [
@@ -235,7 +214,6 @@ def test_a_turn_too_narrow_by_a_hair_is_off_by_centimetres() -> None:
     """The reference of 4.37 m, made smaller to 4.17 m, where 4.2 m are needed."""
     slug = "u-turn-market-crossing"
     (turned,) = entry(slug).reference.changed
-    assert turned.motion is not None
     assert isinstance(turned.motion.path, PointPath)
     x_m, y_m = turned.pose.beside(0.0)
     points = [
@@ -252,32 +230,26 @@ def test_where_a_motion_begins_is_judged_over_time() -> None:
     (made,) = entry(slug).reference.added
     change = Modification(added=(replace(made, x_m=12.0, y_m=0.63, speed_mps=10.0),))
     found = displacement(change, entry(slug).reference, Ground.of(shown_scene(slug)))
-    assert found.mean_m is not None
     assert wish_m(slug, change) < found.mean_m
 
 
 def test_by_interplans_rules_a_bus_without_a_motion_runs_no_red_light() -> None:
     authored, change = entry(BUS), Modification(added=(bus(-60.0),))
-    assert authored.intent is not None
     options = SceneOptions(interplan=InterplanRules())
     ground = Ground.of(replace(shown_scene(BUS), options=options), expect_recording)
     findings = check_against_intent(ground, change, authored.intent)
     assert FindingKind.ASKED_CROSSING in [one.kind for one in findings if one.is_fault]
     measured = measure_wish(ground, change, authored.intent)
-    assert measured is not None
     assert measured.matches[0].distance_m > 1.0
 
 
 def test_who_never_begins_is_off_by_a_number_where_any_moment_is_right() -> None:
     asked = entry(CUT_IN).intent
-    assert asked is not None
     (request,) = asked.requests
     assert isinstance(request, VehicleRequest)
-    assert request.motion is not None
     at_any_time = replace(request, motion=replace(request.motion, start=None))
     never = PlannedMotion(path=LanePath(lane_ids=("Lane2",)), start=NearEgo(within_m=0.1))
     change = Modification(added=(replace(cutting_in(22.0), motion=never),))
     intent = replace(asked, requests=(at_any_time,))
     found = measure_wish(Ground.of(shown_scene(CUT_IN)), change, intent)
-    assert found is not None
     assert math.isfinite(found.distances_m[0])

@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error, travel_pose
 from augment.geometry.polyline import Polyline
+from tests.properties import examples
 from tests.scenes import curve as curved_scene
 
 KAPPA = 4.0 / 3.0 * (math.sqrt(2.0) - 1.0)
@@ -51,6 +52,7 @@ def test_a_point_is_what_de_casteljau_finds(curve: CubicBezier, t: float) -> Non
     )
 
 
+@examples(40)
 @given(curve=lane_like(), share=st.floats(0.0, 1.0))
 def test_the_place_at_an_arc_length_has_that_arc_length(curve: CubicBezier, share: float) -> None:
     assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-3)

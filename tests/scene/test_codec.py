@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from augment.errors import InvalidDocument
 from augment.geometry.polyline import Polyline
 from augment.scene import codec, entities
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording
+from tests.properties import examples
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
+from tests.simulation.worlds import track
 
 METRES = st.floats(-1000.0, 1000.0)
 POINTS = st.tuples(METRES, METRES)
@@ -44,6 +46,7 @@ OPTIONS = st.builds(
 )
 
 
+@examples(40)
 @given(AGENTS, LINES, st.none() | LINES, SIZES, st.none() | SIZES, OPTIONS)
 def test_a_scene_survives_the_way_through_json_exactly(
     agent: entities.TrafficAgent,
@@ -67,6 +70,7 @@ def test_a_scene_survives_the_way_through_json_exactly(
     assert codec.scene_from_document(json.loads(text)) == given_scene
 
 
+@examples(40)
 @given(AGENTS, AGENTS)
 def test_a_modification_survives_the_way_through_json_exactly(
     first: entities.TrafficAgent, second: entities.TrafficAgent
@@ -124,9 +128,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("place", "value", "sentence"), BROKEN)
-def test_every_fault_is_named_with_its_place(
-    place: list[Any], value: object, sentence: str
-) -> None:
+def test_a_fault_is_named_with_its_place(place: list[Any], value: object, sentence: str) -> None:
     with pytest.raises(InvalidDocument) as caught:
         codec.scene_from_document(put(document(), place, value))
     assert sentence in str(caught.value)
@@ -157,10 +159,8 @@ def test_a_list_tells_its_first_fault() -> None:
     made = put(document(), ["lanes", 0, "centerline_m"], [["x", "y"]] * 1000)
     with pytest.raises(InvalidDocument) as caught:
         codec.scene_from_document(made)
-    assert [place for place, _ in caught.value.problems] == [
-        "lanes[0].centerline_m[0][0]",
-        "lanes[0].centerline_m[0][1]",
-    ]
+    places = [f"lanes[0].centerline_m[0][{n}]" for n in range(2)]
+    assert [place for place, _ in caught.value.problems] == places
 
 
 @pytest.mark.parametrize(("number", "is_read"), [(5_000, True), (5_001, False)])
@@ -186,9 +186,8 @@ def test_a_modification_names_each_agent_once() -> None:
 
 
 def test_nobody_adds_a_second_ego() -> None:
-    change = codec.modification_to_document(
-        entities.Modification(added=(cone("Agent2", 1.0, 0.0),))
-    )
+    given = entities.Modification(added=(cone("Agent2", 1.0, 0.0),))
+    change = codec.modification_to_document(given)
     change["add"][0]["type"] = "EGO_VEHICLE"
     with pytest.raises(InvalidDocument, match=r"add\[0\]\.type"):
         codec.modification_from_document(change)
@@ -196,36 +195,21 @@ def test_nobody_adds_a_second_ego() -> None:
 
 def test_documents_say_their_units() -> None:
     change = entities.Modification(added=(pedestrian("Agent2", 12.0, -4.0, (12.0, 4.0)),))
-    assert codec.modification_to_document(change)["add"] == [
-        {
-            "id": "Agent2",
-            "type": "PEDESTRIAN",
-            "x_m": 12.0,
-            "y_m": -4.0,
-            "heading_rad": math.pi / 2,
-            "width_m": 0.791,
-            "length_m": 0.9,
-            "speed_mps": 0.0,
-            "walk_to_m": [12.0, 4.0],
-        }
-    ]
+    (written,) = codec.modification_to_document(change)["add"]
+    assert written == {
+        **{"id": "Agent2", "type": "PEDESTRIAN", "x_m": 12.0, "y_m": -4.0, "speed_mps": 0.0},
+        **{"heading_rad": math.pi / 2, "width_m": 0.791, "length_m": 0.9},
+        "walk_to_m": [12.0, 4.0],
+    }
 
 
 def recording() -> Recording:
     """Three steps; Agent2 is not seen at the second."""
-    unseen = [np.nan] * 4
+    states = np.array([[9.0, 1.0, 3.1, 2.0], [np.nan] * 4, [8.6, 1.0, 3.1, 2.0]])
     return Recording(
         times_s=np.array([0.0, 0.1, 0.2]),
         ego=np.array([[0.0, 0.0, 0.0, 1.0], [0.1, 0.0, 0.0, 1.0], [0.2, 0.01, 0.1, 1.0]]),
-        tracks=(
-            Track(
-                agent_id="Agent2",
-                type=entities.AgentType.VEHICLE,
-                length_m=4.8,
-                width_m=2.0,
-                states=np.array([[9.0, 1.0, 3.1, 2.0], unseen, [8.6, 1.0, 3.1, 2.0]]),
-            ),
-        ),
+        tracks=(track(vehicle("Agent2", 9.0, 1.0), states),),
     )
 
 

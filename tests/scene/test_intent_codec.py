@@ -93,7 +93,6 @@ def document(*requests: dict[str, Any], **parts: Any) -> dict[str, Any]:
 
 def test_an_intent_comes_back_from_its_document_and_can_be_said() -> None:
     for intent in (FULL, *(entry(slug).intent for slug in (*SLUGS, *HARD_SLUGS))):
-        assert intent is not None
         written = json.dumps(intent_to_document(intent), allow_nan=False)
         assert intent_from_document(json.loads(written)) == intent
         assert not any("{" in statement for statement in list_statements(intent))
@@ -113,42 +112,25 @@ def test_what_is_open_is_absent() -> None:
         (document({"body": "tram"}), "requests[0].vehicles.body", "or 'pedestrian'"),
         (document({"count": 0}), "requests[0].vehicles.count", "greater than or equal to 1"),
         (document({"count": "two"}), "requests[0].vehicles.count", "valid integer"),
-        (
-            document({"kind": "elephant"}),
-            "requests[0]",
-            "'vehicles', 'walk', 'cones', 'crash', 'door'",
-        ),
+        (document({"kind": "elephant"}), "requests[0]",
+         "'vehicles', 'walk', 'cones', 'crash', 'door'"),
         (document(), "", "asks for nothing"),
         (document(purpose={}), "purpose", "a purpose has a window"),
-        (
-            document({"spot": {"distance": {"low_m": 20.0}}}),
-            "requests[0].vehicles.spot",
-            "a distance needs a relation: ahead or behind",
-        ),
-        (
-            document({"spot": {"relation": "ahead", "distance": {"low_m": 9.0, "high_m": 8.0}}}),
-            "requests[0].vehicles.spot.distance",
-            "high_m is below low_m",
-        ),
+        (document({"spot": {"distance": {"low_m": 20.0}}}), "requests[0].vehicles.spot",
+         "a distance needs a relation: ahead or behind"),
+        (document({"spot": {"relation": "ahead", "distance": {"low_m": 9.0, "high_m": 8.0}}}),
+         "requests[0].vehicles.spot.distance", "high_m is below low_m"),
         (document({"turn_deg": 9.0}), "requests[0].vehicles", "turn_deg needs a facing"),
-        (
-            document({"spot": {"relation": "ahead", "anchor": "bus"}}),
-            "requests[0].spot.anchor",
-            "'bus' is the name of no earlier request; those before it: none",
-        ),
+        (document({"spot": {"relation": "ahead", "anchor": "bus"}}), "requests[0].spot.anchor",
+         "'bus' is the name of no earlier request; those before it: none"),
         (document({"name": "a"}, {"name": "a"}), "requests[1].name", "taken by an earlier"),
-        (
-            document({"kind": "walk", "count": 2, "behind": [{"low_m": 1.0}, {"low_m": 2.0}]}),
-            "requests[0].behind",
-            "tells of 2 further ones, but the count is 2",
-        ),
+        (document({"kind": "walk", "count": 2, "behind": [{"low_m": 1.0}, {"low_m": 2.0}]}),
+         "requests[0].behind", "tells of 2 further ones, but the count is 2"),
         (document({}) | {"version": 2}, "version", "this program reads version 1"),
         (document({}) | {"format": "else"}, "format", "expected 'scenario-arena/intent'"),
     ],
-)
-def test_what_breaks_the_format_is_named_with_its_place(
-    broken: dict[str, Any], at: str, reason: str
-) -> None:
+)  # fmt: skip
+def test_what_breaks_the_format_has_a_place(broken: dict[str, Any], at: str, reason: str) -> None:
     with pytest.raises(InvalidDocument) as fault:
         intent_from_document(broken)
     ((path, text),) = fault.value.problems
@@ -158,7 +140,6 @@ def test_what_breaks_the_format_is_named_with_its_place(
 
 def test_statements_are_short_and_name_what_they_are_about() -> None:
     intent = entry("jaywalker-ferry-road").intent
-    assert intent is not None
     assert [str(one) for one in list_statements(intent)] == [
         "bus: number 1",
         "bus: 20 m ahead of the ego",

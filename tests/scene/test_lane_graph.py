@@ -7,10 +7,10 @@ import pytest
 from augment.errors import UnknownName
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import LaneConnector, Scene, TrafficSide, TurnType
+from augment.scene.entities import Scene, TrafficSide, TurnType
 from augment.scene.lane_graph import LaneGraph, classify_turn, find_traffic_side
 from augment.variants.pose_tool import PoseTool
-from tests.scenes import EGO, curve, junction, lane, scene
+from tests.scenes import EGO, connector, curve, junction, lane, scene
 
 
 def test_the_lane_under_a_point_fits_its_heading() -> None:
@@ -23,9 +23,7 @@ def test_the_lane_under_a_point_fits_its_heading() -> None:
 
 @pytest.mark.parametrize(("off_m", "is_on"), [(0.0, True), (1.75, True), (1.76, False)])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_lane_reaches_half_its_width_to_either_side(
-    sign: float, off_m: float, is_on: bool
-) -> None:
+def test_a_lane_reaches_half_its_width_to_a_side(sign: float, off_m: float, is_on: bool) -> None:
     graph = LaneGraph(scene(lanes=scene().lanes[:1]))
     assert graph.under(20.0, sign * off_m) == ("Lane1" if is_on else None)
 
@@ -59,7 +57,6 @@ def test_nobody_turns_round_where_the_road_turns_off(left_first: bool) -> None:
 
 def test_a_distance_runs_on_over_connectors() -> None:
     place = LaneGraph(junction()).along("Lane1", 50.0, 40.0, 0.5)
-    assert place is not None
     assert (place.lane_id, place.s_m) == ("Lane2", 4.0)
     assert (place.pose.x_m, place.pose.y_m) == (40.0, 0.5)
     assert LaneGraph(junction()).along("Lane2", 0.0, 65.0) is None, "past the map"
@@ -70,7 +67,6 @@ def test_a_turn_can_be_asked_for_and_a_distance_can_run_back() -> None:
     ahead = graph.route("Lane1", 100.0, turn=TurnType.LEFT)
     assert ahead == ["Lane1", "Connector2", "Lane3"]
     back = graph.along("Lane2", 4.0, -40.0)
-    assert back is not None
     assert back.lane_id == "Lane1"
     assert back.pose.x_m == pytest.approx(0.0)
 
@@ -102,19 +98,10 @@ def merge(side: float, *, side_first: bool, connectors: bool) -> Scene:
         lanes["Lane2"] += bend[1:]
     order = ["Lane2", "Lane1", "Lane3"] if side_first else ["Lane1", "Lane2", "Lane3"]
     after = {} if connectors else {"Lane1": ("Lane3",), "Lane2": ("Lane3",)}
+    turns = TurnType.LEFT if side < 0.0 else TurnType.RIGHT
     ways = [
-        LaneConnector(
-            id=f"Connector{n}",
-            from_lane=f"Lane{n}",
-            to_lane="Lane3",
-            centerline=Polyline(line),
-            width_m=3.5,
-            turn_type=turn,
-        )
-        for n, line, turn in (
-            (1, straight, TurnType.STRAIGHT),
-            (2, bend, TurnType.LEFT if side < 0.0 else TurnType.RIGHT),
-        )
+        connector("Connector1", "Lane1", "Lane3", straight, turn_type=TurnType.STRAIGHT),
+        connector("Connector2", "Lane2", "Lane3", bend, turn_type=turns),
     ]
     return scene(
         areas=(),
@@ -132,7 +119,6 @@ def test_back_over_a_merge_goes_the_straightest_way_not_the_first(
     """Both ways end alike at x = 0: 40 m before x = 10 lies x = -30, on the straight road."""
     world = merge(side, side_first=side_first, connectors=connectors)
     place = LaneGraph(world).along("Lane3", 10.0, -40.0)
-    assert place is not None
     assert place.lane_id == "Lane1"
     assert (place.pose.x_m, place.pose.y_m) == pytest.approx((-30.0, 0.0))
     called = PoseTool(world).pose_on_lane("Lane3", "lane", -30.0, 0.5)
@@ -148,13 +134,9 @@ def arc(turn_rad: float) -> Polyline:
 @pytest.mark.parametrize(
     ("turn_deg", "turn_type"),
     [
-        (10, TurnType.STRAIGHT),
-        (-25, TurnType.STRAIGHT),
-        (35, TurnType.LEFT),
-        (140, TurnType.LEFT),
-        (-90, TurnType.RIGHT),
-        (170, TurnType.U_TURN),
-        (-200, TurnType.U_TURN),
+        *((10, TurnType.STRAIGHT), (-25, TurnType.STRAIGHT), (35, TurnType.LEFT)),
+        *((140, TurnType.LEFT), (-90, TurnType.RIGHT)),
+        *((170, TurnType.U_TURN), (-200, TurnType.U_TURN)),
     ],
 )
 def test_a_line_turns_as_far_as_its_bends_together(turn_deg: float, turn_type: TurnType) -> None:
@@ -175,16 +157,10 @@ def test_a_one_way_street_does_not_tell() -> None:
     assert find_traffic_side(curve().lanes) is None
 
 
-def route_of(where: Scene) -> EgoRoute:
-    route = EgoRoute.of(where)
-    assert route is not None
-    return route
-
-
 @pytest.mark.parametrize("ahead_m", [-5.0, 0.0, 12.5, 40.0])
 @pytest.mark.parametrize("left_m", [-2.0, 0.0, 1.5])
 def test_a_position_is_located_where_it_was_asked_for(ahead_m: float, left_m: float) -> None:
-    route = route_of(curve())
+    route = EgoRoute.of(curve())
     place = route.locate(*route.position(ahead_m, left_m))
     assert (place.ahead_m, place.left_m) == pytest.approx((ahead_m, left_m), abs=0.05)
 
@@ -195,7 +171,7 @@ def test_a_route_goes_back_and_on_over_what_joins_the_ego_s_lane() -> None:
         lane("Own", [(-10.0, 0.0), (30.0, 0.0)], successors=("After",)),
         lane("After", [(30.0, 0.0), (80.0, 0.0)]),
     )
-    route = route_of(scene(ego=EGO, lanes=lanes, agents=(), connectors=(), areas=()))
+    route = EgoRoute.of(scene(ego=EGO, lanes=lanes, agents=(), connectors=(), areas=()))
     assert route.lane_ids == ("Before", "Own", "After")
     assert route.ends_m == (-10.0, 30.0, 80.0)
     assert route.locate(-40.0, 1.0).ahead_m == pytest.approx(-40.0)
@@ -208,9 +184,9 @@ def test_the_lane_that_the_ego_names_counts_before_the_one_under_it() -> None:
         lane("Named", [(-10.0, 1.0), (80.0, 1.0)]),
     )
     here = scene(ego=replace(EGO, lane_id="Named"), lanes=lanes, agents=(), areas=())
-    assert route_of(here).lane_id == "Named"
+    assert EgoRoute.of(here).lane_id == "Named"
     gone = replace(here, ego=replace(here.ego, lane_id="Elsewhere"))
-    assert route_of(gone).lane_id == "Under"
+    assert EgoRoute.of(gone).lane_id == "Under"
 
 
 def test_an_ego_off_every_lane_has_no_route() -> None:

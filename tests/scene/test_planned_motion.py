@@ -1,6 +1,7 @@
 """Motions of one's own: hand-computed triggers, paths and speeds."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,14 +32,8 @@ def two_lanes() -> Scene:
     return scene(lanes=lanes(0.0, 3.5, ends_m=(-50.0, 400.0)))
 
 
-def with_motion(
-    agent: TrafficAgent,
-    motion: PlannedMotion,
-    *,
-    speed_mps: float = 0.0,
-    lane_id: str | None = None,
-) -> TrafficAgent:
-    return replace(agent, speed_mps=speed_mps, lane_id=lane_id, motion=motion)
+def with_motion(agent: TrafficAgent, motion: PlannedMotion, **parts: Any) -> TrafficAgent:
+    return replace(agent, motion=motion, **{"speed_mps": 0.0, "lane_id": None} | parts)
 
 
 def moved(base: Scene, agent: TrafficAgent) -> Movement:
@@ -93,14 +88,12 @@ def test_a_leader_brakes_from_10_to_0_in_2_s() -> None:
         (NearEgo(within_m=3.9), None),
     ],
 )
-def test_a_pedestrian_runs_out_once_the_trigger_fires(
-    start: NearEgo | AtPlace, since_s: float | None
-) -> None:
+def test_a_walker_runs_out_when_triggered(start: NearEgo | AtPlace, since_s: float | None) -> None:
     motion = PlannedMotion(
         path=PointPath(points_m=((40.0, 4.0),)), speeds=((0.0, 2.0),), start=start
     )
     walker = with_motion(pedestrian("Agent2", 40.0, -4.0), motion)
-    other = replace(vehicle("Agent3", 10.0, 3.5), speed_mps=4.0, lane_id="Lane2")
+    other = vehicle("Agent3", 10.0, 3.5, speed_mps=4.0, lane_id="Lane2")
     walk = find_motion(replace(two_lanes(), agents=(walker, other))).others[0]
     assert walk.started_s == (None if since_s is None else pytest.approx(since_s))
     if since_s is not None:
@@ -128,9 +121,7 @@ def test_a_path_follows_lanes_through_a_junction_and_is_gone_past_the_map() -> N
     assert np.flatnonzero(~turning.is_present)[0] == np.ceil((20.0 + arc_m + 52.0) / 1.0)
 
 
-def test_where_a_path_ends_at_its_start_one_stands_at_a_point_and_leaves_at_the_end_of_lanes() -> (
-    None
-):
+def test_at_the_end_of_a_path_one_stands_at_a_point_and_leaves_past_lanes() -> None:
     stops = PlannedMotion(path=PointPath(points_m=((38.0, 0.0),)), start=AtTime(after_s=1.0))
     car = with_motion(vehicle("Agent2", 30.0, 0.0), stops, speed_mps=8.0, lane_id="Lane1")
     assert moved(two_lanes(), car).states[[9, 10, 60], 0] == pytest.approx([37.2, 38.0, 38.0])
@@ -144,16 +135,12 @@ def test_where_a_path_ends_at_its_start_one_stands_at_a_point_and_leaves_at_the_
     ("motion", "sentence"),
     [
         (PlannedMotion(path=LanePath(lane_ids=("Lane9",))), "Lane9 is no lane of the scene"),
-        (
-            PlannedMotion(path=LanePath(lane_ids=("Lane3", "Lane2"))),
-            "Agent2: a path over lanes: Lane2 neither follows Lane3 nor runs beside it",
-        ),
-        (
-            PlannedMotion(start=AtPlace(agent_id="Agent2", x_m=0.0, y_m=0.0)),
-            "it waits for Agent2, who is none of Agent1",
-        ),
+        (PlannedMotion(path=LanePath(lane_ids=("Lane3", "Lane2"))),
+         "Agent2: a path over lanes: Lane2 neither follows Lane3 nor runs beside it"),
+        (PlannedMotion(start=AtPlace(agent_id="Agent2", x_m=0.0, y_m=0.0)),
+         "it waits for Agent2, who is none of Agent1"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_carried_out_is_refused(motion: PlannedMotion, sentence: str) -> None:
     car = with_motion(vehicle("Agent2", 0.0, 0.0), motion)
     with pytest.raises(InvalidModification, match=sentence):
@@ -164,19 +151,16 @@ def test_what_cannot_be_carried_out_is_refused(motion: PlannedMotion, sentence: 
 
 def test_paths_without_an_end_and_rings_of_lanes_are_bounded() -> None:
     corners = tuple((1e5 * (-1) ** n, 1e5 * (-1) ** (n // 2)) for n in range(200))
-    car = with_motion(
-        vehicle("Agent2", 0.0, 3.5), PlannedMotion(path=PointPath(points_m=corners)), speed_mps=9.0
-    )
+    wanders = PlannedMotion(path=PointPath(points_m=corners))
+    car = with_motion(vehicle("Agent2", 0.0, 3.5), wanders, speed_mps=9.0)
     assert moved(two_lanes(), car).is_present.all()
     # Two lanes of 1 mm that follow each other: one time around, and the car is past the map.
     ring = (
         lane("Lane1", [(0.0, 0.0), (0.001, 0.0)], successors=("Lane2",)),
         lane("Lane2", [(0.001, 0.0), (0.0, 0.0)], successors=("Lane1",)),
     )
-    path = LanePath(lane_ids=("Lane1", "Lane2") * 10)
-    goes_round = with_motion(
-        vehicle("Agent2", 0.0, 0.0), PlannedMotion(path=path), speed_mps=9.0, lane_id="Lane1"
-    )
+    circles = PlannedMotion(path=LanePath(lane_ids=("Lane1", "Lane2") * 10))
+    goes_round = with_motion(vehicle("Agent2", 0.0, 0.0), circles, speed_mps=9.0, lane_id="Lane1")
     around = moved(replace(two_lanes(), lanes=ring), goes_round)
     assert np.flatnonzero(around.is_present).tolist() == [0]
     crowd = tuple(replace(goes_round, id=f"Agent{n}") for n in range(2, 103))
@@ -186,7 +170,6 @@ def test_paths_without_an_end_and_rings_of_lanes_are_bounded() -> None:
 
 def test_a_slope_of_next_to_nothing_is_none() -> None:
     line = smooth_line([(0.0, 0.0), (1.0, 1e-310), (2.0, 1.0)])
-    assert line is not None
     assert line.position(0.5) == pytest.approx((0.5, 0.0))
 
 
