@@ -12,8 +12,8 @@ from augment.scene.planned_motion import AtTime, LanePath, NearEgo, PlannedMotio
 from augment.scene.planned_mover import check_motions
 from tests.scenes import curve, junction, pedestrian, scene, vehicle
 
-PARKED = replace(vehicle("Agent2", 21.4, 0.6), lane_id="Lane1")
-ROUND_THE_BEND = replace(vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7), lane_id="Lane1")
+PARKED = vehicle("Agent2", 21.4, 0.6, lane_id="Lane1")
+ROUND_THE_BEND = vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7, lane_id="Lane1")
 
 
 def drawn(shown: Scene, *right: TrafficAgent) -> dict[str, Modification]:
@@ -83,7 +83,7 @@ def test_a_mistake_in_a_motion_is_what_its_name_says() -> None:
     assert made["wrong-speed"].speeds in (((2.0, 2.0),), ((2.0, 6.4),))
     assert made["wrong-deceleration"].speeds in (((0.8, 4.0),), ((5.0, 4.0),))
     assert made["wrong-way"].path == LanePath(lane_ids=("Lane1", "Connector1"))
-    runner = replace(pedestrian("Agent2", 18.0, -5.0), motion=OUT)
+    runner = pedestrian("Agent2", 18.0, -5.0, motion=OUT)
     made = motions(runner)
     assert made.keys() == MOTION_MISTAKES.keys() - {
         "wrong-deceleration"
@@ -104,7 +104,6 @@ def test_a_motion_goes_along_and_leaves_the_share_of_right_answers_as_it_is() ->
         names = [bend(junction(), Modification(added=(one,)), throw)[1] for throw in throws]
         assert Counter(names)["none"] / 400 == pytest.approx(0.25, abs=0.06)
     (far,) = drawn(junction(), runner)["distance"].added
-    assert far.motion is not None
     assert isinstance(far.motion.path, PointPath)
     (end_m,) = far.motion.path.points_m
     assert (end_m[0] - far.x_m, end_m[1] - far.y_m) == pytest.approx((0.0, 11.0))

@@ -40,7 +40,8 @@ def read(document: object, least: int = 0) -> Reply:
 
 # --- No silent default -------------------------------------------------------------------------
 
-SENT = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh", "max_completion_tokens": 8192}
+SENT: dict[str, Any] = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh"}
+SENT["max_completion_tokens"] = 8192
 WRONG: tuple[object, ...] = (7, -1.5, True, "word", "", [], [7], [["a"]], {}, {"a": 1}, None)
 
 
@@ -79,6 +80,14 @@ def outcome(document: object) -> Reply | ModelFault:
         return fault
 
 
+def fault_of(
+    status: int, body: Any, headers: dict[str, str] | None = None, **sent: object
+) -> ModelFault:
+    fault = fault_of_status(status, body, headers or {}, sent=sent)
+    assert isinstance(fault, ModelFault)
+    return fault
+
+
 @pytest.mark.parametrize("value", WRONG, ids=str)
 @pytest.mark.parametrize("path", paths(WHOLE), ids=lambda path: ".".join(map(str, path)))
 def test_no_value_of_an_answer_is_silently_another(path: tuple[Any, ...], value: object) -> None:
@@ -92,11 +101,7 @@ def test_no_value_of_an_answer_is_silently_another(path: tuple[Any, ...], value:
         texts = (reply.text, reply.reasoning, reply.model, reply.finish_reason)
         calls = [text for one in reply.tool_calls for text in (one.id, one.name, one.arguments)]
         counts = (reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens)
-        written: set[object] = {
-            json.dumps(value),
-            str(value),
-            "a" if value == [["a"]] else str(value),
-        }
+        written: set[object] = {json.dumps(value), "a" if value == [["a"]] else str(value)}
         written |= {value} if isinstance(value, int) else set()
         assert written & {*texts, *calls, *counts}, reply
 
@@ -114,8 +119,7 @@ ERROR = {"message": "No.", "type": "t", "param": "messages", "code": "c"}
     ids=str,
 )
 def test_whatever_an_error_body_is_it_is_shown(body: Any) -> None:
-    fault = fault_of_status(400, body, {}, sent={"seed": 7, "temperature": 0.5})
-    assert isinstance(fault, ModelFault)
+    fault = fault_of(400, body, seed=7, temperature=0.5)
     assert not isinstance(fault, ParameterRefused)
     assert is_empty(body) or ": " in str(fault), fault
 
@@ -148,11 +152,8 @@ def test_calls_in_other_forms_are_calls() -> None:
         {"id": "3", "function": {"name": "f", "arguments": "{}"}, "extra_content": {"x": 1}},
     ]
     made = read(answer({"content": None, "tool_calls": calls})).tool_calls
-    assert [(one.id, one.arguments) for one in made] == [
-        ("call_1", '{"a": 1}'),
-        ("3", ""),
-        ("call_3", "{}"),
-    ]
+    read_as = [("call_1", '{"a": 1}'), ("3", ""), ("call_3", "{}")]
+    assert [(one.id, one.arguments) for one in made] == read_as
     thoughts = {"reasoning_content": "", "reasoning_details": [{"data": "x"}], "reasoning": "Hm."}
     back = read(answer({"content": None, "tool_calls": calls} | thoughts))
     del thoughts["reasoning"]
@@ -202,17 +203,13 @@ def test_an_error_of_a_filter_is_a_refusal_and_no_other_is(row: dict[str, Any]) 
 
 @pytest.mark.parametrize("row", rows("lasting"), ids=str)
 def test_what_does_not_pass_by_waiting_is_not_asked_for_again(row: dict[str, Any]) -> None:
-    fault = fault_of_status(row["status"], row["body"], {}, sent={})
-    assert isinstance(fault, ModelFault)
-    assert not fault.retryable
+    assert not fault_of(row["status"], row["body"]).retryable
 
 
 @pytest.mark.parametrize("what", ["capacity", "GPU memory", "resources"])
 def test_what_a_server_lacks_for_a_while_is_asked_for_again(what: str) -> None:
     body = {"error": {"message": f"The cluster has insufficient {what} at the moment."}}
-    fault = fault_of_status(503, body, {}, sent={})
-    assert isinstance(fault, ModelFault)
-    assert fault.retryable
+    assert fault_of(503, body).retryable
 
 
 @pytest.mark.parametrize("code", [400, "402", "invalid_api_key", "model_not_found"])
@@ -230,38 +227,27 @@ def test_an_error_in_a_200_may_ask_to_wait() -> None:
 
 def test_thoughts_that_nobody_may_read_are_thoughts() -> None:
     """OpenRouter hands out those of several vendors sealed; all tokens may have gone into them."""
-    sealed = {
-        "reasoning": None,
-        "reasoning_details": [{"type": "reasoning.encrypted", "data": "x"}],
-    }
+    details = [{"type": "reasoning.encrypted", "data": "x"}]
+    sealed = {"reasoning": None, "reasoning_details": details}
     reply = read(answer({"content": ""} | sealed, "length"))
     assert (reply.text, reply.is_cut_off, reply.remarks) == ("", True, ())
 
 
-ENDLESS = (
-    "<title>",
-    "unsupported ",
-    "seed_",
-    "does not support the parameter 'seed' ",
-    "max",
-    "1m",
-)
+SEED = "does not support the parameter 'seed' "
 
 
-@pytest.mark.parametrize("words", ENDLESS)
+@pytest.mark.parametrize("words", ["<title>", "unsupported ", "seed_", SEED, "max", "1m"])
 def test_nothing_that_a_server_repeats_without_end_holds_a_worker_up(words: str) -> None:
     text, started = words * 50_000, time.process_time()
     fields = {"message": text, "code": text, "retryDelay": text}
     for body in (text, {"error": fields}, {"error": [fields] * 3}):
-        assert isinstance(fault_of_status(500, body, {}, sent=SENT), ModelFault)
+        fault_of(500, body, **SENT)
     assert not read(answer({"content": "Hi"}, text)).is_withheld
     assert time.process_time() - started < 10.0
 
 
 @pytest.mark.parametrize("row", rows("usage"), ids=str)
-def test_cached_tokens_belong_to_the_prompt_and_a_small_count_is_a_remark(
-    row: dict[str, Any],
-) -> None:
+def test_cached_tokens_are_the_prompts_and_a_small_count_is_a_remark(row: dict[str, Any]) -> None:
     reply = read(answer({"content": "Hi"}) | {"usage": row["usage"]}, least=4900)
     counts = [reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens]
     assert (counts, len(reply.remarks)) == (row["counts"], row["remarks"]), reply.remarks
@@ -270,22 +256,10 @@ def test_cached_tokens_belong_to_the_prompt_and_a_small_count_is_a_remark(
 @pytest.mark.parametrize(
     ("written", "count"),
     [
-        ("0", None),
-        ("7", 7),
-        ("7.0", 7),
-        ("7.5", None),
-        ("-1", None),
-        ("true", None),
-        ('"7"', 7),
-        ('"7.5"', None),
-        ("null", None),
-        ("[7]", None),
-        (str(MOST_TOKENS), MOST_TOKENS),
-        (str(MOST_TOKENS + 1), None),
-        ("9" * 400, None),
-        ("1e300", None),
-        ("1e999", None),
-        ("NaN", None),
+        *(("7", 7), ("7.0", 7), ('"7"', 7), (str(MOST_TOKENS), MOST_TOKENS)),
+        *((written, None) for written in ("0", "7.5", "-1", "true", '"7.5"', "null", "[7]")),
+        *((written, None) for written in (str(MOST_TOKENS + 1), "9" * 400)),
+        *((written, None) for written in ("1e300", "1e999", "NaN")),
     ],
 )
 def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int | None) -> None:
@@ -297,8 +271,7 @@ def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int |
 @pytest.mark.parametrize("row", [*rows("unknown parameter"), *rows("refused value")], ids=str)
 def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -> None:
     """Not where a value is not taken, and not where its name is a word in a sentence."""
-    refused = fault_of_status(422, row["body"], {}, sent=SENT)
-    assert isinstance(refused, ModelFault)
+    refused = fault_of(422, row["body"], **SENT)
     parameter = refused.parameter if isinstance(refused, ParameterRefused) else None
     assert (parameter, refused.retryable) == (row.get("parameter"), "parameter" in row)
 
@@ -330,14 +303,10 @@ def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -
         ),
     ],
 )
-def test_the_wait_that_is_asked_for_has_three_forms(
-    headers: dict[str, str], wait_s: float | None
-) -> None:
-    body = {"details": [{"retryDelay": headers.pop("body", "")}]} | {
-        "message": headers.pop("sentence", "")
-    }
-    fault = fault_of_status(429, body, headers, sent={})
-    assert isinstance(fault, ModelFault)
+def test_the_wait_asked_for_has_three_forms(headers: dict[str, str], wait_s: float | None) -> None:
+    details = [{"retryDelay": headers.pop("body", "")}]
+    body = {"details": details, "message": headers.pop("sentence", "")}
+    fault = fault_of(429, body, headers)
     assert fault.retry_after_s == wait_s
     assert ("can't be read" in str(fault)) == (wait_s is None)
 
@@ -345,13 +314,9 @@ def test_the_wait_that_is_asked_for_has_three_forms(
 @pytest.mark.parametrize("wait", [{"retry_after": 20}, {"estimated_time": 20.0}], ids=str)
 def test_a_wait_may_be_a_number_of_the_body(wait: dict[str, object]) -> None:
     for body in (wait, {"error": "m is loading"} | wait, {"error": wait}):
-        fault = fault_of_status(503, body, {}, sent={})
-        assert isinstance(fault, ModelFault)
-        assert fault.retry_after_s == 20.0
+        assert fault_of(503, body).retry_after_s == 20.0
 
 
 def test_a_date_is_waited_for() -> None:
     until = format_datetime(datetime.now(UTC) + timedelta(seconds=60), usegmt=True)
-    fault = fault_of_status(503, "", {"retry-after": until}, sent={})
-    assert isinstance(fault, ModelFault)
-    assert fault.retry_after_s == pytest.approx(60.0, abs=5.0)
+    assert fault_of(503, "", {"retry-after": until}).retry_after_s == pytest.approx(60.0, abs=5.0)

@@ -76,13 +76,8 @@ def test_an_error_that_drips_is_still_that_error() -> None:
 @pytest.mark.parametrize(("now_s", "is_over"), [(9.99, False), (10.0, True), (10.01, True)])
 def test_the_last_moment_of_a_call(now_s: float, is_over: bool) -> None:
     clock = [0.0]
-    watch = Watch(
-        longest_s=10.0,
-        most_bytes=1,
-        still_wanted=lambda: None,
-        look_every_s=99.0,
-        clock=lambda: clock[0],
-    )
+    rest: dict[str, Any] = {"most_bytes": 1, "still_wanted": lambda: None, "look_every_s": 99.0}
+    watch = Watch(longest_s=10.0, clock=lambda: clock[0], **rest)
     clock[0] = now_s
     if is_over:
         with pytest.raises(OutOfTime):
@@ -101,12 +96,8 @@ def test_a_call_in_flight_that_nobody_wants_any_more_is_given_up_at_the_next_loo
         if not next(looks):
             raise JobCancelled
 
-    broken = fault(
-        drip(head("Content-Length: 100000"), b" "),
-        still_wanted=still_wanted,
-        look_every_s=0.03,
-        timeout_s=60.0,
-    )
+    looking: dict[str, Any] = {"still_wanted": still_wanted, "look_every_s": 0.03}
+    broken = fault(drip(head("Content-Length: 100000"), b" "), timeout_s=60.0, **looking)
     assert isinstance(broken, CallDropped)
     assert isinstance(broken.why, JobCancelled)
     assert not broken.retryable
@@ -210,9 +201,7 @@ def test_calls_of_tools_are_bounded_in_number_and_length() -> None:
 @pytest.mark.parametrize(
     "said",
     [
-        b"",
-        b"HTTP/1.1 20",
-        head("Content-Length: 500") + BODY[:40],
+        *(b"", b"HTTP/1.1 20", head("Content-Length: 500") + BODY[:40]),
         b"\x00\x01\x02 nonsense\r\n\r\n",
     ],
 )

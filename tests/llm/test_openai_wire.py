@@ -4,7 +4,7 @@ import socket
 import ssl
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 from unittest.mock import Mock
 
@@ -14,70 +14,53 @@ from augment.errors import ModelFault, NotSent, ParameterRefused
 from augment.fake_llm.server import FakeServer
 from augment.llm import wire_transport
 from augment.llm.addresses import Resolve
-from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from tests.llm.json_server import GOOD, recorder
 from tests.llm.raw_server import speaking, whole
 from tests.llm.test_addresses import leading_to
-from tests.llm.test_hostile_servers import ASKED, BODY
+from tests.llm.test_hostile_servers import ASKED, BODY, ask, fault
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
-Ask = Callable[..., Reply]
-
 
 def request(model: str) -> Request:
-    return Request(
-        model=model,
-        messages=(Message(speaker=Speaker.USER, text="Hello"),),
-        temperature=0.0,
-        seed=7,
-    )
+    return replace(ASKED, model=model, temperature=0.0, seed=7)
 
 
-@pytest.fixture
-def ask(server: FakeServer) -> Iterator[Ask]:
-    with OpenAIWire(base_url=server.url, api_key=None, timeout_s=60.0) as client:
-        yield lambda model: client.complete(request(model))
-
-
-def fault(ask: Ask, model: str) -> ModelFault:
-    with pytest.raises(ModelFault) as raised:
-        ask(model)
+def fault_of(url: str, model: str) -> ModelFault:
+    with OpenAIWire(base_url=url, api_key=None) as client, pytest.raises(ModelFault) as raised:
+        client.complete(request(model))
     return raised.value
 
 
+def answer(*says: Any) -> Reply:
+    """What comes of a status, a body and headers."""
+    with recorder(*says) as server, OpenAIWire(base_url=server.url, api_key=None) as client:
+        return client.complete(request("m"))
+
+
 @pytest.mark.parametrize(
-    ("model", "status", "retryable", "retry_after_s", "text"),
+    ("model", "expected", "text"),
     [
-        ("fake-429", 429, True, 1.0, "rate_limit_exceeded"),
-        ("fake-quota", 429, False, None, "insufficient_quota"),
-        ("fake-500", 500, True, None, "The server had an error"),
-        ("nobody", 404, False, None, "fake-good"),
+        ("fake-429", (429, True, 1.0), "rate_limit_exceeded"),
+        ("fake-quota", (429, False, None), "insufficient_quota"),
+        ("fake-500", (500, True, None), "The server had an error"),
+        ("nobody", (404, False, None), "fake-good"),
     ],
 )
 def test_a_fault_says_whether_it_may_pass(
-    ask: Ask,
-    model: str,
-    status: int | None,
-    retryable: bool,
-    retry_after_s: float | None,
-    text: str,
+    server: FakeServer, model: str, expected: tuple[object, ...], text: str
 ) -> None:
-    broken = fault(ask, model)
+    broken = fault_of(server.url, model)
     assert text in str(broken)
-    assert (broken.status, broken.retryable, broken.retry_after_s) == (
-        status,
-        retryable,
-        retry_after_s,
-    )
+    assert (broken.status, broken.retryable, broken.retry_after_s) == expected
 
 
 def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-    with OpenAIWire(base_url=f"http://127.0.0.1:{port}/v1", api_key=None) as client:
-        broken = fault(lambda model: client.complete(request(model)), "fake-good")
+    broken = fault_of(f"http://127.0.0.1:{port}/v1", "fake-good")
     assert isinstance(broken, NotSent)
     assert broken.retryable
     assert "refused" in str(broken)
@@ -85,12 +68,8 @@ def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again
 
 @pytest.mark.parametrize("body", [[], "text", 7, None, {"choices": [None]}, {"choices": {}}])
 def test_any_other_json_is_a_fault(body: object) -> None:
-    with (
-        recorder(body=body) as server,
-        OpenAIWire(base_url=server.url, api_key=None) as client,
-        pytest.raises(ModelFault),
-    ):
-        client.complete(request("m"))
+    with pytest.raises(ModelFault):
+        answer(200, body)
 
 
 @pytest.mark.parametrize(
@@ -104,23 +83,17 @@ def test_any_other_json_is_a_fault(body: object) -> None:
     ids=["byte order mark", "nothing", "blank", "error in a stream"],
 )
 def test_a_success_without_an_answer_may_be_asked_for_again(body: bytes, problem: str) -> None:
-    with speaking(whole(body)) as server, OpenAIWire(base_url=server.url, api_key=None) as client:
-        if not problem:
-            assert client.complete(ASKED).text == "Hi"
-            return
-        with pytest.raises(ModelFault, match=problem) as raised:
-            client.complete(ASKED)
-    assert raised.value.retryable
+    if problem:
+        broken = fault(whole(body))
+        assert (broken.retryable, problem in str(broken)) == (True, True)
+    else:
+        assert ask(whole(body)).text == "Hi"
 
 
 def test_a_redirect_is_not_followed_and_says_where_it_leads() -> None:
     moved = {"location": "https://elsewhere.example/v1"}
-    with (
-        recorder(301, {}, moved) as server,
-        OpenAIWire(base_url=server.url, api_key=None) as client,
-        pytest.raises(ModelFault, match=r"301: it leads to https://elsewhere\.example/v1"),
-    ):
-        client.complete(ASKED)
+    with pytest.raises(ModelFault, match=r"301: it leads to https://elsewhere\.example/v1"):
+        answer(301, {}, moved)
 
 
 @pytest.mark.parametrize(
@@ -135,9 +108,7 @@ def test_a_redirect_is_not_followed_and_says_where_it_leads() -> None:
     ],
     ids=str,
 )
-def test_a_list_of_models_has_several_shapes(
-    listed: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_models_are_listed_in_many_shapes(listed: object, monkeypatch: pytest.MonkeyPatch) -> None:
     with OpenAIWire(base_url="http://127.0.0.1:1/v1", api_key=None) as client:
         monkeypatch.setattr(client, "_exchange", lambda path: listed)
         assert client.list_models() == ["a", "b"]
@@ -146,9 +117,7 @@ def test_a_list_of_models_has_several_shapes(
             client.list_models()
 
 
-def test_a_key_goes_to_its_endpoint_and_nothing_of_the_environment(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_key_goes_to_its_endpoint_and_no_variable_does(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("OPENAI_API_KEY", "OPENAI_ORG_ID", "OPENAI_PROJECT_ID", "OPENAI_ADMIN_KEY"):
         monkeypatch.setenv(name, "leak")
     with recorder() as server:
@@ -163,9 +132,7 @@ def test_a_key_goes_to_its_endpoint_and_nothing_of_the_environment(
     assert KEY not in str(without_key)
 
 
-def test_custom_headers_of_the_environment_stop_the_client(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_headers_of_the_environment_stop_the_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_CUSTOM_HEADERS", f"X-Secret: {KEY}")
     with pytest.raises(ModelFault, match="OPENAI_CUSTOM_HEADERS is set") as raised:
         OpenAIWire(base_url="http://127.0.0.1:1/v1", api_key=None)
@@ -215,12 +182,9 @@ def test_the_certificate_of_an_endpoint_is_checked() -> None:
 
 @pytest.mark.parametrize("status", [400, 422])
 def test_a_parameter_that_is_not_taken_is_named(status: int) -> None:
-    with (
-        recorder(status, {"error": {"message": "Unknown field max_completion_tokens."}}) as server,
-        OpenAIWire(base_url=server.url, api_key=None) as client,
-        pytest.raises(ParameterRefused) as caught,
-    ):
-        client.complete(request("m"))
+    said = {"error": {"message": "Unknown field max_completion_tokens."}}
+    with pytest.raises(ParameterRefused) as caught:
+        answer(status, said)
     refused = caught.value
     assert (refused.parameter, refused.status) == ("max_completion_tokens", status)
     assert refused.retryable
@@ -233,9 +197,7 @@ def named(port: int, names: Resolve, scheme: str = "http") -> OpenAIWire:
 
 
 @pytest.mark.parametrize("addresses", [["127.0.0.1"], ["::1", "127.0.0.1"]])
-def test_a_name_is_connected_to_where_somebody_listens_and_keeps_its_host_header(
-    addresses: list[str],
-) -> None:
+def test_a_name_leads_to_who_listens_and_keeps_its_host_header(addresses: list[str]) -> None:
     names = Mock(side_effect=leading_to(*addresses))
     with speaking(whole(BODY)) as server, named(server.port, names) as client:
         assert client.complete(ASKED).text == "Hi"
@@ -266,9 +228,7 @@ def test_the_certificate_is_held_against_the_name_and_not_the_address() -> None:
     assert b"models.example" in server.heard[0]
 
 
-def test_a_name_that_is_never_found_takes_no_longer_than_a_call(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_name_never_found_takes_no_longer_than_a_call(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wire_transport, "CONNECT_TIMEOUT_S", 0.1)
     over = threading.Event()
 
@@ -278,9 +238,7 @@ def test_a_name_that_is_never_found_takes_no_longer_than_a_call(
 
     try:
         with (
-            OpenAIWire(
-                base_url="http://models.example/v1", api_key=None, resolve=resolve
-            ) as client,
+            named(80, resolve) as client,
             pytest.raises(NotSent, match="the connection failed") as raised,
         ):
             client.complete(ASKED)
@@ -296,7 +254,6 @@ def test_the_proxy_that_is_named_gets_everything_but_what_stays_here() -> None:
             client.complete(ASKED)
         with OpenAIWire(base_url=server.url, **settings) as client:
             client.complete(ASKED)
-    assert [heard.split()[1] for heard in proxy.heard] == [
-        b"http://models.example/v1/chat/completions"
-    ]
+    (heard,) = proxy.heard
+    assert heard.split()[1] == b"http://models.example/v1/chat/completions"
     assert len(server.heard) == 1

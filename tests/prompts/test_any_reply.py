@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from augment.errors import ReplyUnreadable
 from augment.prompts.blocks import LONGEST_ANSWER
 from augment.prompts.reply import ReadReply, read_reply
+from tests.properties import examples
 from tests.scenes import scene
 from tests.variants.playing import GOOD, agent, answer, block
 
@@ -45,6 +46,7 @@ def test_any_text(text: str) -> None:
 MOTIONS = st.dictionaries(st.sampled_from(["start", "path", "speeds"]), JSON)
 
 
+@examples(40)
 @given(
     st.dictionaries(st.sampled_from([*sorted(agent()), "walk_to"]), JSON)
     | st.builds(dict, motion=JSON | MOTIONS)
@@ -56,31 +58,16 @@ def test_any_fields_of_an_agent(fields: dict[str, object]) -> None:
 @pytest.mark.parametrize(
     "unit",
     [
-        *(
-            "/*",
-            ",/**/",
-            '\\"',
-            '"',
-            "{",
-            "[",
-            "\n",
-            "#",
-            " ",
-            "```\n",
-            "```",
-            "Insights",
-            "* ",
-            ",",
-        ),
-        *(", ", '"add":', '{"add":', "</think>", "//", '{"a":1}', '"a":1,', '{"add":1,"add":2}'),
+        *("/*", ",/**/", '\\"', '"', "{", "[", "\n", "#", " ", "```\n", "```", "Insights", "* "),
+        *(",", ", ", '"add":', '{"add":', "</think>", "//", '{"a":1}', '"a":1,'),
+        '{"add":1,"add":2}',
     ],
 )
 def test_no_answer_leads_a_pattern_astray(unit: str) -> None:
     """A pattern that tries every way to split an answer would take hours; this takes 0.1 s."""
     started = time.process_time()
     for before in ("", '{"add": "', '```json\n{"add":[', 'Insights: "'):
-        room = LONGEST_ANSWER - len(before)
-        read(before + unit * (room // len(unit)))
+        read(before + unit * (LONGEST_ANSWER // 2 // len(unit)))
     assert time.process_time() - started < 5.0
 
 

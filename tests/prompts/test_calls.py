@@ -60,9 +60,7 @@ FORMS = {
 
 @pytest.mark.parametrize("written", FORMS.values(), ids=FORMS)
 @pytest.mark.parametrize("around", ["{}", "First I look it up.\n\n{}\n\nThen I'll wait {{}}."])
-def test_a_call_in_another_form_is_understood_and_counts_as_mended(
-    written: str, around: str
-) -> None:
+def test_a_call_in_another_form_is_read_and_counts_as_mended(written: str, around: str) -> None:
     assert calls_in(around.format(written)) == (ONE_OF_THEM,)
 
 

@@ -7,6 +7,7 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +17,10 @@ from augment.prompts.calls import PARAMETERS, Tools, calls_in
 from augment.prompts.fill import read_text
 from augment.prompts.reply import answer_notes, read_reply
 from augment.prompts.vectors import LaneFormat, scene_text
-from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
+from augment.scene.entities import Lane, Scene, TurnType
 from augment.variants.pose_tool import PoseTool
 from augment.variants.retrieval import RetrievalTool
-from tests.scenes import EGO, scene
+from tests.scenes import EGO, connector, scene
 
 TEXTS = Path(__file__).parents[2] / "augment" / "prompts" / "text"
 WIDTH_M = 3.4
@@ -41,25 +42,13 @@ def beyond() -> Polyline:
 def example() -> Scene:
     """A road with one lane that is straight, bends on a connector, and goes on."""
 
-    def lane(name: str, line: Polyline) -> Lane:
-        return Lane(id=name, centerline=line, width_m=WIDTH_M, speed_limit_mps=11.0)
-
-    return scene(
-        ego=EGO,
-        lanes=(lane("Lane1", Polyline([(-20.0, 0.0), (10.0, 0.0)])), lane("Lane2", beyond())),
-        connectors=(
-            LaneConnector(
-                id="Connector1",
-                from_lane="Lane1",
-                to_lane="Lane2",
-                centerline=bend(),
-                width_m=WIDTH_M,
-                turn_type=TurnType.STRAIGHT,
-                speed_limit_mps=11.0,
-            ),
-        ),
-        areas=(),
-    )
+    rest: dict[str, Any] = {"width_m": WIDTH_M, "speed_limit_mps": 11.0}
+    before = Polyline([(-20.0, 0.0), (10.0, 0.0)])
+    lines = {"Lane1": before, "Lane2": beyond()}
+    turn = TurnType.STRAIGHT
+    way = connector("Connector1", "Lane1", "Lane2", bend().points_m, turn_type=turn, **rest)
+    lanes = tuple(Lane(id=name, centerline=line, **rest) for name, line in lines.items())
+    return scene(ego=EGO, lanes=lanes, connectors=(way,), areas=())
 
 
 @pytest.mark.parametrize("lanes", list(LaneFormat))
@@ -91,7 +80,6 @@ def test_the_answer_of_the_example_is_read_and_right(work: str) -> None:
     car, walker = read_reply(answer, example()).modification.added
     assert answer_notes(answer).startswith("A road with a single lane")
     tool = PoseTool(example())
-    assert walker.walk_to_m is not None
     spots = [
         ((car.x_m, car.y_m), car.lane_id, 17.5, -0.6),
         ((walker.x_m, walker.y_m), walker.lane_id, 21.5, -2.5),

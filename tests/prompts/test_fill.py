@@ -36,7 +36,6 @@ def test_what_never_changes_comes_first_and_the_wish_last() -> None:
 def test_no_line_of_an_instruction_ends_its_quotation(wish: str) -> None:
     task = fill.modifier_messages(scene(), wish)[1].text
     inside = re.search(r"^<instruction>\n(.*?)\n</instruction>$", task, re.DOTALL | re.MULTILINE)
-    assert inside is not None
     assert task.endswith(inside.group(0) + "\n\n# Output")
     assert all(line.startswith("> ") for line in inside.group(1).split("\n"))
     assert re.search(r"[\x00-\x09\x0b-\x1f\u202e]", inside.group(1)) is None
@@ -45,7 +44,7 @@ def test_no_line_of_an_instruction_ends_its_quotation(wish: str) -> None:
 def test_the_form_of_a_scene_is_pinned_to_its_version() -> None:
     """Whoever changes the form raises VECTORS_VERSION: stored answers are told apart by it."""
     motion = PlannedMotion(speeds=((0.5, 0.0),), start=NearEgo(within_m=12.5))
-    moving = replace(junction(), agents=(replace(vehicle("Agent2", 9.0, 0.0), motion=motion),))
+    moving = replace(junction(), agents=(vehicle("Agent2", 9.0, 0.0, motion=motion),))
     text = "\n".join(
         scene_text(place, lanes=lanes)
         for place in (scene(), moving, without_traffic(shown_scene(SLUGS[0])))

@@ -3,7 +3,6 @@
 python -m tests.prompts.test_golden
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,19 +34,15 @@ DONE = Modification(
     added=(
         vehicle("Agent2", 21.4, 0.5),
         pedestrian("Agent3", 24.0, -5.0, (24.0, 5.0)),
-        replace(vehicle("Agent4", 12.0, 0.0), speed_mps=6.0, lane_id="Lane1", motion=TURNS),
+        vehicle("Agent4", 12.0, 0.0, speed_mps=6.0, lane_id="Lane1", motion=TURNS),
     )
 )
 
 CASES = [
-    ("otm", ModelRole.MODIFIER, False),
-    ("fc", ModelRole.MODIFIER, False),
-    ("fc", ModelRole.MODIFIER, True),
-    ("fc-plus", ModelRole.MODIFIER, False),
-    ("fc-plus", ModelRole.MODIFIER, True),
-    ("tqa", ModelRole.REVIEWER, False),
-    ("vqa", ModelRole.ENGINEER, False),
-    ("vqa", ModelRole.VIEWER, False),
+    *(("otm", ModelRole.MODIFIER, False), ("fc", ModelRole.MODIFIER, False)),
+    *(("fc", ModelRole.MODIFIER, True), ("fc-plus", ModelRole.MODIFIER, False)),
+    *(("fc-plus", ModelRole.MODIFIER, True), ("tqa", ModelRole.REVIEWER, False)),
+    *(("vqa", ModelRole.ENGINEER, False), ("vqa", ModelRole.VIEWER, False)),
 ]
 
 

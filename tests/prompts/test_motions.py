@@ -29,6 +29,7 @@ from augment.scene.planned_motion import (
     PointPath,
 )
 from tests.fixtures.shelf import MOVING_SLUGS, entry, shown_scene
+from tests.properties import examples
 from tests.scenes import junction, vehicle
 from tests.variants.playing import block
 
@@ -82,23 +83,17 @@ def vector(text: str, name: str) -> list[Any]:
 def entry_of(name: str, values: list[Any]) -> dict[str, object]:
     """The same as a model answers it."""
     keys = (
-        "type",
-        "x_m",
-        "y_m",
-        "heading_rad",
-        "width_m",
-        "length_m",
-        "speed_mps",
-        "lane",
-        "motion",
+        *("type", "x_m", "y_m", "heading_rad", "width_m", "length_m"),
+        *("speed_mps", "lane", "motion"),
     )
     return {"id": name, **dict(zip(keys, values, strict=False))}
 
 
+@examples(40)
 @given(motion=MOTIONS)
 def test_every_motion_that_is_shown_is_read_back(motion: PlannedMotion) -> None:
     street = foreign()
-    added = replace(vehicle("Agent3", 5.0, 0.0), lane_id="48", motion=motion)
+    added = vehicle("Agent3", 5.0, 0.0, lane_id="48", motion=motion)
     moved = replace(street.agents[0], motion=motion)
     if isinstance(motion.start, AtPlace):
         start = replace(motion.start, agent_id=EGO_ID)

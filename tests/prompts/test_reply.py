@@ -19,28 +19,19 @@ from augment.prompts.reply import (
     read_verdict,
 )
 from augment.prompts.vectors import short_names, with_short_ids
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import TrafficAgent
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import scene, vehicle
 from tests.variants.playing import GOOD, agent, block, rating
 
 NUMBERS = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
-PARKED = TrafficAgent(
-    id="Agent2",
-    type=AgentType.VEHICLE,
-    x_m=21.4,
-    y_m=0.9,
-    heading_rad=0.0,
-    width_m=2.0,
-    length_m=4.8,
-    speed_mps=0.0,
-    lane_id="Lane1",
-)
+PARKED = vehicle("Agent2", 21.4, 0.9, lane_id="Lane1")
+BUSY = scene(agents=(vehicle("Agent7", 40.0, 0.0),))
 
 
 def problems(text: str) -> list[str]:
     with pytest.raises(ReplyUnreadable) as raised:
-        read_reply(text, scene(agents=(vehicle("Agent7", 40.0, 0.0),)))
+        read_reply(text, BUSY)
     return raised.value.problems
 
 
@@ -168,7 +159,7 @@ def test_a_broken_final_block_is_not_replaced_by_an_earlier_draft() -> None:
 
 
 def test_odd_ids_of_a_scene_are_known_by_their_short_forms() -> None:
-    odd = scene(agents=(replace(vehicle("truck <7>", 40.0, 0.0), lane_id="Lane1"),))
+    odd = scene(agents=(vehicle("truck <7>", 40.0, 0.0, lane_id="Lane1"),))
     assert read_reply(block(remove=["Agent2"]), odd).modification.removed == ("truck <7>",)
     with pytest.raises(ReplyUnreadable, match="its agents: Agent2") as raised:
         read_reply(block(remove=["Agent5"]), odd)
@@ -186,16 +177,13 @@ def test_neither_a_place_nor_the_end_of_a_walk_lies_beyond_the_radius(
 ) -> None:
     point = [3.0, 3.0]
     point[axis] = sign * value_m
-    if what == "place":
-        text = block(agent(x_m=point[0], y_m=point[1]))
-    elif what == "walk":
-        text = block(agent(type="PEDESTRIAN", walk_to=point))
-    else:
-        text = block(move=[agent(id="Agent7", type="PEDESTRIAN", walk_to=point)])
+    text = {
+        "place": block(agent(x_m=point[0], y_m=point[1])),
+        "walk": block(agent(type="PEDESTRIAN", walk_to=point)),
+        "moved walk": block(move=[agent(id="Agent7", type="PEDESTRIAN", walk_to=point)]),
+    }[what]
     if is_read:
-        made = read_reply(
-            text, scene(agents=(vehicle("Agent7", 40.0, 0.0),))
-        ).modification.changed[0]
+        (made,) = read_reply(text, BUSY).modification.changed
         assert (made.walk_to_m or (made.x_m, made.y_m)) == tuple(point)
     else:
         assert "x and y must lie between -80 and 80" in problems(text)[0]
@@ -205,9 +193,7 @@ def test_neither_a_place_nor_the_end_of_a_walk_lies_beyond_the_radius(
     ("value_m", "is_read"), [(0.09, False), (0.1, True), (20.0, True), (20.01, False)]
 )
 @pytest.mark.parametrize("key", ["width_m", "length_m"])
-def test_a_size_is_between_a_door_and_an_articulated_bus(
-    key: str, value_m: float, is_read: bool
-) -> None:
+def test_a_size_is_between_a_door_and_a_long_bus(key: str, value_m: float, is_read: bool) -> None:
     text = block(agent(**{key: value_m}))
     if is_read:
         (added,) = read_reply(text, scene()).modification.added
@@ -232,10 +218,8 @@ def test_a_new_agent_takes_no_id_that_the_scene_uses_under_another_name() -> Non
         (3, "add.0.motion: Input should be an object"),
         ({"colour": 1}, "add.0.motion.colour: Unexpected keyword argument"),
         ({"start": {"within_m": 3}}, "add.0.motion.start: Unable to extract tag using disc"),
-        (
-            {"start": {"kind": "hush" * 99}},
-            "add.0.motion.start.kind: Input should be 'time', 'ego_distance', 'place'",
-        ),
+        ({"start": {"kind": "hush" * 99}},
+         "add.0.motion.start.kind: Input should be 'time', 'ego_distance', 'place'"),
         ({"start": {"kind": "time", "after_s": -1}}, "start.time.after_s: Input should be great"),
         ({"start": at("Agent9")}, "Agent2: it waits for Agent9, who is none of Agent1, Agent7"),
         ({"speeds": [["2", 0]]}, "add.0.motion.speeds.0.0: Input should be a valid number"),
@@ -244,15 +228,11 @@ def test_a_new_agent_takes_no_id_that_the_scene_uses_under_another_name() -> Non
         ({"path": along()}, "path.lanes.lane_ids: List should have at least 1 item"),
         ({"path": along("Lane9")}, "Agent2: Lane9 is no lane of the scene; its lanes: Lane1, Lan"),
         ({"path": along("Lane1", "Lane2")}, "Lane2 neither follows Lane1 nor runs beside it"),
-        (
-            {"path": {"kind": "points", "points_m": [[160, 0], [160.01, 0]]}},
-            "Agent2: points_m must lie between -160 and 160",
-        ),
+        ({"path": {"kind": "points", "points_m": [[160, 0], [160.01, 0]]}},
+         "Agent2: points_m must lie between -160 and 160"),
     ],
-)
-def test_a_motion_that_can_not_be_read_is_refused_with_its_reason(
-    motion: object, problem: str
-) -> None:
+)  # fmt: skip
+def test_an_unreadable_motion_is_refused_with_its_reason(motion: object, problem: str) -> None:
     (said,) = problems(block(agent(motion=motion)))
     assert problem in said
     assert "hush" not in said
@@ -274,11 +254,8 @@ READERS: list[Callable[[str], object]] = [
 def test_sections_are_kept_and_the_block_counts() -> None:
     text = "Summary: A road.\n\n**Questions:**\n1. Where?\n\nAnswers:\n1. There.\n\nRatings: 5\n\n"
     review = read_ratings(text + "Review:\n" + rating(5, 5, 4), accepted_from=4.0)
-    assert (review.summary, review.questions, review.answers) == (
-        "A road.",
-        "1. Where?",
-        "1. There.",
-    )
+    said = (review.summary, review.questions, review.answers)
+    assert said == ("A road.", "1. Where?", "1. There.")
     assert review.ratings.mean == pytest.approx(14 / 3)
 
 

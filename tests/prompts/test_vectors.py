@@ -21,17 +21,17 @@ from augment.prompts.vectors import (
     scene_vectors,
     short_names,
 )
-from augment.scene.entities import Lane, LaneConnector, TurnType
+from augment.scene.entities import TurnType
 from augment.scene.planned_motion import LanePath
 from augment.variants.pose_tool import PoseTool
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, whole_scene
-from tests.scenes import junction, scene, vehicle
+from tests.scenes import connector, junction, lane, scene, vehicle
 
 FloatArray = NDArray[np.float64]
 
 
 def test_an_agent_is_type_centre_heading_width_length_velocity_lane() -> None:
-    street = scene(agents=(replace(vehicle("Agent2", 12.346, 3.5, math.pi), lane_id="Lane2"),))
+    street = scene(agents=(vehicle("Agent2", 12.346, 3.5, math.pi, lane_id="Lane2"),))
     assert scene_vectors(street, 80.0)["Agents"] == {
         "Agent1": ["EGO_VEHICLE", 0.0, 0.0, 0.0, 2.3, 5.18, 8.0, "Lane1"],
         "Agent2": ["VEHICLE", 12.35, 3.5, 3.142, 2.0, 4.8, 0.0, "Lane2"],
@@ -41,29 +41,16 @@ def test_an_agent_is_type_centre_heading_width_length_velocity_lane() -> None:
 def test_a_lane_is_number_directions_width_limit_and_points_five_metres_apart() -> None:
     street = scene()
     lanes = scene_vectors(street, 12.0)["Lanes"]
-    assert lanes["Lane1"] == [
-        1,
-        "Eastwards",
-        "same",
-        3.5,
-        13.9,
-        [[-6.0, 0.0], [-1.0, 0.0], [4.0, 0.0], [9.0, 0.0], [12.0, 0.0]],
-    ]
+    points = [[-6.0, 0.0], [-1.0, 0.0], [4.0, 0.0], [9.0, 0.0], [12.0, 0.0]]
+    assert lanes["Lane1"] == [1, "Eastwards", "same", 3.5, 13.9, points]
     assert lanes["Lane2"][:3] == [2, "Westwards", "opposite"]
 
 
 def test_a_connector_is_from_to_light_turn_limit_and_points() -> None:
     crossing = junction()
     found = scene_vectors(crossing, 80.0)["Lane connectors"]
-    assert found["Connector1"] == [
-        "Lane1",
-        "Lane2",
-        "green",
-        "straight",
-        3.5,
-        None,
-        [[20.0, 0.0], [25.0, 0.0], [30.0, 0.0], [35.0, 0.0], [36.0, 0.0]],
-    ]
+    points = [[20.0, 0.0], [25.0, 0.0], [30.0, 0.0], [35.0, 0.0], [36.0, 0.0]]
+    assert found["Connector1"] == ["Lane1", "Lane2", "green", "straight", 3.5, None, points]
 
 
 def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
@@ -71,12 +58,8 @@ def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
     areas = scene_vectors(street, 20.0)["Areas"]
     kind, points = areas["Area2"]
     assert kind == "walkway"
-    assert sorted(map(tuple, points)) == [  # type: ignore[call-overload]
-        (-10.0, -4.25),
-        (-10.0, -1.75),
-        (20.0, -4.25),
-        (20.0, -1.75),
-    ]
+    corners = [(-10.0, -4.25), (-10.0, -1.75), (20.0, -4.25), (20.0, -1.75)]
+    assert sorted(map(tuple, points)) == corners  # type: ignore[call-overload]
 
 
 def test_a_name_out_of_a_file_never_reaches_the_prompt() -> None:
@@ -85,13 +68,10 @@ def test_a_name_out_of_a_file_never_reaches_the_prompt() -> None:
         name=shout,
         provenance=shout,
         agents=(
-            replace(vehicle(shout, 9.0, 0.0), lane_id=shout),
-            replace(vehicle("Agent2", 19.0, 0.0), lane_id="gone"),
+            vehicle(shout, 9.0, 0.0, lane_id=shout),
+            vehicle("Agent2", 19.0, 0.0, lane_id="gone"),
         ),
-        lanes=(
-            Lane(id=shout, centerline=Polyline([(-50, 0), (50, 0)]), width_m=3.5),
-            Lane(id="Lane1", centerline=Polyline([(50, 3), (-50, 3)]), width_m=3.5),
-        ),
+        lanes=(lane(shout, [(-50, 0), (50, 0)]), lane("Lane1", [(50, 3), (-50, 3)])),
         areas=(replace(scene().areas[0], id=shout),),
     )
     text = scene_text(street)
@@ -109,13 +89,10 @@ def test_a_line_is_shown_from_its_first_to_its_last_point_within() -> None:
 
 def test_a_boundary_is_cut_and_loses_points_that_say_nothing() -> None:
     square = np.array([[0, 0], [50, 0], [50, 50], [0, 50]], dtype=float)
-    assert sorted(map(tuple, boundary_within(square, (-10.0, -10.0, 10.0, 10.0)))) == [
-        (0.0, 0.0),
-        (0.0, 10.0),
-        (10.0, 0.0),
-        (10.0, 10.0),
-    ]
-    assert boundary_within(square + 100.0, (-10.0, -10.0, 10.0, 10.0)).shape == (0, 2)
+    window = (-10.0, -10.0, 10.0, 10.0)
+    corners = [(0.0, 0.0), (0.0, 10.0), (10.0, 0.0), (10.0, 10.0)]
+    assert sorted(map(tuple, boundary_within(square, window))) == corners
+    assert boundary_within(square + 100.0, window).shape == (0, 2)
     dotted = np.array([[0, 0], [5, 0.05], [10, 0], [10, 10], [0, 10]], dtype=float)
     assert simplify_boundary(dotted, 0.1).tolist() == [[0, 0], [10, 0], [10, 10], [0, 10]]
 
@@ -159,17 +136,13 @@ def test_lanes_and_connectors_are_curves_that_know_their_neighbours() -> None:
     assert curves["Connector1"].width_m == 3.5
 
 
-def lane(name: str, *points: tuple[float, float]) -> Lane:
-    return Lane(id=name, centerline=Polyline(points), width_m=3.5)
-
-
 @pytest.mark.parametrize(
     ("y_m", "is_shown"),
     [(BESIDE_M - 0.1, True), (BESIDE_M + 0.1, False), (-BESIDE_M - 0.1, False)],
 )
 def test_what_runs_too_far_beside_the_ego_is_left_out(y_m: float, is_shown: bool) -> None:
     street = scene(
-        lanes=(*scene().lanes, lane("Lane3", (-50.0, y_m), (100.0, y_m))),
+        lanes=(*scene().lanes, lane("Lane3", [(-50.0, y_m), (100.0, y_m)])),
         agents=(vehicle("Agent2", 20.0, y_m),),
     )
     assert ("Lane3" in find_spans(street, 80.0)) is is_shown
@@ -178,8 +151,8 @@ def test_what_runs_too_far_beside_the_ego_is_left_out(y_m: float, is_shown: bool
 
 
 def test_a_crossing_street_is_cut_where_the_wish_ends_and_goes_far_ahead() -> None:
-    crossing = lane("Lane3", (40.0, -70.0), (40.0, 70.0))
-    street = scene(lanes=(*scene().lanes, crossing, lane("Lane4", (-60.0, -9.0), (-60.0, 9.0))))
+    crossing = lane("Lane3", [(40.0, -70.0), (40.0, 70.0)])
+    street = scene(lanes=(*scene().lanes, crossing, lane("Lane4", [(-60.0, -9.0), (-60.0, 9.0)])))
     spans = find_spans(street, 80.0)
     assert spans["Lane3"] == pytest.approx((70.0 - BESIDE_M, 70.0 + BESIDE_M), abs=0.5)
     assert "Lane4" not in spans
@@ -193,17 +166,11 @@ def test_where_the_ego_can_turn_off_is_shown_as_far_as_it_can_drive() -> None:
 
 
 def test_a_turning_lane_beside_the_ego_leads_on_too() -> None:
-    ahead = replace(lane("Lane1", (-50.0, 0.0), (20.0, 0.0)), left_neighbor="Lane2")
-    beside = lane("Lane2", (-50.0, 3.5), (20.0, 3.5))
-    leads = LaneConnector(
-        id="Connector1",
-        from_lane="Lane2",
-        to_lane="Lane3",
-        centerline=Polyline([(20.0, 3.5), (28.0, 11.5)]),
-        width_m=3.5,
-        turn_type=TurnType.LEFT,
-    )
-    away = lane("Lane3", (28.0, 11.5), (28.0, 70.0))
+    ahead = replace(lane("Lane1", [(-50.0, 0.0), (20.0, 0.0)]), left_neighbor="Lane2")
+    beside = lane("Lane2", [(-50.0, 3.5), (20.0, 3.5)])
+    line = [(20.0, 3.5), (28.0, 11.5)]
+    leads = connector("Connector1", "Lane2", "Lane3", line, turn_type=TurnType.LEFT)
+    away = lane("Lane3", [(28.0, 11.5), (28.0, 70.0)])
     street = scene(lanes=(ahead, beside, away), connectors=(leads,), areas=())
     assert find_spans(street, 80.0)["Lane3"][1] > 50.0
 
@@ -221,7 +188,6 @@ def test_of_connectors_that_lead_the_same_way_one_is_shown() -> None:
 @pytest.mark.parametrize("slug", [*SLUGS, *HARD_SLUGS, *MOVING_SLUGS])
 def test_every_place_of_a_reference_is_shown_with_its_lane(slug: str) -> None:
     base, reference = whole_scene(entry(slug).scene), entry(slug).reference
-    assert reference is not None
     extent, spans = find_extent(base, DEFAULT_RADIUS_M), find_spans(base, DEFAULT_RADIUS_M)
     for agent in reference.changed:
         ends = [(agent.x_m, agent.y_m), *([agent.walk_to_m] if agent.walk_to_m else [])]
@@ -234,14 +200,8 @@ def test_every_place_of_a_reference_is_shown_with_its_lane(slug: str) -> None:
 @pytest.mark.parametrize(("y_m", "is_shown"), [(4.9, True), (5.1, False)])
 def test_a_connector_that_no_way_of_the_ego_meets_is_left_out(y_m: float, is_shown: bool) -> None:
     """The ego's own way ends before the intersection, its lane leads nowhere."""
-    street = scene(lanes=(lane("Lane1", (-50.0, 0.0), (60.0, 0.0)),), areas=())
-    beside = LaneConnector(
-        id="Connector1",
-        from_lane=None,
-        to_lane=None,
-        centerline=Polyline([(20.0, y_m), (35.0, y_m + 10.0)]),
-        width_m=3.5,
-        turn_type=TurnType.STRAIGHT,
-    )
+    street = scene(lanes=(lane("Lane1", [(-50.0, 0.0), (60.0, 0.0)]),), areas=())
+    line = [(20.0, y_m), (35.0, y_m + 10.0)]
+    beside = connector("Connector1", None, None, line, turn_type=TurnType.STRAIGHT)
     crossing = replace(street, connectors=(beside,))
     assert ("Connector1" in find_spans(crossing, 80.0)) is is_shown

@@ -72,17 +72,9 @@ class MemoryTranscript:
 
 
 def agent(**changes: object) -> dict[str, object]:
-    made: dict[str, object] = {
-        "id": "Agent2",
-        "type": "VEHICLE",
-        "x_m": 21.4,
-        "y_m": 0.9,
-        "heading_rad": 0.0,
-        "width_m": 2.0,
-        "length_m": 4.8,
-        "speed_mps": 0.0,
-        "lane": "Lane1",
-    }
+    made: dict[str, object] = {"id": "Agent2", "type": "VEHICLE", "x_m": 21.4, "y_m": 0.9}
+    made |= {"heading_rad": 0.0, "width_m": 2.0, "length_m": 4.8, "speed_mps": 0.0}
+    made |= {"lane": "Lane1"}
     return {key: value for key, value in (made | changes).items() if value is not ...}
 
 
@@ -171,7 +163,6 @@ class Play:
     @property
     def x_m(self) -> float:
         """Where the first added agent of the outcome is."""
-        assert self.outcome.modification is not None
         return self.outcome.modification.added[0].x_m
 
     def notes(self, kind: str) -> list[dict[str, object]]:

@@ -2,43 +2,25 @@
 
 import json
 import math
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from augment.formats.readers import recognise
 from augment.prompts.vectors import control_points, curve_from, short_names
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.pose_tool import PoseTool
+from tests.formats.test_recorded_formats import FILES, reading
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 AUTHORED = [
     scene_from_document(json.loads(path.read_text(encoding="utf-8")))
     for path in sorted(FIXTURES.glob("**/scenes/*.json"))[::4]
 ]
-FILES = (
-    "av2_sensor/7fab2350-7eaf-3b7e-a39d-6937a4c1bede",
-    "commonroad/USA_Peach-4_8_T-1.xml",
-    "scenarionet/sd_nuscenes_mini_val_scene-0103*.pkl",
-    "waymo_motion/womd_scenario_input.tfrecord",
-)
 EVERY_M = 4.0
-
-
-@cache
-def recorded_scenes(realdata: Path) -> tuple[Scene, ...]:
-    """One scene of each recorded file."""
-    found = []
-    for pattern in FILES:
-        (path,) = realdata.glob(pattern)
-        reader = recognise(path)
-        found.append(reader.read(path, item=None, frame=None, name=reader.name).scene)
-    return tuple(found)
 
 
 def on_polyline(points: NDArray[np.float64], s_m: float) -> tuple[float, float]:
@@ -72,8 +54,6 @@ def test_on_authored_lanes_the_tool_and_the_text_are_on_the_lane(scene: Scene) -
 
 @pytest.mark.slow
 @pytest.mark.realdata
-@pytest.mark.parametrize("number", range(len(FILES)))
-def test_on_recorded_lanes_the_tool_and_the_text_are_on_the_lane(
-    realdata: Path, number: int
-) -> None:
-    assert_on_the_lanes(recorded_scenes(realdata)[number])
+@pytest.mark.parametrize("name", FILES)
+def test_on_recorded_lanes_tool_and_text_are_on_the_lane(realdata: Path, name: str) -> None:
+    assert_on_the_lanes(reading(realdata, name).scene)

@@ -35,20 +35,10 @@ def test_a_distance_from_the_ego_is_measured_along_its_lane() -> None:
 
 def test_the_answer_carries_what_an_agent_of_the_block_needs() -> None:
     assert JUNCTION.answer({"lane": "Lane1", "start": "Agent1", "distance_m": 15}) == {
-        "x_m": 15.0,
-        "y_m": 0.0,
-        "heading_rad": 0.0,
-        "heading_deg": 0.0,
-        "lane": "Lane1",
-        "taken_by": None,
-        "along_m": 50.0,
-        "remaining_m": 5.0,
-        "lane_width_m": 3.5,
-        "edge_left_m": 1.75,
-        "edge_right_m": 1.75,
-        "next_lanes": ["Connector1", "Connector2"],
-        "route": ["Lane1"],
-        "start_lateral_m": 0.0,
+        **{"x_m": 15.0, "y_m": 0.0, "heading_rad": 0.0, "heading_deg": 0.0, "lane": "Lane1"},
+        **{"taken_by": None, "along_m": 50.0, "remaining_m": 5.0, "start_lateral_m": 0.0},
+        **{"lane_width_m": 3.5, "edge_left_m": 1.75, "edge_right_m": 1.75},
+        **{"next_lanes": ["Connector1", "Connector2"], "route": ["Lane1"]},
     }
 
 
@@ -63,12 +53,8 @@ def test_a_place_is_taken_by_the_box_that_interplan_will_use() -> None:
 @pytest.mark.parametrize(
     ("lateral_m", "lane"),
     [
-        (1.75, "Lane1"),
-        (1.76, "Lane2"),
-        (3.5, "Lane2"),
-        (5.26, None),
-        (-1.75, "Lane1"),
-        (-1.76, None),
+        *((1.75, "Lane1"), (1.76, "Lane2"), (3.5, "Lane2"), (5.26, None)),
+        *((-1.75, "Lane1"), (-1.76, None)),
     ],
 )
 def test_the_lane_is_the_one_under_the_place(lateral_m: float, lane: str | None) -> None:
@@ -116,11 +102,7 @@ def test_the_edge_of_the_road_lies_before_its_bays_and_its_walkways() -> None:
     ],
 )
 def test_a_place_that_is_taken_names_who_stands_there_and_the_nearest_free_one(
-    distance_m: float,
-    lateral_m: float,
-    object_type: str,
-    taken_by: list[str] | None,
-    free_m: float | None,
+    distance_m: float, lateral_m: float, object_type: str, taken_by: object, free_m: float | None
 ) -> None:
     call = {"lane": "Lane1", "start": "Agent1", "distance_m": distance_m, "lateral_m": lateral_m}
     answer = parking_street().answer({**call, "object": object_type})
@@ -138,7 +120,6 @@ def test_the_tool_goes_where_the_checks_measure(name: str, goal: TurnType | None
     """Over junctions and around roundabouts "our lane" is one and the same."""
     world = replace(whole_scene(name), options=SceneOptions(goal=goal))
     tool, route = PoseTool(world), EgoRoute.of(world)
-    assert route is not None
     start = short_names(world).lanes[route.lane_id]
     for ahead_m in range(5, 75, 10):
         place = tool.pose_on_lane(start, "Agent1", ahead_m).pose
@@ -212,15 +193,13 @@ any_json = st.recursive(
 )
 
 
-STARTS: st.SearchStrategy[Any] = st.builds(
-    dict, kind=st.just("place"), x_m=st.floats(-9, 9), y_m=st.just(0), agent_id=st.text()
-)
-ALONG: st.SearchStrategy[Any] = st.builds(
-    dict, kind=st.just("lanes"), lane_ids=st.lists(st.sampled_from(["Lane1", "x"]))
-)
-OVER: st.SearchStrategy[Any] = st.builds(
-    dict, kind=st.just("points"), points_m=st.lists(st.tuples(st.floats(-1e6, 1e6), st.just(0)))
-)
+def documents(kind: str, **parts: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    return st.fixed_dictionaries({"kind": st.just(kind), **parts})
+
+
+STARTS = documents("place", x_m=st.floats(-9, 9), y_m=st.just(0), agent_id=st.text())
+ALONG = documents("lanes", lane_ids=st.lists(st.sampled_from(["Lane1", "x"])))
+OVER = documents("points", points_m=st.lists(st.tuples(st.floats(-1e6, 1e6), st.just(0))))
 MOVES = {
     "path": any_json | ALONG | OVER,
     "speeds": any_json | st.lists(st.tuples(st.floats(0, 60), st.floats(0, 100)), max_size=3),
@@ -349,16 +328,12 @@ def test_half_a_turn_is_pi_to_either_side() -> None:
         ({"after_s": [1] * 17}, "after_s: Value should have at most 16 items"),
         ({"speed_mps": -1}, "speed_mps: Input should be greater than or equal to 0"),
         ({"motion": {"speed": 1}}, "motion.speed: is not a field of this format"),
-        (
-            {"motion": {"path": {"kind": "lanes", "lane_ids": ["Lane7"]}}},
-            "Agent3: Lane7 is no lane of the scene; its lanes: Lane1, Lane2",
-        ),
-        (
-            {"motion": {"start": {"kind": "place", "agent_id": "x", "x_m": 0, "y_m": 0}}},
-            "Agent3: it waits for x",
-        ),
+        ({"motion": {"path": {"kind": "lanes", "lane_ids": ["Lane7"]}}},
+         "Agent3: Lane7 is no lane of the scene; its lanes: Lane1, Lane2"),
+        ({"motion": {"start": {"kind": "place", "agent_id": "x", "x_m": 0, "y_m": 0}}},
+         "Agent3: it waits for x"),
     ],
-)
+)  # fmt: skip
 def test_what_can_not_be_carried_out_is_told(changes: dict[str, object], said: str) -> None:
     answer = PoseTool(two_lanes()).answer(SETS_OUT | changes)
     assert str(answer["error"]).startswith(said)

@@ -8,11 +8,8 @@ from augment.variants.recipes import FC, FC_PLUS, TQA, Keep, Recipe, find_recipe
 @pytest.mark.parametrize("name", ["otm", "OTM", " Otm "])
 def test_a_recipe_is_found_in_any_case(name: str) -> None:
     found = find_recipe(name)
-    assert (found.lane_format, found.tools, found.review) == (
-        LaneFormat.POLYLINE,
-        Tools.NONE,
-        None,
-    )
+    parts = (found.lane_format, found.tools, found.review)
+    assert parts == (LaneFormat.POLYLINE, Tools.NONE, None)
 
 
 @pytest.mark.parametrize(

@@ -111,9 +111,7 @@ def test_without_an_accepted_round_the_last_counts_and_is_marked() -> None:
         ([questions(), Reply(text="", finish_reason="content_filter")], "mev"),
     ],
 )
-def test_a_visual_review_that_fails_anywhere_is_unusable(
-    script: list[str | Reply], roles: str
-) -> None:
+def test_a_visual_review_that_fails_is_unusable(script: list[str | Reply], roles: str) -> None:
     play = Play("vqa", [car(21.4), *script])
     assert (play.roles, play.outcome.status) == (roles, OutcomeStatus.DONE)
     assert play.outcome.is_accepted is None

@@ -113,10 +113,7 @@ def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> No
     calls = document["tool_calls"]
     assert isinstance(calls, list)
     assert calls[0]["extra_content"] == {"google": {"thought_signature": "abc"}}
-    assert [(one.speaker, one.answers) for one in told] == [
-        (Speaker.TOOL, "c0"),
-        (Speaker.TOOL, "c1"),
-    ]
+    assert [(one.speaker, one.answers) for one in told] == [("tool", "c0"), ("tool", "c1")]
     assert json.loads(told[0].text)["y_m"] == 0.5
     assert (second.tool_choice, play.x_m) == (ToolChoice.AUTO, 21.4)
 
@@ -154,9 +151,7 @@ def test_the_papers_function_returns_one_pose_and_nothing_else(native_calls: boo
         ({"lateral_m": 0.5}, "lateral_m: is not a field of this format"),
     ],
 )
-def test_what_the_papers_function_can_t_answer_goes_back_as_text(
-    changes: dict[str, object], said: str
-) -> None:
+def test_what_it_can_t_answer_goes_back_as_text(changes: dict[str, object], said: str) -> None:
     call = {"call": "retrieve_suitable_pose", "arguments": THERE | changes}
     play = Play("fc", [json.dumps(call), car(21.4)])
     (result,) = results(play.client.requests[1].messages[-1])
