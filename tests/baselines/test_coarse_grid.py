@@ -13,28 +13,19 @@ from hypothesis import strategies as st
 from augment.baselines import coarse_grid, rule_placer
 from augment.baselines.coarse_grid import Code, Direction, quantise
 from augment.baselines.registry import PLACERS
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import AgentType
 from bench.displacement import made, measured
 from tests.fixtures.shelf import SLUGS
 from tests.intents import parked
 from tests.scenes import scene as street
+from tests.scenes import vehicle
 
 PARKED = parked(22.0)
 SEEDS = 2
 
 
-def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float = 0.0) -> Code:
-    agent = TrafficAgent(
-        id="Agent2",
-        type=AgentType.VEHICLE,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        width_m=2.0,
-        length_m=4.8,
-        speed_mps=speed_mps,
-    )
-    return quantise(agent)
+def code_of(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float = 0.0) -> Code:
+    return quantise(vehicle("Agent2", x_m, y_m, heading_rad, speed_mps=speed_mps))
 
 
 @pytest.mark.parametrize(
@@ -42,29 +33,26 @@ def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float =
     [(4.9, 0.0, 0), (5.0, 0.0, 1), (30.0, 40.0, 10), (71.9, 0.0, 14), (200.0, 0.0, 14)],
 )
 def test_bins_are_of_the_straight_line_up_to_72_m(x_m: float, y_m: float, number: int) -> None:
-    assert vehicle(x_m, y_m).distance_bin == number
+    assert code_of(x_m, y_m).distance_bin == number
 
 
 @pytest.mark.parametrize(
     ("degrees", "direction"),
     [
-        (44, Direction.SAME),
-        (-44, Direction.SAME),
-        (46, Direction.ACROSS_TO_LEFT),
-        (-134, Direction.ACROSS_TO_RIGHT),
-        (136, Direction.OPPOSITE),
+        *((44, Direction.SAME), (-44, Direction.SAME), (46, Direction.ACROSS_TO_LEFT)),
+        *((-134, Direction.ACROSS_TO_RIGHT), (136, Direction.OPPOSITE)),
         (-179, Direction.OPPOSITE),
     ],
 )
 def test_directions_are_to_45_degrees(degrees: float, direction: Direction) -> None:
-    assert vehicle(10.0, 0.0, math.radians(degrees)).direction is direction
+    assert code_of(10.0, 0.0, math.radians(degrees)).direction is direction
 
 
 @given(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0), st.floats(-3.1, 3.1), st.floats(0.0, 19.0))
 def test_nothing_finer_than_the_code_gets_through(
     x_m: float, y_m: float, heading_rad: float, speed_mps: float
 ) -> None:
-    code = vehicle(x_m, y_m, heading_rad, speed_mps)
+    code = code_of(x_m, y_m, heading_rad, speed_mps)
     assert 0 <= code.distance_bin <= 14
     assert abs(code.speed_mps - speed_mps) <= 2.5
 
@@ -74,7 +62,6 @@ def test_it_stands_on_a_centreline_within_its_code() -> None:
     (right,) = rule_placer.place(scene, PARKED, seed=3).modification.added
     placed = coarse_grid.place(scene, PARKED, seed=3)
     (made,) = placed.modification.added
-    assert made.lane_id is not None
     lane = next(lane for lane in scene.lanes if lane.id == made.lane_id)
     assert lane.centerline.project(made.x_m, made.y_m).distance_m < 0.01
     assert quantise(made) == quantise(right)

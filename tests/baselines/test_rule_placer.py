@@ -121,9 +121,7 @@ def test_the_papers_offset_is_drawn_from_its_range_by_the_seed() -> None:
         (towards(LateralTarget.KERB, how=Nearness.HALF_OUT), -1.75),
     ],
 )
-def test_sides_are_those_of_the_ego_and_the_kerb_that_of_the_map(
-    lateral: Lateral, y_m: float
-) -> None:
+def test_sides_are_the_egos_and_the_kerb_is_that_of_the_map(lateral: Lateral, y_m: float) -> None:
     (car,) = added(scene(), parked(lateral=lateral))
     assert (car.x_m, car.y_m) == (21.4, y_m)
 
@@ -167,9 +165,7 @@ def on_shoulder(target: LateralTarget) -> Lateral:
         (scene(), cones(20.0, 5, Shape.TAPER, spacing=metres(0.2)), "stand in each other"),
     ],
 )
-def test_what_the_map_has_no_room_for_is_refused(
-    shown: Scene, intent: Intent, reason: str
-) -> None:
+def test_what_has_no_room_on_the_map_is_refused(shown: Scene, intent: Intent, reason: str) -> None:
     if shown.lanes == ():
         shown = replace(shown, ego=replace(shown.ego, lane_id=None))
     assert reason in refusal(shown, intent)
@@ -218,7 +214,6 @@ def test_a_pedestrian_crosses_from_edge_to_edge(
 ) -> None:
     (walker,) = added(scene(), walk(18.0, side))
     assert walker.type is AgentType.PEDESTRIAN
-    assert walker.walk_to_m is not None
     assert (walker.x_m, walker.y_m) == pytest.approx(start, abs=0.26)
     assert walker.walk_to_m == pytest.approx(end, abs=0.26)
     assert walker.heading_rad == pytest.approx(heading_rad, abs=1e-4)
@@ -288,7 +283,6 @@ def test_the_checks_find_nothing_in_a_placement(slug: str) -> None:
 @pytest.mark.parametrize("slug", SLUGS)
 def test_what_is_asked_for_is_placed_beside_its_reference(slug: str) -> None:
     reference = entry(slug).reference
-    assert reference is not None
     placement = placed(slug)
     apply(shown_scene(slug), placement.modification)
     made = placement.modification.added
@@ -306,15 +300,12 @@ def test_what_is_asked_for_is_placed_beside_its_reference(slug: str) -> None:
 @pytest.mark.parametrize("slug", [slug for slug in SLUGS if slug.startswith("jaywalker")])
 def test_walks_begin_and_end_beside_those_of_the_reference(slug: str) -> None:
     reference = entry(slug).reference
-    assert reference is not None
     pairs = zip(
         of_type(placed(slug).modification.added, AgentType.PEDESTRIAN),
         of_type(reference.added, AgentType.PEDESTRIAN),
         strict=True,
     )
     for walker, wanted in pairs:
-        assert walker.walk_to_m is not None
-        assert wanted.walk_to_m is not None
         assert (walker.x_m, walker.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1.5)
         assert walker.walk_to_m == pytest.approx(wanted.walk_to_m, abs=2.0)
 
@@ -328,10 +319,8 @@ def test_the_papers_vehicle_stands_on_the_egos_lane(realdata: Path, frame: int) 
     assert apply(scene, modification).agents == (car,)
     graph = LaneGraph(scene)
     own = scene.ego.lane_id or graph.under(0.0, 0.0, 0.0)
-    assert own is not None
     start_m = graph.lane(own).centerline.project(0.0, 0.0).s_m
     asked = graph.along(own, start_m, 21.4)
-    assert asked is not None
     seen = asked.pose.pose_to_local(car.pose)
     assert seen.x_m == pytest.approx(0.0, abs=0.01)
     assert 0.0 <= seen.y_m <= 1.5
@@ -351,9 +340,7 @@ def test_each_member_has_a_number_of_the_range_and_stands_where_it_says() -> Non
     members = sample_family(scene(), cars(15.0, 40.0), count=8, seed=3)
     places = []
     for member in members:
-        assert member.modification is not None
         distance = member.intent.requests[0].spot.distance
-        assert distance is not None
         assert not distance.is_range
         assert 15.0 <= distance.low_m <= 40.0
         findings = check_against_intent(Ground.of(scene()), member.modification, member.intent)

@@ -36,7 +36,7 @@ def pixels_of(png: bytes) -> np.ndarray:
 def braking(start: AtTime | NearEgo) -> TrafficAgent:
     """A car that drives 10 m/s and stands 2 s after its start: 10 m later."""
     motion = PlannedMotion(speeds=((2.0, 0.0),), start=start)
-    return replace(vehicle("New1", 20.0, 0.0), speed_mps=10.0, lane_id="Lane1", motion=motion)
+    return vehicle("New1", 20.0, 0.0, speed_mps=10.0, lane_id="Lane1", motion=motion)
 
 
 @pytest.mark.parametrize(
@@ -49,9 +49,7 @@ def braking(start: AtTime | NearEgo) -> TrafficAgent:
         (NearEgo(within_m=5.0), []),
     ],
 )
-def test_a_trail_has_a_spot_each_second_since_it_sets_out(
-    start: AtTime | NearEgo, places_m: list[float]
-) -> None:
+def test_a_trail_has_a_spot_each_second(start: AtTime | NearEgo, places_m: list[float]) -> None:
     (trail,) = find_trails(STREET, Modification(added=(braking(start),)))
     assert trail.sets_out == bool(places_m)
     assert [spot.x_m for spot in trail.spots] == pytest.approx(places_m)
@@ -92,7 +90,7 @@ def test_a_picture_shows_a_trail_and_one_without_has_the_palette_that_it_had() -
 
 
 def test_in_filmed_pictures_who_holds_a_velocity_looks_as_if_a_motion_said_so() -> None:
-    bus = replace(vehicle("New1", 20.0, 0.0), speed_mps=6.0, lane_id="Lane1")
+    bus = vehicle("New1", 20.0, 0.0, speed_mps=6.0, lane_id="Lane1")
     said = replace(bus, motion=PlannedMotion())
     changes = [Modification(added=(one,)) for one in (bus, said)]
     camera = camera_for(STREET, changes[1])
@@ -148,7 +146,7 @@ def test_who_stands_is_one_pose_and_who_is_never_in_the_window_is_left_out() -> 
 
 def test_a_window_widens_for_a_way_but_never_loses_who_is_changed_for_it() -> None:
     way = PlannedMotion(path=PointPath(points_m=((30.0, -55.0),)), speeds=((0.0, 14.0),))
-    crossing = replace(vehicle("New1", 30.0, 45.0, -math.pi / 2), motion=way)
+    crossing = vehicle("New1", 30.0, 45.0, -math.pi / 2, motion=way)
     camera = camera_for(STREET, Modification(added=(crossing,)))
     assert camera.shows(crossing.box.corners_m)
     still = camera_for(STREET, Modification(added=(replace(crossing, motion=None),)))

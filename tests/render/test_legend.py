@@ -10,7 +10,7 @@ VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 400.0], "width": 1200, "height": 800
 
 
 def test_traffic_junctions_and_goals_are_named_where_they_are_drawn() -> None:
-    moving = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=5.0)
+    moving = vehicle("Agent2", 20.0, 0.0, speed_mps=5.0)
     assert scene_keys(scene(agents=(moving,)), VIEW) >= {"recorded", "motion"}
     far = replace(moving, x_m=500.0)
     assert not scene_keys(scene(agents=(far,)), VIEW) & {"recorded"}
@@ -21,7 +21,7 @@ def test_traffic_junctions_and_goals_are_named_where_they_are_drawn() -> None:
 def test_a_change_names_its_marks_and_what_lies_outside() -> None:
     change = Modification(
         added=(
-            replace(vehicle("Added1", 20.0, 0.0), type=AgentType.BUS),
+            vehicle("Added1", 20.0, 0.0, type=AgentType.BUS),
             cone("Added2", 10.0, 1.0),
             pedestrian("Added3", 15.0, -4.0, (15.0, 4.0)),
         )

@@ -9,20 +9,12 @@ from augment.render import palette
 from augment.render.palette import Colour
 
 # Machado, Oliveira and Fernandes (2009), full severity, for linear RGB.
-PROTANOPIA = np.array(
-    [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ]
-)
-DEUTERANOPIA = np.array(
-    [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ]
-)
+PROTANOPIA, DEUTERANOPIA = np.array([
+    [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+     [-0.003882, -0.048116, 1.051998]],
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+     [-0.011820, 0.042940, 0.968881]],
+])  # fmt: skip
 
 
 def linear(colour: Colour) -> np.ndarray:

@@ -55,10 +55,8 @@ def test_arrows_stay_inside_and_apart(count: int) -> None:
     boxes = [badge.box_px for badge in found] + [SCALE]
     assert all(apart(one, other) for one, other in combinations(boxes, 2))
     for left, top, right, bottom in boxes:
-        assert left >= 0.0
-        assert top >= 0.0
-        assert right <= 1200.0
-        assert bottom <= 800.0
+        assert 0.0 <= left < right <= 1200.0
+        assert 0.0 <= top < bottom <= 800.0
 
 
 def test_arrows_keep_clear_of_the_marks_that_are_seen() -> None:
@@ -106,17 +104,9 @@ def test_every_edited_object_and_every_lane_near_it_carries_its_label(monkeypatc
 
 def test_what_is_small_is_shown_enlarged_as_well() -> None:
     base = scene()
-    assert (
-        len(
-            draw_for_review(
-                base, Modification(added=(vehicle("Agent2", 15.0, 0.0),)), camera_for(base, None)
-            )
-        )
-        == 1
-    )
-    bicycle = replace(
-        vehicle("Agent2", 15.0, 0.0), type=AgentType.BICYCLE, length_m=1.8, width_m=0.6
-    )
+    large = Modification(added=(vehicle("Agent2", 15.0, 0.0),))
+    assert len(draw_for_review(base, large, camera_for(base, None))) == 1
+    bicycle = vehicle("Agent2", 15.0, 0.0, type=AgentType.BICYCLE, length_m=1.8, width_m=0.6)
     change = Modification(added=(bicycle,))
     whole, closer = (pixels(png) for png in draw_for_review(base, change, camera_for(base, None)))
     blue = [

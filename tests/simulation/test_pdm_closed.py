@@ -65,7 +65,6 @@ def judged_among(states: FloatArray, objects: Objects, road: Road | None = None)
 def test_fifteen_proposals_by_default_of_the_release_and_45_of_the_paper() -> None:
     for offsets, count in [(ORIGINAL_OFFSETS_M, 15), (None, 45)]:
         plan = planned([]) if offsets is None else planned([], offsets_m=offsets)
-        assert plan.proposals is not None
         assert plan.proposals.states.shape == (count, 41, 6)
         assert plan.poses.shape == (81, 3)
 
@@ -89,7 +88,7 @@ def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
         ("a parked car", [vehicle("A", 20.0, 0.0)], 0.0),
         ("a person", [pedestrian("A", 20.0, 0.0)], 0.0),
         ("a cone", [cone("A", 20.0, 0.0)], 0.5),
-        ("a car from behind", [replace(vehicle("A", -10.0, 0.0), speed_mps=12.0)], 1.0),
+        ("a car from behind", [vehicle("A", -10.0, 0.0, speed_mps=12.0)], 1.0),
     ],
 )
 def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: float) -> None:
@@ -104,10 +103,8 @@ def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: f
         (-0.59, 8.0, 1.0, 1.0),
         (-0.61, 8.0, 0.0, 1.0),
         # Up to 2 m the wrong way in 4 s are free, up to 6 m half.
-        (3.5, 0.49, 1.0, 1.0),
-        (3.5, 0.51, 1.0, 0.5),
-        (3.5, 1.49, 1.0, 0.5),
-        (3.5, 1.51, 1.0, 0.0),
+        *((3.5, 0.49, 1.0, 1.0), (3.5, 0.51, 1.0, 0.5)),
+        *((3.5, 1.49, 1.0, 0.5), (3.5, 1.51, 1.0, 0.0)),
     ],
 )
 def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
@@ -145,7 +142,7 @@ def test_time_to_collision_looks_0_9_s_ahead_of_every_state(gap_m: float, ttc: f
 def test_of_each_object_the_first_meeting_ahead_of_time_counts(from_m: float, ttc: float) -> None:
     # It would come from the side at once: that matters only to an ego whose rear axle, 1.46 m
     # behind its centre, is in an intersection. Later on it would be met in front, or in one.
-    crossing = replace(vehicle("A", 1.0, 6.5, -math.pi / 2.0), speed_mps=8.0)
+    crossing = vehicle("A", 1.0, 6.5, -math.pi / 2.0, speed_mps=8.0)
     rim = ((from_m, -3.0), (60.0, -3.0), (60.0, 6.0), (from_m, 6.0))
     area = Area(id="Area1", kind=AreaKind.INTERSECTION, boundary_m=rim)
     road = Road(replace(street(), areas=(area,)))
@@ -158,7 +155,6 @@ def test_who_stands_beside_the_rear_half_of_the_ego_is_a_leader_on_the_path_ther
     ends = []
     for agents in ([], [vehicle("A", -0.7, 4.2)]):
         plan = planned(agents, speed_mps=0.0)
-        assert plan.proposals is not None
         left = PAPER_OFFSETS_M.index(3.0) * 5 + 4
         ends.append(plan.proposals.states[left, -1, 3])
     assert ends[1] < 0.1 < 4.0 < ends[0]
@@ -173,7 +169,6 @@ def test_it_brakes_only_slowly_driven_and_soon_hit() -> None:
 def test_where_every_proposal_fails_it_keeps_to_the_centreline() -> None:
     wall = [vehicle(f"A{n}", 12.0, y, math.pi / 2.0) for n, y in enumerate((-6.0, -1.0, 4.0, 9.0))]
     plan = planned(wall, speed_mps=9.0)
-    assert plan.proposals is not None
     assert plan.proposals.scores.max() == 0.0
     assert plan.proposals.chosen == 0
     assert plan.poses[:, 1] == pytest.approx(np.zeros(81), abs=1e-9)
@@ -216,13 +211,8 @@ def test_one_walker_who_steps_out_late_makes_a_slow_ego_brake(
 
 
 def test_the_published_vector() -> None:
-    driver = Idm(
-        min_gap_m=2.0,
-        headway_s=1.5,
-        max_acceleration_mps2=0.73,
-        max_deceleration_mps2=1.67,
-        exponent=4.0,
-    )
+    limits = {"max_acceleration_mps2": 0.73, "max_deceleration_mps2": 1.67}
+    driver = Idm(min_gap_m=2.0, headway_s=1.5, exponent=4.0, **limits)
     # Ego at 5 m with 3 m/s; the leader's front at 15 m, 5 m long, 2 m/s.
     found = driver.acceleration(np.array(3.0), np.array(30.0), np.array(5.0), np.array(2.0))
     assert found == pytest.approx(-1.073366, abs=1e-6)
@@ -252,7 +242,7 @@ def test_a_free_road_pulls_with_all_that_is_left() -> None:
 def test_traffic_settles_at_the_steady_gap_and_its_sweep() -> None:
     # A leader that holds 5 m/s; the follower's limit is 10 m/s.
     road = Road(street(3000.0))
-    follower = replace(vehicle("Agent2", 0.0, 0.0), speed_mps=5.0)
+    follower = vehicle("Agent2", 0.0, 0.0, speed_mps=5.0)
     drivers = LaneDrivers([follower], road)
     leader_m = 30.0
     for _ in range(700):
@@ -282,7 +272,6 @@ def advance_m(drive: Drive) -> float:
 
 def test_offsets_to_4_m_pass_a_parked_car_at_which_the_original_ones_wait() -> None:
     scene, parked = without_traffic(shown_scene(SLUG)), entry(SLUG).reference
-    assert parked is not None
     road, setting = Road(scene), DriveSetting(scene=scene, modification=parked)
     wide, narrow = (
         run(setting, PdmClosed(offsets), road=road, steps=STEPS)
@@ -295,7 +284,6 @@ def test_offsets_to_4_m_pass_a_parked_car_at_which_the_original_ones_wait() -> N
 def test_the_documented_planner_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     page = (ROOT / "docs" / "simulation.md").read_text()
     found = re.search(r"```python\n(.*?)```", page, re.S)
-    assert found is not None
     module = ModuleType("my_planners")
     exec(compile(found.group(1), "my_planners", "exec"), module.__dict__)
     monkeypatch.setitem(__import__("sys").modules, "my_planners", module)

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from augment.scene.entities import Modification, ScenarioType, Scene, TrafficAgent
-from augment.simulation.drive import Expert, ExpertKind
+from augment.simulation.drive import Drive, Expert, ExpertKind
 from augment.simulation.score import (
     Metric,
     Score,
@@ -101,12 +102,8 @@ def test_the_drivable_area_allows_less_than_30_cm(y_m: float, expected: float) -
 @pytest.mark.parametrize(
     ("speed", "ratio", "enough"),
     [
-        (8.0, 1.0, 1.0),
-        (4.0, 0.5, 1.0),
-        (1.61, 0.20125, 1.0),
-        (1.59, 0.19875, 0.0),
-        (9.0, 1.0, 1.0),
-        (-8.0, 0.0, 0.0),
+        *((8.0, 1.0, 1.0), (4.0, 0.5, 1.0), (1.61, 0.20125, 1.0), (1.59, 0.19875, 0.0)),
+        *((9.0, 1.0, 1.0), (-8.0, 0.0, 0.0)),
     ],
 )
 def test_progress_is_a_share_of_the_experts(speed: float, ratio: float, enough: float) -> None:
@@ -149,15 +146,11 @@ def test_who_is_beside_an_ego_in_its_lane_does_not_count_as_a_coming_collision()
 @pytest.mark.parametrize(
     ("limit", "speed", "expected"),
     [
-        (10.0, 10.0, 1.0),
-        (10.0, 11.115, 1.0 - 151 / 150 * 0.5),
-        (10.0, 13.0, 0.0),
-        (None, 30.0, None),
+        *((10.0, 10.0, 1.0), (10.0, 11.115, 1.0 - 151 / 150 * 0.5)),
+        *((10.0, 13.0, 0.0), (None, 30.0, None)),
     ],
 )
-def test_overspeed_is_integrated(
-    limit: float | None, speed: float, expected: float | None
-) -> None:
+def test_overspeed_is_summed_up(limit: float | None, speed: float, expected: float | None) -> None:
     score = scored(np.full(151, speed), on=street(600.0, limit_mps=limit))
     assert value(score, "speed_limit_compliance") == (
         None if expected is None else pytest.approx(expected)
@@ -172,26 +165,22 @@ def test_comfort_is_all_or_nothing(pull: float, expected: float) -> None:
 
 
 def test_multipliers_multiply_and_what_is_unknown_does_not_count() -> None:
-    metrics = (
-        Metric("a", 0.5),
-        Metric("b", None),
-        Metric("c", 0.4, 5.0),
-        Metric("d", 1.0, 1.0),
-        Metric("e", None, 100.0),
+    rows = (("a", 0.5), ("b", None), ("c", 0.4, 5.0), ("d", 1.0, 1.0), ("e", None, 100.0))
+    assert combine(tuple(Metric(*row) for row in rows)) == pytest.approx(
+        0.5 * (5.0 * 0.4 + 1.0) / 6.0
     )
-    assert combine(metrics) == pytest.approx(0.5 * (5.0 * 0.4 + 1.0) / 6.0)
+
+
+def by_interplan(drive: Drive, kind: ScenarioType, change: Modification) -> Score:
+    more: dict[str, Any] = {"kind": ScoreKind.INTERPLAN, "scenario_type": kind}
+    return score_drive(drive, FAR, modification=change, **more)
 
 
 @pytest.mark.parametrize("scenario_type", list(ScenarioType))
 def test_interplan_lets_four_types_use_the_other_lane(scenario_type: ScenarioType) -> None:
     parked = Modification(added=(vehicle("A", 60.0, 0.0),))
-    score = score_drive(
-        driven(states_along(STEADY, y_m=3.5)),
-        FAR,
-        kind=ScoreKind.INTERPLAN,
-        scenario_type=scenario_type,
-        modification=parked,
-    )
+    drive = driven(states_along(STEADY, y_m=3.5))
+    score = by_interplan(drive, scenario_type, parked)
     weights = {metric.name: metric.weight for metric in score.metrics}
     if scenario_type is ScenarioType.JAYWALKER:
         assert weights["driving_direction_compliance"] is None
@@ -212,13 +201,8 @@ def test_interplan_wants_the_furthest_obstacle_passed(
 ) -> None:
     # 60 of the expert's 120 m: half of its way.
     parked = Modification(added=(furthest, cone("B", 20.0, 5.0)))
-    score = score_drive(
-        driven(states_along(np.full(151, speed))),
-        FAR,
-        kind=ScoreKind.INTERPLAN,
-        scenario_type=ScenarioType.NUDGE,
-        modification=parked,
-    )
+    drive = driven(states_along(np.full(151, speed)))
+    score = by_interplan(drive, ScenarioType.NUDGE, parked)
     assert value(score, "ego_passed_obstacles") == expected
 
 

@@ -19,12 +19,8 @@ def tried(value: float, tested: str, **others: float) -> TriedValue:
 @pytest.mark.parametrize(
     ("outcomes", "edges"),
     [
-        ("--++", ((3.0, 2.0),)),
-        ("++--", ((2.0, 3.0),)),
-        ("+-+", ((1.0, 2.0), (3.0, 2.0))),
-        ("++", ()),
-        ("--", ()),
-        ("", ()),
+        *(("--++", ((3.0, 2.0),)), ("++--", ((2.0, 3.0),)), ("+-+", ((1.0, 2.0), (3.0, 2.0)))),
+        *(("++", ()), ("--", ()), ("", ())),
     ],
 )
 def test_edges_lie_where_the_outcome_changes(
@@ -48,14 +44,12 @@ def test_the_hardest_is_failed_by_the_planner_and_solved_with_the_least_score() 
         tried(5.0, "", idm=0.2),  # the planner has not driven it
     ]
     hardest = find_hardest(values)
-    assert hardest is not None
     assert hardest.value == 2.0
     assert find_hardest([values[0], *values[3:]]) is None
 
 
 def test_of_equally_hard_ones_the_furthest_from_what_the_planner_passes_is_kept() -> None:
     hardest = find_hardest([tried(1.0, "+"), tried(2.0, "-", pdm=0.5), tried(3.0, "-", pdm=0.5)])
-    assert hardest is not None
     assert hardest.value == 3.0
 
 

@@ -8,10 +8,8 @@ import pytest
 
 from augment.checks import Ground
 from augment.checks.wish import measure_wish
-from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     InterplanRules,
-    LaneConnector,
     Modification,
     SceneOptions,
     TrafficAgent,
@@ -26,7 +24,7 @@ from augment.simulation.road import Road
 from augment.simulation.states import Objects, start_state
 from augment.simulation.traffic import DriveSetting, Traffic
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
-from tests.scenes import pedestrian, vehicle
+from tests.scenes import connector, pedestrian, vehicle
 from tests.simulation.places import assert_everybody_is_at_one_place, place
 from tests.simulation.worlds import BODY, street, track
 
@@ -75,7 +73,7 @@ def test_by_interplans_rules_a_walk_lasts_longer_the_later_it_begins(
 
 @pytest.mark.parametrize("keeps_rule", [False, True])
 def test_a_moving_vehicle_keeps_its_lane_and_reacts_to_the_ego(keeps_rule: bool) -> None:
-    behind = replace(vehicle("V", -30.0, 0.3), speed_mps=6.0)
+    behind = vehicle("V", -30.0, 0.3, speed_mps=6.0)
     setting = with_agents(behind)
     made = after(by_interplans_rules(setting) if keeps_rule else setting, 150)
     x, y = place(made[-1], "V")
@@ -98,22 +96,15 @@ def test_everybody_is_at_one_place_in_checks_films_stills_and_drives(slug: str) 
 def test_so_it_is_where_others_drive_by_rules_and_where_a_recording_ends_early(
     goes_by_interplan: bool, lasts_s: float | None
 ) -> None:
-    setting = recorded(
-        modification=Modification(
-            added=(
-                replace(vehicle("New1", 60.0, 0.3), speed_mps=3.0),
-                replace(vehicle("New2", 35.0, 0.4), speed_mps=8.0),
-                vehicle("New3", 90.0, 0.0),
-                pedestrian("New4", 55.0, -6.0, (55.0, 6.0)),
-                replace(
-                    vehicle("New5", -30.0, 0.0),
-                    speed_mps=6.0,
-                    motion=PlannedMotion(speeds=((3.0, 9.0),)),
-                ),
-            )
-        )
+    faster = PlannedMotion(speeds=((3.0, 9.0),))
+    added = (
+        vehicle("New1", 60.0, 0.3, speed_mps=3.0),
+        vehicle("New2", 35.0, 0.4, speed_mps=8.0),
+        vehicle("New3", 90.0, 0.0),
+        pedestrian("New4", 55.0, -6.0, (55.0, 6.0)),
+        vehicle("New5", -30.0, 0.0, speed_mps=6.0, motion=faster),
     )
-    assert setting.recording is not None
+    setting = recorded(modification=Modification(added=added))
     steps = round(10.0 * (lasts_s or 0.0)) + 1
     shorter = Recording(
         times_s=setting.recording.times_s[:steps],
@@ -132,29 +123,22 @@ def test_so_it_is_where_others_drive_by_rules_and_where_a_recording_ends_early(
 def test_who_is_to_drive_on_is_measured_by_the_rule_of_the_drive(
     goes_by_interplan: bool, least_m: float, most_m: float
 ) -> None:
-    holds = replace(vehicle("New1", 20.0, 0.0), speed_mps=5.0, motion=PlannedMotion())
+    holds = vehicle("New1", 20.0, 0.0, speed_mps=5.0, motion=PlannedMotion())
     setting = with_agents(holds)
     setting = by_interplans_rules(setting) if goes_by_interplan else setting
     spot = Spot(distance=Length(low_m=20.0, high_m=20.0), lane=LaneChoice.OWN)
     asked = VehicleRequest(spot=spot, body=Body.CAR, speed_mps=5.0, count=1)
     ground = Ground.of(setting.scene, expect_recording)
     measured = measure_wish(ground, setting.modification, Intent(requests=(asked,)))
-    assert measured is not None
     # From 5 towards 10 m/s at 1 m/s^2: t^2 / 2 at first, 18 m after 6 s, 6 m in the mean.
     assert least_m <= measured.matches[0].distance_m <= most_m
 
 
 def test_interplans_drivers_stop_at_a_red_light_and_ours_hold_their_speed() -> None:
     plain = street(60.0)
-    crossing = LaneConnector(
-        id="Connector1",
-        from_lane="Lane1",
-        to_lane=None,
-        centerline=Polyline([(60.0, 0.0), (200.0, 0.0)]),
-        width_m=3.5,
-        traffic_light=TrafficLight.RED,
-    )
-    driver = replace(vehicle("V", 20.0, 0.0), speed_mps=8.0)
+    line, red = [(60.0, 0.0), (200.0, 0.0)], TrafficLight.RED
+    crossing = connector("Connector1", "Lane1", None, line, traffic_light=red)
+    driver = vehicle("V", 20.0, 0.0, speed_mps=8.0)
     setting = DriveSetting(
         scene=replace(plain, connectors=(crossing,)), modification=Modification(added=(driver,))
     )
@@ -164,13 +148,13 @@ def test_interplans_drivers_stop_at_a_red_light_and_ours_hold_their_speed() -> N
 
 
 def test_a_velocity_is_held_through_who_stands_there() -> None:
-    driver = replace(vehicle("V", 20.0, 0.3), speed_mps=8.0)
+    driver = vehicle("V", 20.0, 0.3, speed_mps=8.0)
     made = after(with_agents(driver, vehicle("W", 60.0, 0.0)), 100)
     assert place(made[100], "V") == pytest.approx((100.0, 0.3))
 
 
 def test_in_interplans_scenarios_a_driver_that_starts_in_somebody_is_dropped() -> None:
-    inside = with_agents(replace(vehicle("V", 3.0, 0.0), speed_mps=5.0))
+    inside = with_agents(vehicle("V", 3.0, 0.0, speed_mps=5.0))
     assert after(by_interplans_rules(inside), 0)[0].ids == ()
     assert after(inside, 0)[0].ids == ("V",)
 
@@ -206,7 +190,6 @@ def test_a_recording_is_replayed() -> None:
 
 def test_a_recording_with_few_moments_is_read_as_films_read_it() -> None:
     setting = recorded()
-    assert setting.recording is not None
     thin = setting.recording
     thin = Recording(
         times_s=thin.times_s[::4],

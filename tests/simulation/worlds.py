@@ -89,7 +89,7 @@ def track(agent: TrafficAgent, states: FloatArray) -> Track:
 
 def recorded_street(length_s: float = 15.0) -> tuple[Scene, Recording]:
     """The ego at 8 m/s, a car 40 m ahead as fast, one parked beside the lane 60 m ahead."""
-    ahead = replace(vehicle("Agent2", 40.0, 0.0), speed_mps=8.0, lane_id="Lane1")
+    ahead = vehicle("Agent2", 40.0, 0.0, speed_mps=8.0, lane_id="Lane1")
     scene = replace(street(), agents=(ahead, vehicle("Agent3", 60.0, -3.2)))
     times_s = np.arange(round(length_s / STEP_S) + 1, dtype=np.float64) * STEP_S
     ego, *others = (
