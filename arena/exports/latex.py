@@ -11,15 +11,10 @@ from arena.rating.lines import UNKNOWN, count_text, votes_text
 _ESCAPES = str.maketrans(
     {
         "\\": r"\textbackslash{}",
-        "{": r"\{",
-        "}": r"\}",
-        "&": r"\&",
-        "%": r"\%",
-        "$": r"\$",
-        "#": r"\#",
-        "_": r"\_",
+        **{sign: f"\\{sign}" for sign in "{}&%$#_"},
         "~": r"\textasciitilde{}",
         "^": r"\textasciicircum{}",
+        "|": r"\textbar{}",
         "<": r"\textless{}",
         ">": r"\textgreater{}",
         "∞": r"$\infty$",
@@ -96,7 +91,11 @@ def latex_table(
         r"    \toprule",
         "    " + " & ".join(titles) + r"\\",
         r"    \midrule",
-        *("    " + " & ".join([model, *map(escape, rest)]) + r"\\" for model, *rest in rows),
+        # The end of a line takes a bracket or an asterisk behind it for its own.
+        *(
+            f"    {'{}' * name.startswith(('[', '*'))}{' & '.join([name, *map(escape, rest)])}\\\\"
+            for name, *rest in rows
+        ),
         r"    \bottomrule",
         *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
         r"    \end{tabular}",

@@ -16,7 +16,7 @@ from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, 
 from arena.exports.leaderboard import VOTES_FILE, list_columns, print_lines
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
-from arena.rating.lines import notes_by_reason
+from arena.rating.lines import notes_by_reason, votes_text
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
@@ -232,7 +232,7 @@ def _write_table(rated: RatedCsv) -> str:
     lines += ["", *(" ".join(f"{line}.".split()) for line in rated.missing)]
     board = rated.board
     if board.tie_share is not None:
-        lines.append(f"{rated.method}; {board.votes} votes; {board.tie_share:.1%} ties.")
+        lines.append(f"{rated.method}; {votes_text(board.votes, 0)}; {board.tie_share:.1%} ties.")
     if rated.told_apart is not None:
         models = len(board.lines)
         lines.append(
@@ -303,9 +303,9 @@ def _write_latex(rated: RatedCsv) -> str:
     heads, *cells = print_lines(board.standings, has_places=has_places)
     return latex_table(
         ((escape(name), *rest) for name, *rest in cells),
-        comments=(f"{rated.method}; {board.votes} votes", *rated.notes),
+        comments=(f"{rated.method}; {votes_text(board.votes, 0)}", *rated.notes),
         heads=heads,
-        notes=rated.missing,
+        notes=[*rated.missing, *board.reasons],
         caption=caption_text(
             rated.method,
             votes=board.votes,

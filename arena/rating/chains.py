@@ -20,7 +20,6 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     PairCounts,
-    select_votes,
 )
 from arena.rating.models import Meetings
 from arena.rating.rules import Unit
@@ -271,9 +270,10 @@ def judge_across(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
 def _find_shown_parts(votes: Comparisons, chains: Chains, unit: Unit) -> BoolArray:
     """(K,) which parts enough independent votes show to be above those that they reach."""
     is_across = chains.part_of[votes.first] != chains.part_of[votes.second]
-    votes = select_votes(votes, is_across)
-    number = _independent(votes, _winner_parts(votes, chains), len(chains.sizes), unit)
-    return np.asarray(number >= FEWEST_TO_TELL)
+    # Votes within a part are a group of their own, the last.
+    winner = np.where(is_across, _winner_parts(votes, chains), len(chains.sizes))
+    number = _independent(votes, winner, len(chains.sizes) + 1, unit)
+    return np.asarray(number[:-1] >= FEWEST_TO_TELL)
 
 
 def _winner_parts(votes: Comparisons, chains: Chains) -> IntArray:
@@ -284,7 +284,7 @@ def _winner_parts(votes: Comparisons, chains: Chains) -> IntArray:
 def _independent(votes: Comparisons, group: IntArray, groups: int, unit: Unit) -> FloatArray:
     """(G,) how many independent votes each group has, by the group (R,) of each row.
 
-    Votes of one cluster count as one. What there is only one of is left out.
+    Votes of one cluster count as one. What all votes have only one of is left out.
     """
     fewest = np.bincount(group, weights=votes.count, minlength=groups)
     for kind in unit.kinds:
@@ -292,5 +292,5 @@ def _independent(votes: Comparisons, group: IntArray, groups: int, unit: Unit) -
         # Group and cluster as one number: how many different clusters each group has.
         met = np.unique(group * len(codes) + cluster)
         different = np.bincount(met // max(len(codes), 1), minlength=groups)
-        fewest = np.where(different > 1, np.minimum(fewest, different), fewest)
+        fewest = np.minimum(fewest, different) if len(codes) > 1 else fewest
     return np.asarray(fewest, dtype=np.float64)

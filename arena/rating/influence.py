@@ -75,8 +75,9 @@ def rank_changes(strengths: FloatArray, without: FloatArray) -> list[int | None]
 
 # --- Single votes --------------------------------------------------------------------------------
 
-RIVALS, REFITTED = 20, 3
-"""So many of the next places are tried by influence, and so many of these by refits."""
+RIVALS, REFITTED, _EVEN = 20, 3, 1e-6
+"""So many of the next places are tried by influence, and so many of these by refits; who is ahead
+by less is level."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,8 +149,8 @@ def _first_without(
     games = counts.games - np.bincount(pairs, minlength=len(counts.low))
     scores = counts.scores - np.bincount(pairs, score, minlength=len(counts.low))
     strengths = _fits(counts, games[None], scores[None], start)[0]
-    new = None if np.isnan(strengths).any() else int(strengths.argmax())
-    return None if new == start.argmax() else new
+    lead = strengths.max() - strengths[start.argmax()]
+    return int(strengths.argmax()) if lead > _EVEN else None
 
 
 # --- Private -------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def rate_part(votes: Comparisons, rules: Rules) -> RatedGroup:
     intervals = _find_intervals(point, values, reference, rules)
     if intervals is None or (votes.score == 0.5).all():
         why = remarks.why_no_intervals(votes, rules.unit)
-        if why != remarks.NO_INTERVALS:
+        if not np.isnan(bootstrap.percentile_interval(values)).all():
             plain = replace(plain, note=(remarks.NOTHING_DIFFERS,) * len(votes.names))
         return replace(plain, explanation=(why,))
     average = float(point.rating[reference].mean())

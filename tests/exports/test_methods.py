@@ -36,6 +36,6 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     assert set(sheet["blank"]) >= {"1.1", "3.2.2", "3.2.3", "5.1"}
     assert all((answers[number] is None) == (number in sheet["blank"]) for number in answers)
     text = exported("latex")
-    assert "8 votes count; left out: 2 repeat." in text
+    assert "Counted: 8 votes; left out: 2 repeat." in text
     assert r"Recruitment: \textbf{[BLANK]}" in text
     assert "finn" not in text + json.dumps(sheet)

@@ -88,13 +88,12 @@ def test_latex_has_the_form_of_the_papers_table() -> None:
     ]
 
 
-def test_tex_specials_are_escaped() -> None:
-    assert escape("a_b & 5% of $x {#1} ~^\\") == (
-        r"a\_b \& 5\% of \$x \{\#1\} \textasciitilde{}\textasciicircum{}\textbackslash{}"
+def test_tex_specials_are_escaped_and_no_line_break_leaves_a_comment() -> None:
+    assert "    {}[x] " in latex(table(row("[x]")))
+    assert escape("a_b | 5% & $x {#1} ~^\\") == (
+        r"a\_b \textbar{} 5\% \& \$x \{\#1\} "
+        r"\textasciitilde{}\textasciicircum{}\textbackslash{}"
     )
-
-
-def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
     text = latex(table(row("x"), study="Round\n\\input{evil}"))
     assert all(line.startswith("%") for line in text.splitlines() if "evil" in line)
 

@@ -110,6 +110,8 @@ def test_six_wins_of_six_tell_two_apart_and_five_do_not(
 @pytest.mark.parametrize(("experts", "rank"), [(5, None), (6, 1)])
 def test_votes_of_few_experts_count_as_few(experts: int, rank: int | None) -> None:
     votes = spread(versus("a", "b", 300, 0, 0), experts=experts)
+    of_one_of_nine = spread(40 * [*versus("a", "b", 1, 0, 0), *versus("b", "c", 4, 0, 4)])
+    assert rate(of_one_of_nine, rounds=50).lines[0].rank is None
     assert rate(votes, unit=Unit.TWO_WAY, rounds=50).standings[0].rank == rank
     assert by_votes(votes, rounds=50).standings[0].rank == 1
 

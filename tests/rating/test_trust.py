@@ -134,8 +134,11 @@ def test_wins_and_ties_count_both_ways() -> None:
 
 
 def first_of(votes: Comparisons, rows: Sequence[int]) -> str | None:
+    """Who is ahead of all others, None for nobody."""
     strengths = bradley_terry(select_votes(votes, np.array(rows, dtype=np.int64)))
-    return None if strengths is None else votes.names[int(strengths.argmax())]
+    if strengths is None or np.ptp(np.sort(strengths)[-2:]) < 1e-9:
+        return None
+    return votes.names[int(strengths.argmax())]
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -17,8 +17,9 @@ from arena.exports.formats import formats, json_bytes
 from arena.exports.latex import escape
 from arena.models import Question, Snapshot
 from arena.rating.comparisons import Estimate
-from arena.rating.lines import votes_text
-from arena.rating.snapshot_document import BoardRemarks, Trust
+from arena.rating.lines import count_text, votes_text
+from arena.rating.rules import Unit
+from arena.rating.snapshot_document import Trust
 from arena.results.exports.tables import method_text
 from arena.results.queries.votes import Filters
 from arena.studies.services.opening import preregistration_sha256
@@ -73,7 +74,7 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "votes": votes_text(snapshot.votes_cast, snapshot.settled_ties),
         "left_out": ", ".join(f"{number} {reason}" for reason, number in left_out) or "none",
         "agreement": _tell_agreement(snapshot.results.trust),
-        "tests": _tell_tests(snapshot.results.board),
+        "tests": _tell_tests(snapshot),
         "preregistration": preregistration_sha256(study),
     }
 
@@ -126,8 +127,8 @@ def _render(name: str, methods: dict[str, Any]) -> str:
 def _tell_plan(snapshot: Snapshot, frozen: dict[str, Any]) -> str:
     plan = (
         f"A balanced plan ({frozen['product']['planner']}, seed {frozen['seed']}) chose pairs and "
-        f"sides before the first vote, {snapshot.study.votes_per_expert} pairs for each of "
-        f"{frozen['experts']} accounts"
+        f"sides before the first vote, {count_text(snapshot.study.votes_per_expert, 'pair|')} for "
+        f"each of {count_text(frozen['experts'], 'account|')}"
     )
     settled = len(frozen["rules"].get("identical", ()))
     if not settled:
@@ -151,33 +152,35 @@ def _tell_quality(rules: dict[str, Any]) -> str:
     return f"On top came {' and '.join(used)}; they are not rated, and no vote is removed by them"
 
 
-def _tell_tests(board: BoardRemarks) -> str:
+def _tell_tests(snapshot: Snapshot) -> str:
+    board = snapshot.results.board
     if board.above is None:
         why = "the intervals do not know how votes are clustered"
-        if board.seems_above is not None:
+        if board.seems_above is not None or 1 in (board.experts, board.scenarios):
             why = "too few experts or scenarios judged"
+        elif snapshot.resampling_unit == Unit.TWO_WAY:
+            why = "the votes bound no rating"
         return f"Differences of pairs are not tested: {why}"
     number = len(board.above)
-    verb = "differs" if number == 1 else "differ"
     if board.p_values is None:
         tested = "All pairs are tested at once"
     elif len(board.p_values) == 1:
         tested = "The one pair is tested"
     else:
         tested = f"All {len(board.p_values)} pairs are tested at once"
-    return f"{tested}, at an error of 5 % for the table; {number} {verb}"
+    return f"{tested}, at an error of 5 % for the table; {number} differ{'s' * (number == 1)}"
 
 
 def _tell_agreement(trust: Trust) -> str:
     parts = []
-    if trust.agreement is not None:
+    if trust.agreement and trust.agreement.units:
         alpha, units = _text(trust.agreement.alpha), trust.agreement.units
-        on = f"{units} pair{'s' * (units != 1)} that several experts judged"
+        on = count_text(units, "pair| that several experts judged")
         parts.append(f"Krippendorff's alpha (nominal) is {alpha} on {on}")
     if trust.repeats is not None:
         number, same = trust.repeats.number, _text(trust.repeats.same)
         parts.append(f"Of {number} hidden repeats a share of {same} was answered alike")
-    return "; ".join(parts) or "Agreement was not measured: no pair was judged twice"
+    return ". ".join(parts) or "Agreement was not measured: no pair was judged twice"
 
 
 def _text(estimate: Estimate) -> str:

@@ -133,7 +133,7 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
             *((table.frozen_text,) if table.frozen_text else ()),
             *table.warnings,
         ),
-        notes=table.missing,
+        notes=[*table.missing, *table.reasons],
         caption=f"{caption} ({', '.join(words)})" if words else caption,
     )
     return text.encode()

@@ -16,7 +16,7 @@ from arena.rating.influence import (
     without_each_expert,
 )
 from arena.rating.leaderboard import Leaderboard
-from arena.rating.lines import whole_percent
+from arena.rating.lines import count_text, whole_percent
 from arena.rating.models import to_elo
 from arena.rating.reliability import (
     Evidence,
@@ -103,8 +103,8 @@ def remark_on_ties(study: Study, votes: VoteSet, *, left_out: bool) -> str:
         "that nobody can tell apart were not shown and are left out."
         if left_out
         else f"The table says how contestants compare over all pairs of pictures: {settled} "
-        f"pairs that nobody can tell apart were not shown and count as {ties} ties, as many a "
-        "pair as others have votes on average."
+        "pairs that nobody can tell apart were not shown and count as "
+        f"{count_text(ties, 'tie|')}, as many a pair as others have votes on average."
     )
     return f"{sentence} {_on_those_shown(study, votes)}".strip()
 
