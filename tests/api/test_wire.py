@@ -49,17 +49,15 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
     assert "no-store" in response["Cache-Control"]
 
 
-@pytest.mark.parametrize(("letter", "stored"), [("A", "left"), ("E", "equal"), ("B", "right")])
-def test_a_vote_is_stored_and_answered_with_what_comes_next(
-    study: Study, letter: str, stored: str
-) -> None:
-    first, second, *_ = matchups_of(study, "eva")
-    answer = post(signed_in("eva"), body_for(first, letter, ms_visible=5100)).json()
-    assert (answer["saved"], answer["skipped"], answer["total"]) == (1, 0, 9)
-    assert answer["next"][0]["matchup"] == str(second.code)
-    assert len(answer["next"]) == 4
-    kept = Vote.objects.get()
-    assert (kept.matchup, kept.outcome, kept.ms_visible) == (first, stored, 5100)
+def test_a_vote_is_stored_and_answered_with_what_comes_next(study: Study) -> None:
+    client, mine = signed_in("eva"), matchups_of(study, "eva")
+    for number, (letter, stored) in enumerate({"A": "left", "E": "equal", "B": "right"}.items()):
+        answer = post(client, body_for(mine[number], letter, ms_visible=5100)).json()
+        assert (answer["saved"], answer["skipped"], answer["total"]) == (number + 1, 0, 9)
+        assert answer["next"][0]["matchup"] == str(mine[number + 1].code)
+        assert len(answer["next"]) == 4
+        kept = Vote.objects.latest("pk")
+        assert (kept.matchup, kept.outcome, kept.ms_visible) == (mine[number], stored, 5100)
 
 
 def test_the_same_key_again_is_answered_the_same(study: Study) -> None:
@@ -250,64 +248,58 @@ def test_a_pair_takes_so_many_reports_and_no_more(study: Study) -> None:
     assert [report(pairs[0], keys[0]), report(pairs[1], keys[10])] == [200, 200]
 
 
-@pytest.mark.parametrize(
-    ("whose", "changes", "status", "code"),
-    [
-        ("finn", {}, 404, "not_found"),
-        ("eva", {"reason": "dull"}, 422, "invalid"),
-        ("eva", {"comment": "x" * 1001}, 422, "invalid"),
-        ("eva", {"side": "left"}, 422, "invalid"),
-        ("eva", {"vote": 1}, 422, "invalid"),
-    ],
-)
-def test_a_report_that_can_not_be_kept_says_why(
-    study: Study, whose: str, changes: dict[str, object], status: int, code: str
-) -> None:
+def test_a_report_that_can_not_be_kept_says_why(study: Study) -> None:
     matchup = matchups_of(study, "eva")[0]
-    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other", **changes}
-    answer = signed_in(whose).post("/api/v1/reports", body, content_type="application/json")
-    error_of(answer, status, code)
+    body = {"key": str(uuid.uuid4()), "matchup": str(matchup.code), "reason": "other"}
+
+    def send(whose: str, **changes: object) -> Any:
+        sent = body | changes
+        return signed_in(whose).post("/api/v1/reports", sent, content_type="application/json")
+
+    error_of(send("finn"), 404, "not_found")
+    wrong = {"reason": "dull", "side": "left", "vote": 1, "comment": "x" * 1001}
+    for field, value in wrong.items():
+        error_of(send("eva", **{field: value}), 422, "invalid")
     assert not Report.objects.exists()
 
 
-@pytest.mark.parametrize(
-    ("changes", "field"),
-    [
-        ({"outcome": "left"}, "outcome"),
-        ({"outcome": None}, "outcome"),
-        ({"key": "1"}, "key"),
-        ({"key": 5}, "key"),
-        ({"matchup": 5}, "matchup"),
-        ({"supersedes": 5}, "supersedes"),
-        ({"matchup": None}, "matchup"),
-        ({"supersedes": "x"}, "supersedes"),
-        ({"ms_visible": -1}, "ms_visible"),
-        ({"ms_visible": "12"}, "ms_visible"),
-        ({"ms_visible": 2**31}, "ms_visible"),
-        ({"expert": "finn"}, "expert"),
-        ({"outcome": "skip"}, "reason"),
-        ({"outcome": "skip", "reason": "bored"}, "reason"),
-        ({"reason": "unclear"}, "reason"),
-        ({"reason": "\ud800"}, "reason"),
-        ({"\ud800": 1}, "\ud800"),
-        ({"both_miss": True}, "both_miss"),
-        ({"outcome": "E", "both_miss": True}, "both_miss"),
-        ({"both_miss": 1}, "both_miss"),
-        ({"comment": "x" * 1001}, "comment"),
-        ({"comment": 5}, "comment"),
-        ({"aids": ["glasses"]}, "aids"),
-        ({"aids": ["replay"]}, "aids"),
-        ({"aids": "zoom"}, "aids"),
-        ({"n": 0}, "n"),
-        ({"n": 13}, "n"),
-    ],
-)
-def test_a_bad_body_answers_422_with_the_field(
-    study: Study, changes: dict[str, object], field: str
-) -> None:
-    body = {**body_for(matchups_of(study, "eva")[0]), **changes}
-    error = error_of(post(signed_in("eva"), body), 422, "invalid")
-    assert list(error["fields"]) == [field]
+WRONG: list[tuple[dict[str, object], str]] = [
+    ({"outcome": "left"}, "outcome"),
+    ({"outcome": None}, "outcome"),
+    ({"key": "1"}, "key"),
+    ({"key": 5}, "key"),
+    ({"matchup": 5}, "matchup"),
+    ({"supersedes": 5}, "supersedes"),
+    ({"matchup": None}, "matchup"),
+    ({"supersedes": "x"}, "supersedes"),
+    ({"ms_visible": -1}, "ms_visible"),
+    ({"ms_visible": "12"}, "ms_visible"),
+    ({"ms_visible": 2**31}, "ms_visible"),
+    ({"expert": "finn"}, "expert"),
+    ({"outcome": "skip"}, "reason"),
+    ({"outcome": "skip", "reason": "bored"}, "reason"),
+    ({"reason": "unclear"}, "reason"),
+    ({"reason": "\ud800"}, "reason"),
+    ({"\ud800": 1}, "\ud800"),
+    ({"both_miss": True}, "both_miss"),
+    ({"outcome": "E", "both_miss": True}, "both_miss"),
+    ({"both_miss": 1}, "both_miss"),
+    ({"comment": "x" * 1001}, "comment"),
+    ({"comment": 5}, "comment"),
+    ({"aids": ["glasses"]}, "aids"),
+    ({"aids": ["replay"]}, "aids"),
+    ({"aids": "zoom"}, "aids"),
+    ({"n": 0}, "n"),
+    ({"n": 13}, "n"),
+]
+"""What a body is changed by, and the field that is named then."""
+
+
+def test_a_bad_body_answers_422_with_the_field(study: Study) -> None:
+    client, first = signed_in("eva"), matchups_of(study, "eva")[0]
+    for changes, field in WRONG:
+        error = error_of(post(client, {**body_for(first), **changes}), 422, "invalid")
+        assert list(error["fields"]) == [field], changes
     assert not Vote.objects.exists()
 
 
@@ -318,12 +310,10 @@ def test_a_body_too_deep_or_too_long_to_read_is_refused(study: Study) -> None:
     error_of(post(client, '{"key": "' + "x" * 3_000_000 + '"}'), 413, "too_large")
 
 
-@pytest.mark.parametrize(
-    "query", ["", "study=x", "study={code}&n=0", "study={code}&n=x", "study={code}&m=1"]
-)
-def test_a_bad_question_answers_422(study: Study, query: str) -> None:
-    address = f"/api/v1/matchups?{query.format(code=study.code)}"
-    assert error_of(signed_in("eva").get(address), 422, "invalid")["fields"]
+def test_a_bad_question_answers_422(study: Study) -> None:
+    for query in ("", "study=x", "study={code}&n=0", "study={code}&n=x", "study={code}&m=1"):
+        address = f"/api/v1/matchups?{query.format(code=study.code)}"
+        assert error_of(signed_in("eva").get(address), 422, "invalid")["fields"], query
 
 
 def test_without_a_session_the_answer_is_401(study: Study) -> None:

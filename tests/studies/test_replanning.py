@@ -75,24 +75,20 @@ def test_repeats_are_drawn_anew_for_who_takes_over() -> None:
         assert row.repeat_of.left_id == row.right_id
 
 
-@pytest.mark.parametrize(
-    ("giver", "to", "error", "sentence"),
-    [
+def test_a_hand_over_that_makes_no_sense_is_refused() -> None:
+    study = a_study()
+    expert("sim", is_simulated=True)
+    expert("hans")
+    wrong: list[tuple[str, list[str], type[Exception], str]] = [
         ("eva", [], Conflict, "Name at least one"),
         ("eva", ["eva"], Conflict, "other than eva"),
         ("eva", ["nobody"], UnknownName, "Unknown expert 'nobody'"),
         ("eva", ["sim"], Conflict, "Simulated: sim"),
         ("hans", ["finn"], UnknownName, "expert of this study 'hans'. Known: eva, finn"),
-    ],
-)
-def test_a_hand_over_that_makes_no_sense_is_refused(
-    giver: str, to: list[str], error: type[Exception], sentence: str
-) -> None:
-    study = a_study()
-    expert("sim", is_simulated=True)
-    expert("hans")
-    with pytest.raises(error, match=sentence):
-        hand_over(study=study, username=giver, to=to)
+    ]
+    for giver, to, error, sentence in wrong:
+        with pytest.raises(error, match=sentence):
+            hand_over(study=study, username=giver, to=to)
     assert study.matchups.count() == 18
 
 

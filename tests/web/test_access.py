@@ -98,14 +98,20 @@ def test_every_role_gets_what_the_table_says() -> None:
         url = address(name, here)
         found = tuple(status(user, url) for user in accounts.values())
         assert found == expected, name
+        check_login_alone(name, url)
+    for name in ("job", "augmentation", "scenario", "study", "results"):
+        url = reverse(name, kwargs={"code": STRANGER})
+        assert status(accounts["admin"], url) == 404, name
 
 
-def test_every_action_is_for_the_roles_of_the_table() -> None:
-    here, accounts = world(), people()
-    for name, expected in ACTIONS.items():
-        url = address(name, here)
-        found = tuple(signed_in(user).post(url).status_code for user in accounts.values())
-        assert found == expected, name
+def check_login_alone(name: str, url: str) -> None:
+    """What is open to nobody: programs are told so, people are led to the login."""
+    answer = Client().get(url)
+    if name in ("job-progress", "metrics"):
+        assert answer.status_code in (401, 403)
+    else:
+        assert answer.status_code == 302, name
+        assert answer.headers["Location"].startswith(reverse("login")), name
 
 
 ASKS_FIRST = {
@@ -116,11 +122,16 @@ ASKS_FIRST = {
 """What a GET of them answers: a question, which changes nothing; here nobody labels."""
 
 
-def test_an_action_needs_a_post() -> None:
-    here, admin = world(), people()["admin"]
+def test_every_action_needs_a_post_and_is_for_the_roles_of_the_table() -> None:
+    here, accounts = world(), people()
     for name in ACTIONS:
-        answer = signed_in(admin).get(address(name, here))
-        assert answer.status_code == ASKS_FIRST.get(name, 405), name
+        url = address(name, here)
+        assert status(accounts["admin"], url) == ASKS_FIRST.get(name, 405), name
+        check_login_alone(name, url)
+    for name, expected in ACTIONS.items():
+        url = address(name, here)
+        found = tuple(signed_in(user).post(url).status_code for user in accounts.values())
+        assert found == expected, name
 
 
 def test_a_button_pressed_after_the_session_ended_leads_back_to_its_page() -> None:
@@ -136,17 +147,6 @@ def test_a_button_pressed_after_the_session_ended_leads_back_to_its_page() -> No
     admin.save()
     given = {"username": admin.username, "password": "x", "next": page}
     assert Client().post(reverse("login"), given).headers["Location"] == page
-
-
-def test_the_login_alone_is_open_to_the_world() -> None:
-    here = world()
-    for name in {**PAGES, **ACTIONS}.keys() - {"job-progress", "metrics"}:
-        answer = Client().get(address(name, here))
-        assert answer.status_code == 302, name
-        assert answer.headers["Location"].startswith(reverse("login")), name
-    assert Client().get(address("job-progress", here)).status_code in (401, 403)
-    assert Client().get(reverse("metrics")).status_code == 401
-    assert Client().get(reverse("login")).status_code == 200
 
 
 def test_the_table_misses_no_page() -> None:
@@ -167,12 +167,6 @@ def test_results_open_to_their_experts_and_to_staff_when_the_study_closes() -> N
     assert signed_in(accounts["researcher"]).get(url).status_code == 200
     assert signed_in(here.expert).get(url).status_code == 200
     assert signed_in(accounts["expert"]).get(url).status_code == 403
-
-
-@pytest.mark.parametrize("name", ["job", "augmentation", "scenario", "study", "results"])
-def test_an_unknown_code_is_404_even_for_an_admin(name: str) -> None:
-    url = reverse(name, kwargs={"code": STRANGER})
-    assert signed_in(people()["admin"]).get(url).status_code == 404
 
 
 WRITES = re.compile(r'^(?:INSERT(?: OR \w+)? INTO|UPDATE|DELETE FROM) "(\w+)"')

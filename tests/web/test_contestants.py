@@ -79,34 +79,20 @@ ENTERED = {
 }
 
 
-@pytest.fixture
-def admin() -> User:
-    return people()["admin"]
-
-
-@pytest.fixture
-def client(admin: User) -> Client:
-    return signed_in(admin)
-
-
-def test_the_paper_set_is_loaded_by_a_button_and_loading_it_again_changes_nothing(
-    client: Client, admin: User
-) -> None:
-    assert "Load the paper set" in client.get(reverse("scenarios")).content.decode()
-    for says in ("50 added", "50 unchanged"):
-        answer = client.post(reverse("catalogue-load"), {"set": "paper"}, follow=True)
-        assert says in answer.content.decode()
-    assert Scenario.objects.count() == 50
-    assert set(Event.objects.values_list("actor", flat=True)) == {admin.pk, None}
+def test_the_paper_set_is_loaded_by_a_button(admin: Client, accounts: dict[str, User]) -> None:
+    assert "Load the paper set" in admin.get(reverse("scenarios")).content.decode()
+    answer = admin.post(reverse("catalogue-load"), {"set": "paper"}, follow=True)
+    assert "50 added" in answer.content.decode()
+    assert set(Event.objects.values_list("actor", flat=True)) == {accounts["admin"].pk, None}
     assert Contestant.objects.filter(slug="reference").exists()
 
 
-def test_a_contestant_is_entered_with_its_options(client: Client) -> None:
+def test_a_contestant_is_entered_with_its_options(admin: Client) -> None:
     address = reverse("contestant-new")
-    assert "No model yet" in client.get(address).content.decode()
+    assert "No model yet" in admin.get(address).content.decode()
     endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:11434/v1")
     EndpointModel.objects.create(endpoint=endpoint, model="qwen3")
-    assert "0.7" in client.post(address, ENTERED, follow=True).content.decode()
+    assert "0.7" in admin.post(address, ENTERED, follow=True).content.decode()
     row = Contestant.objects.get(slug="qwen3-fc-t0p7-native")
     assert (row.variant, row.model, row.endpoint) == ("fc", "qwen3", endpoint)
     assert row.options == {"temperature": 0.7, "protocol": "native"}
@@ -163,9 +149,8 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
     assert told["max_concurrency"] == 3
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "words"),
-    [
+def test_what_no_endpoint_can_be_is_refused_at_its_field(keeper: Client) -> None:
+    for field, value, words in (
         ("base_url", "ftp://x/v1", "An address such as https://api.openai.com/v1 is needed"),
         ("base_url", "http://169.254.169.254/v1", "no model is served from there"),
         ("base_url", "https://me:secret@x.example/v1", "Keys and passwords don&#x27;t belong"),
@@ -174,13 +159,8 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
         ("key_variable", "sk-abc", "The name of an environment variable is needed, not the key"),
         ("max_concurrency", "0", "greater than or equal to 1"),
         ("requests_per_minute", "0", "greater than or equal to 1"),
-    ],
-)
-def test_what_no_endpoint_can_be_is_refused_at_its_field(
-    keeper: Client, field: str, value: str, words: str
-) -> None:
-    shown = post(keeper, "endpoint-new", GIVEN | {field: value})
-    assert words in shown
+    ):
+        assert words in post(keeper, "endpoint-new", GIVEN | {field: value}), (field, value)
     assert not Endpoint.objects.exists()
 
 

@@ -1,6 +1,7 @@
 """What holds on every page: headers, faults, words, language, home."""
 
 import sqlite3
+from typing import Any
 
 import pytest
 from django.conf import LazySettings
@@ -49,30 +50,22 @@ handler404 = "arena.config.faults.answer_missing"
 handler500 = "arena.config.faults.answer_broken"
 
 
-@pytest.mark.parametrize(
-    ("address", "status"),
-    [
-        ("/", 200),
-        ("/jobs/", 200),
-        (GONE, 404),
-        ("/jobs", 301),
-        ("/logout/", 405),
-        ("/label/x/", 404),
-        ("/broken/", 500),
-        ("/api/v1/matchups", 403),
-        ("/api/v1/votes", 403),
-        ("/api/v1/nothing", 404),
-    ],
-)
 @pytest.mark.urls(__name__)
-def test_pages_the_wire_and_errors_are_kept_by_nobody(
-    address: str, status: int, admin: Client
-) -> None:
+def test_pages_the_wire_and_errors_are_kept_by_nobody(admin: Client) -> None:
     admin.raise_request_exception = False
-    answer = admin.get(address)
-    assert answer.status_code == status
+    for address, status in {
+        **{"/": 200, "/jobs/": 200, GONE: 404, "/jobs": 301, "/logout/": 405, "/label/x/": 404},
+        **{"/broken/": 500, "/api/v1/matchups": 403, "/api/v1/votes": 403},
+        "/api/v1/nothing": 404,
+    }.items():
+        answer = admin.get(address)
+        assert answer.status_code == status, address
+        check_kept_by_nobody(answer)
+        assert "private" in answer["Cache-Control"], address
+
+
+def check_kept_by_nobody(answer: Any) -> None:
     assert "no-store" in answer["Cache-Control"]
-    assert "private" in answer["Cache-Control"]
     assert "camera=()" in answer["Permissions-Policy"]
     assert "geolocation=()" in answer["Permissions-Policy"]
 
@@ -84,8 +77,7 @@ def test_redirects_and_refusals_before_any_page_say_so_as_well(settings: LazySet
     secured = Client().get("/")
     assert [one.status_code for one in (forged, unknown, secured)] == [403, 400, 301]
     for answer in (forged, unknown, secured):
-        assert "no-store" in answer["Cache-Control"]
-        assert "camera=()" in answer["Permissions-Policy"]
+        check_kept_by_nobody(answer)
 
 
 def test_pictures_and_static_files_keep_their_own(settings: LazySettings) -> None:
@@ -103,38 +95,30 @@ def test_pictures_and_static_files_keep_their_own(settings: LazySettings) -> Non
     assert "camera=()" in script["Permissions-Policy"]
 
 
-@pytest.mark.django_db
-def test_a_missing_page_is_said_in_the_products_own_words() -> None:
-    answer = signed_in(people()["expert"]).get("/nowhere/")
-    assert answer.status_code == 404
-    assert "There is nothing here" in answer.content.decode()
-
-
-@pytest.mark.django_db
-@pytest.mark.parametrize(
-    "address",
-    [
-        *(
-            "/enrol/a%00b/",
-            "/i/%00",
-            "/shared/%00/",
-            "/shared/boards/%00/",
-            "/api/v1/pictures/%00",
-        ),
-        *("/contestants/new/?model=%00", "/scenarios/?q=a%00"),
-    ],
-)
-def test_the_database_is_never_asked_for_what_postgresql_has_no_text_for(
-    address: str, django_assert_num_queries: DjangoAssertNumQueries
+def test_a_missing_or_refused_page_has_our_own_words_and_allows_its_own_files_alone(
+    accounts: dict[str, User],
 ) -> None:
-    with django_assert_num_queries(0):
-        assert Client().get(address).status_code == 404
+    expert = signed_in(accounts["expert"])
+    for address, status, words in (
+        ("/nowhere/", 404, "There is nothing here"),
+        ("/jobs/", 403, "not for your account"),
+        ("/", 200, ""),
+    ):
+        answer = expert.get(address)
+        assert (answer.status_code, words in answer.content.decode()) == (status, True), address
+        policy = answer.headers["Content-Security-Policy"]
+        assert ("default-src 'none'" in policy, "unsafe" in policy) == (True, False), address
 
 
-@pytest.mark.django_db
-def test_a_refused_page_is_said_in_the_products_own_words() -> None:
-    answer = signed_in(people()["expert"]).get("/jobs/")
-    assert "not for your account" in answer.content.decode()
+def test_the_database_is_never_asked_for_what_postgresql_has_no_text_for(
+    django_assert_num_queries: DjangoAssertNumQueries,
+) -> None:
+    for address in (
+        *("/enrol/a%00b/", "/i/%00", "/shared/%00/", "/shared/boards/%00/"),
+        *("/api/v1/pictures/%00", "/contestants/new/?model=%00", "/scenarios/?q=a%00"),
+    ):
+        with django_assert_num_queries(0):
+            assert Client().get(address).status_code == 404, address
 
 
 @pytest.mark.parametrize(("code", "status"), [(None, 503), (5, 503), (13, 503), (1, 500)])
@@ -155,13 +139,6 @@ def test_the_page_for_our_own_fault_asks_no_database() -> None:
     answer = answer_broken(RequestFactory().get("/"))
     assert answer.status_code == 500
     assert "Something broke on our side" in answer.content.decode()
-
-
-@pytest.mark.django_db
-def test_a_page_allows_nothing_but_its_own_files() -> None:
-    policy = signed_in(people()["expert"]).get("/").headers["Content-Security-Policy"]
-    assert "default-src 'none'" in policy
-    assert "unsafe" not in policy
 
 
 GERMAN = {"HTTP_ACCEPT_LANGUAGE": "de-AT,de;q=0.9,en;q=0.8"}
@@ -214,14 +191,14 @@ def test_voting_is_german() -> None:
         assert "Abmelden" in answer.content.decode()
 
 
-@pytest.mark.parametrize("address", ["/", "/jobs/", "/studies/new/", "/people/"])
-def test_pages_of_the_staff_are_english(address: str) -> None:
-    answer = signed_in(people()["admin"]).get(address, **GERMAN)  # type: ignore[arg-type]
-    page = answer.content.decode()
-    assert answer.headers["Content-Language"] == "en"
-    assert '<html lang="en"' in page
-    assert "Signed in as an admin" in page
-    assert 'name="language"' not in page
+def test_pages_of_the_staff_are_english(admin: Client) -> None:
+    for address in ("/", "/jobs/", "/studies/new/", "/people/"):
+        answer = admin.get(address, **GERMAN)  # type: ignore[arg-type]
+        page = answer.content.decode()
+        assert answer.headers["Content-Language"] == "en", address
+        assert '<html lang="en"' in page
+        assert "Signed in as an admin" in page
+        assert 'name="language"' not in page
 
 
 def home(user: User) -> str:
@@ -281,12 +258,12 @@ def test_the_theme_is_kept_with_the_person_and_leads_back() -> None:
     assert 'data-theme="dark"' in home(expert)
 
 
-@pytest.mark.parametrize("address", ["https://elsewhere.example/", "//elsewhere", "-1", "jobs"])
-def test_a_made_up_theme_or_a_foreign_address_changes_nothing(address: str) -> None:
-    expert = people()["expert"]
-    answer = signed_in(expert).post(reverse("theme"), {"theme": "pink", "next": address})
-    assert answer.headers["Location"] == "/"
-    assert Person.objects.get(user=expert).preferences == {}
+def test_a_made_up_theme_or_a_foreign_address_changes_nothing(accounts: dict[str, User]) -> None:
+    expert = signed_in(accounts["expert"])
+    for address in ("https://elsewhere.example/", "//elsewhere", "-1", "jobs"):
+        answer = expert.post(reverse("theme"), {"theme": "pink", "next": address})
+        assert answer.headers["Location"] == "/", address
+    assert Person.objects.get(user=accounts["expert"]).preferences == {}
 
 
 def test_a_voter_is_refused_in_the_language_of_the_request() -> None:

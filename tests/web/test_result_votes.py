@@ -200,26 +200,13 @@ def pictures_in(shown: str) -> list[str]:
     return re.findall(r'<img[^>]* src="([^"?]*/shown/[^"?]*)[^"]*"', shown)
 
 
-@pytest.mark.parametrize(
-    ("score", "expected"),
-    [
-        ((0, 0, 0), 0.0),
-        ((1, 0, 0), 0.0),
-        ((2, 0, 0), 0.0),
-        ((0, 5, 0), 0.0),
-        ((1, 0, 1), 1.0),
-        ((1, 1, 0), 0.5),
-        ((0, 1, 1), 0.5),
-        ((1, 1, 1), 2 / 3),
-        ((2, 0, 2), 4 / 6),
-    ],
-)
-def test_disagreement_is_the_mean_distance_of_two_judgements(
-    score: tuple[int, int, int], expected: float
-) -> None:
-    wins, ties, losses = score
-    given = VoteScore(wins=wins, ties=ties, losses=losses)
-    assert given.disagreement == pytest.approx(expected)
+def test_disagreement_is_the_mean_distance_of_two_judgements() -> None:
+    for (wins, ties, losses), expected in {
+        **{(0, 0, 0): 0.0, (1, 0, 0): 0.0, (2, 0, 0): 0.0, (0, 5, 0): 0.0},
+        **{(1, 0, 1): 1.0, (1, 1, 0): 0.5, (0, 1, 1): 0.5, (1, 1, 1): 2 / 3, (2, 0, 2): 4 / 6},
+    }.items():
+        score = VoteScore(wins=wins, ties=ties, losses=losses)
+        assert score.disagreement == pytest.approx(expected), score
 
 
 def test_the_votes_on_the_most_disputed_pair_come_first(

@@ -55,12 +55,6 @@ from tests.web.cast import World, names_of_contestants, people, png, signed_in, 
 pytestmark = pytest.mark.django_db
 
 
-def test_a_closed_study_is_said_kindly() -> None:
-    here = world()
-    close_study(study=here.study)
-    assert "This study is closed" in signed_in(here.expert).get(page(here)).content.decode()
-
-
 def test_the_page_is_never_cached_and_offers_both_miss_where_the_study_asks_for_it() -> None:
     here = world()
     expert = signed_in(here.expert)
@@ -72,22 +66,24 @@ def test_the_page_is_never_cached_and_offers_both_miss_where_the_study_asks_for_
     assert "no-store" in answer.headers["Cache-Control"]
 
 
-@pytest.mark.parametrize("key", ["theirs", "7"])
-def test_only_a_vote_of_ones_own_can_be_shown_for_a_change(key: str) -> None:
+def test_only_a_vote_of_ones_own_can_be_shown_for_a_change() -> None:
     here = world()
     theirs = study_rows.vote(study_rows.matchups_of(here.study, "finn")[0])
-    asked = {"change": str(theirs.key) if key == "theirs" else key}
-    shown = signed_in(here.expert).get(page(here), asked).content.decode()
-    assert '"change": null' in shown
+    for key in (str(theirs.key), "7"):
+        shown = signed_in(here.expert).get(page(here), {"change": key}).content.decode()
+        assert '"change": null' in shown, key
 
 
-def test_the_last_vote_leads_to_the_thanks() -> None:
+def test_the_last_vote_leads_to_the_thanks_and_a_closed_study_is_said_kindly() -> None:
     here = world()
     for matchup in study_rows.matchups_of(here.study, "eva"):
         study_rows.vote(matchup)
-    shown = signed_in(here.expert).get(page(here)).content.decode()
+    expert = signed_in(here.expert)
+    shown = expert.get(page(here)).content.decode()
     assert "You are done." in shown
     assert "9 answers saved" in shown
+    close_study(study=here.study)
+    assert "This study is closed" in expert.get(page(here)).content.decode()
 
 
 def test_neither_page_nor_headers_tell_who_made_what() -> None:
@@ -120,8 +116,8 @@ def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
     assert signed_in(here.expert).get(reverse("matchup-image", args=["x"])).status_code == 404
 
 
-BASE = Path(settings.BASE_DIR)
 NUMBERS = ("one", "many")
+STATIC = Path(settings.BASE_DIR) / "static"
 
 
 def given_to_the_script(here: World) -> dict[str, Any]:
@@ -132,12 +128,14 @@ def given_to_the_script(here: World) -> dict[str, Any]:
     return given
 
 
-def test_the_script_gets_the_pair_on_the_page_and_four_more() -> None:
+def test_the_script_gets_the_pair_on_the_page_and_four_more_and_an_outbox_of_its_own() -> None:
     here = world()
     given = given_to_the_script(here)
     mine = study_rows.matchups_of(here.study, "eva")[:5]
     assert [pair["matchup"] for pair in given["pairs"]] == [str(one.code) for one in mine]
     assert (given["saved"], given["total"], given["last"]) == (0, 9, [])
+    for code in (here.study.code, here.expert.person.code):
+        assert str(code) in given["outbox"], "of two people or studies it is never the same"
 
 
 def test_the_script_gets_the_last_ten_votes_the_latest_first() -> None:
@@ -152,38 +150,19 @@ def test_the_script_gets_the_last_ten_votes_the_latest_first() -> None:
     }
 
 
-def test_the_outbox_of_two_people_or_studies_is_never_the_same() -> None:
-    here = world()
-    given = given_to_the_script(here)
-    assert str(here.study.code) in given["outbox"]
-    assert str(here.expert.person.code) in given["outbox"]
-
-
-def test_every_text_that_the_script_says_is_on_the_page() -> None:
+def test_the_page_has_every_text_and_module_of_its_script_and_loads_at_most_40_kb() -> None:
     here = world()
     shown = signed_in(here.expert).get(page(here)).content.decode()
     offered = set(re.findall(r'data-text="([\w-]+)"', shown))
-    scripts = "".join(path.read_text() for path in (BASE / "static/js").glob("vote*.js"))
+    scripts = "".join(path.read_text() for path in (STATIC / "js").glob("vote*.js"))
     said = set(re.findall(r'(?<!\.)\b(?:text|note|say)\("([\w-]+)"', scripts))
     said |= {f"{name}-{n}" for name in re.findall(r'counted\("(\w+)"', scripts) for n in NUMBERS}
     said |= {f"{name}-{n}" for name in re.findall(r'data-kept="(\w+)"', shown) for n in NUMBERS}
     assert said <= offered
-
-
-STATIC = Path(settings.BASE_DIR) / "static"
-
-
-MOST_BYTES = 40 * 1024
-
-
-@pytest.mark.django_db
-def test_the_voting_page_loads_at_most_40_kb_and_names_every_module_of_its_script() -> None:
-    here = world()
-    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
     loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
     assert {"js/vote.js", "css/vote.css"} <= loaded
     sizes = {name: len(gzip.compress((STATIC / name).read_bytes())) for name in sorted(loaded)}
-    assert sum(sizes.values()) <= MOST_BYTES, sizes
+    assert sum(sizes.values()) <= 40 * 1024, sizes
     named = set(re.findall(r'modulepreload" href="/static/js/([\w-]+\.js)"', shown))
     imported: set[str] = set()
     for script in ("vote.js", *named):
@@ -376,6 +355,7 @@ def answer(client: Client, study: Study, pair: PracticePair, *, well: bool) -> s
 
 def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote() -> None:
     study = opened()
+    assert study.practice
     client = signed_in(the_eva())
     assert client.get(pairs_page(study)).headers["Location"] == practice(study)
     pairs = practice_pairs(study, the_eva())
@@ -390,6 +370,7 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
         good, broken = ("A", "B") if pair.good_is_left else ("B", "A")
         assert f"{good} carries out the instruction, {broken} does not." in told
     assert "Start voting" in told
+    assert "Right." in answer(client, study, pairs[0], well=False), "the first answer stays"
     assert client.get(pairs_page(study)).status_code == 200
     assert not Vote.objects.exists()
     assert voting_progress(study=study, expert=the_eva()).voted == 0
@@ -410,20 +391,9 @@ def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_t
     assert len(set(slugs)) == 5
 
 
-def test_a_second_answer_to_a_pair_changes_nothing() -> None:
-    study = opened()
-    client = signed_in(the_eva())
-    first = practice_pairs(study, the_eva())[0]
-    answer(client, study, first, well=True)
-    assert "Right." in answer(client, study, first, well=False)
-    first.refresh_from_db()
-    assert first.is_right
-
-
 def test_a_study_with_nothing_to_practise_on_has_no_practice() -> None:
     assert not open_study(name="Round 0", votes_per_expert=9, **cast_of()).practice
 
 
-@pytest.mark.parametrize(("said", "practises"), [({}, True), ({"practice": False}, False)])
-def test_a_study_has_practice_unless_it_is_said(said: dict[str, bool], practises: bool) -> None:
-    assert opened(**said).practice == practises
+def test_a_study_has_no_practice_where_that_is_said() -> None:
+    assert not opened(practice=False).practice
