@@ -141,15 +141,9 @@ def _paint_scene(
     trails = find_trails(scene, modification, recording, with_held=camera.is_filmed)
     draw_trails(ground, trails)
     _paint(ground, [(agent, palette.CHANGED_MARK) for agent in modification.changed])
-    lost = [
-        agent
-        for agent in modification.changed
-        if not ground.shows(ground.at(agent.x_m, agent.y_m))
-    ]
-    seen = [agent for agent in (after.ego, *modification.changed) if agent not in lost]
     scale_px = road.scale_box(camera, corner)
-    inset_px = (camera.inset.box_px,) if camera.inset else ()
-    badges = place_badges(ground, lost, seen, taken=(scale_px, *inset_px))
+    taken = (scale_px, camera.inset.box_px) if camera.inset else (scale_px,)
+    badges = place_badges(ground, after.ego, modification.changed, taken)
     draw_badges(ground, badges)
     if camera.inset is not None:
         _draw_inset(ground, rest, modification, camera.inset)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from augment.render import palette
+from augment.render.camera import Camera
 from augment.render.canvas import Box, Canvas, Spot, box_around, overlap, text_width_px
 from augment.render.road import raster
 from augment.render.shapes import spread
@@ -31,9 +32,9 @@ class Badge:
 
 
 def place_badges(
-    ground: Canvas, lost: list[TrafficAgent], seen: list[TrafficAgent], taken: tuple[Box, ...] = ()
+    ground: Canvas, ego: TrafficAgent, changed: tuple[TrafficAgent, ...], taken: tuple[Box, ...]
 ) -> list[Badge]:
-    """Place a badge for each agent outside, on the line from the ego to it or as near as it can.
+    """Place a badge for each change outside, on the line from the ego to it or near that.
 
     Badges lie inside the picture, apart from each other and from what is taken, and clear of the
     agents that are seen if that is possible. When the edge is full a second row begins further
@@ -41,7 +42,8 @@ def place_badges(
     """
     badges: list[Badge] = []
     boxes = list(taken)
-    marks = [mark_box(ground, agent) for agent in seen]
+    lost = [agent for agent in changed if not ground.shows(ground.at(agent.x_m, agent.y_m))]
+    marks = [mark_box(ground.camera, agent) for agent in (ego, *changed) if agent not in lost]
     for agent in sorted(lost, key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.id)):
         distance_m = math.hypot(agent.x_m, agent.y_m)
         text = f"{distance_m:.0f} m" if distance_m < 999.5 else f"{distance_m / 1000.0:.3g} km"
@@ -73,9 +75,9 @@ def draw_badges(ground: Canvas, badges: list[Badge]) -> None:
         ground.text(at, badge.text, palette.INK, BADGE_TEXT_PX, anchor="rm")
 
 
-def mark_box(ground: Canvas, agent: TrafficAgent) -> Box:
+def mark_box(camera: Camera, agent: TrafficAgent) -> Box:
     """Return the upright box round an agent's own, in pixels."""
-    box = ground.px(agent.box.corners_m)
+    box = camera.to_pixels(agent.box.corners_m)
     (left, top), (right, bottom) = box.min(axis=0).tolist(), box.max(axis=0).tolist()
     return left, top, right, bottom
 
@@ -115,7 +117,7 @@ def draw_labels(
     """
     _write_metres(ground)
     everyone = sorted(scene.everyone, key=lambda agent: agent.id not in first)
-    boxes = {agent.id: mark_box(ground, agent) for agent in everyone}
+    boxes = {agent.id: mark_box(ground.camera, agent) for agent in everyone}
     writer = _Writer(ground, list(taken), list(boxes.values()))
     spots_of = {agent.id: ground.at(agent.x_m, agent.y_m) for agent in everyone}
     for name in (name for name in boxes if name in first and ground.shows(spots_of[name])):

@@ -1,11 +1,12 @@
 """Window of a pair: a pure function of the scene, both changes and what the instruction names.
 
-It holds the ego, what either side changes within 60 m with its path, what the intent names and
-10 m around, and no more; in films whoever is changed, and the ego, at every moment.
+It holds the ego, what either side changes within 60 m with its path, whom it removes, what the
+intent names and 10 m around, and no more; in films whoever is changed and the ego at every moment.
 
 Frames: those of `camera`.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -16,8 +17,10 @@ from augment.checks.lanes_across import LanesAcross, find_mark, find_picked
 from augment.checks.wish_places import list_named
 from augment.geometry.polyline import FloatArray
 from augment.render.camera import FOLLOWED_M, MAX_WIDTH_M, Camera, changed_places
-from augment.render.canvas import Box, overlap
-from augment.render.road import scale_box, scale_corner
+from augment.render.canvas import Box, Canvas, overlap
+from augment.render.labels import mark_box, place_badges
+from augment.render.palette import PAPER
+from augment.render.road import scale_box, scale_corner, tick_bars
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent, MapPlace, Setting
 from augment.scene.motion import HORIZON_S, STEP_S, Movement, find_trails
@@ -30,14 +33,11 @@ MOST_PX_PER_M = 40.0
 
 INSET_BELOW_PX = 12.0
 """Changes that come no farther from each other are shown enlarged."""
-_INSET_SHARE, _INSET_AROUND_M, _INSET_GAIN = 0.4, 0.75, 1.5
-_INSET_EDGE_PX, _INSET_GAP_PX, _INSET_PLACES = 8.0, 6.0, 16
+_INSET_SHARE, _INSET_AROUND_M, _INSET_GAIN, _INSET_LEAST_PX = 0.4, 0.75, 1.5, 4.0
+_EDGE_PX, _INSET_GAP_PX, _INSET_PLACES = 8.0, 6.0, 16
 
 _JUNCTION = {MapPlace.JUNCTION_START, MapPlace.JUNCTION_END}
-_BY_JUNCTION = {
-    *(Setting.BEFORE_INTERSECTION, Setting.IN_INTERSECTION),
-    *(Setting.AT_INTERSECTION, Setting.AFTER_INTERSECTION),
-}
+_BY_JUNCTION = {setting for setting in Setting if setting.name.endswith("_INTERSECTION")}
 
 
 def pair_camera(
@@ -67,9 +67,14 @@ def pair_camera(
     """
     scene = ground.scene
     need = _around([scene.ego.box.corners_m])
-    near = [place for side in sides for place in changed_places(scene, side)]
-    places = [place for place in near if _middle_m(place) <= FOLLOWED_M]
-    places += [place for place in _named(ground, intent) if _middle_m(place) <= FOLLOWED_M]
+    changed = [place for side in sides for place in changed_places(scene, side)]
+    # Of a walk the box and the end each on its own.
+    places = [part for place in changed for part in np.split(place, [4]) if len(part)]
+    places += [*_named(ground, intent), *(bar for _, bar in tick_bars(scene, ticks_m))]
+    places = [place for place in places if _middle_m(place) <= FOLLOWED_M]
+    # No arrow at the edge points to who is gone.
+    gone = {name for side in sides for name in side.removed}
+    places += [agent.box.corners_m for agent in scene.agents if agent.id in gone]
     if is_filmed:
         places += [place for side in sides for place in _passed(ground, side)]
     for place in sorted(places, key=_middle_m):
@@ -89,10 +94,12 @@ def find_scale(width_m: float, height_m: float) -> float:
     return min(max(beside, stacked), MOST_PX_PER_M)
 
 
-def covered_boxes(scene: Scene, camera: Camera) -> list[Box]:
-    """Return what lies over the picture's ground, in pixels: the scale's plate and an inset."""
+def covered_boxes(scene: Scene, camera: Camera, sides: tuple[Modification, ...]) -> list[Box]:
+    """Return what lies over the ground of any side, in pixels: the scale, an inset, arrows."""
     scale = scale_box(camera, scale_corner(scene, camera))
-    return [scale, *([camera.inset.box_px] if camera.inset else [])]
+    boxes = [scale, *([camera.inset.box_px] if camera.inset else [])]
+    drawn = [(Canvas(camera, PAPER), scene.ego, side.changed, tuple(boxes)) for side in sides]
+    return boxes + sorted({badge.box_px for side in drawn for badge in place_badges(*side)})
 
 
 def film_states(movement: Movement) -> FloatArray:
@@ -106,8 +113,7 @@ def film_states(movement: Movement) -> FloatArray:
 
 def _around(places: list[FloatArray]) -> FloatArray:
     """Return the window (2, 2) in whole metres that holds points (N, 2) with room around them."""
-    points = np.vstack(places)
-    low, high = points.min(axis=0) - AROUND_M, points.max(axis=0) + AROUND_M
+    low, high = _frame(np.vstack(places), AROUND_M)
     return np.array([np.floor(low), np.ceil(high)])
 
 
@@ -156,6 +162,18 @@ def _named(ground: Ground, intent: Intent | None) -> Iterator[FloatArray]:
             yield np.array([[pose.x_m, pose.y_m]])
 
 
+def _frame(points_m: FloatArray, around_m: float = _INSET_AROUND_M) -> FloatArray:
+    """Return the corners (2, 2) of the window round points (N, 2)."""
+    return np.array([points_m.min(axis=0) - around_m, points_m.max(axis=0) + around_m])
+
+
+def _outline(agent: TrafficAgent) -> FloatArray:
+    """Return what is drawn of somebody, (5 or 6, 2): corners, a second's way, a walk's end."""
+    ahead_m = math.copysign(agent.length_m / 2.0, agent.speed_mps) + agent.speed_mps
+    tip = agent.pose.to_parent(np.array([[ahead_m, 0.0]]))
+    return np.vstack([agent.box.corners_m, tip, *([agent.walk_to_m] if agent.walk_to_m else [])])
+
+
 def _with_inset(
     camera: Camera,
     scene: Scene,
@@ -164,37 +182,34 @@ def _with_inset(
 ) -> Camera:
     """Return the camera with an inset of what differs, where that is hard to see and it helps."""
     apart = sorted((pair for pair in differing if pair[2] > 0.0), key=lambda pair: -pair[2])
-    if not apart or apart[0][2] * camera.px_per_m >= INSET_BELOW_PX:
+    seen_m = [m for *both, m in apart if any(camera.shows(one.box.corners_m) for one in both)]
+    if not apart or max(seen_m, default=0.0) * camera.px_per_m >= INSET_BELOW_PX:
         return camera
-    # All that differs, or at least what differs most.
-    for pairs in (apart, apart[:1]):
-        boxes = [agent.box.corners_m for *both, _ in pairs for agent in both]
-        points = np.vstack(boxes)
-        low, high = points.min(axis=0) - _INSET_AROUND_M, points.max(axis=0) + _INSET_AROUND_M
-        across, up = (high - low).tolist()
-        most = (_INSET_SHARE * camera.width_px / across, _INSET_SHARE * camera.height_px / up)
-        scale = min(*most, MOST_PX_PER_M)
-        if scale >= _INSET_GAIN * camera.px_per_m:
-            break
-    else:
+    boxes = [np.vstack([agent.box.corners_m for agent in both]) for *both, _ in apart]
+    most_px = _INSET_SHARE * np.array([camera.width_px, camera.height_px])
+    # All that differs, what differs most, or its part that does.
+    first, other = _outline(apart[0][0]), _outline(apart[0][1])
+    ends = np.stack([first, other], axis=1)[np.hypot(*(first - other).T).round(6).argmax()]
+    whole = _frame(np.vstack([boxes[0], ends]))
+    room_m = np.outer([-0.5, 0.5], most_px / MOST_PX_PER_M)
+    part = _frame(np.vstack([ends, np.clip(ends.mean(axis=0) + room_m, *whole)]), 0.0)
+    frames = [_frame(np.vstack([*boxes, ends])), whole, part]
+    scales = [min(*(most_px / (high - low)).tolist(), MOST_PX_PER_M) for low, high in frames]
+    gain = _INSET_GAIN * camera.px_per_m if seen_m else 0.0
+    least = max(_INSET_LEAST_PX / apart[0][2], gain)
+    chosen = next((n for n, scale in enumerate(scales) if scale >= least), -1)
+    (low, high), scale = frames[chosen], scales[chosen]
+    if scale < gain:
         return camera
-    marks = [agent.box.corners_m for side in sides for agent in (*side.changed, scene.ego)]
-    marks += [agent.box.corners_m for agent in scene.agents]
-    spots = [camera.to_pixels(mark) for mark in marks]
-    hidden = [(*spot.min(axis=0).tolist(), *spot.max(axis=0).tolist()) for spot in spots]
+    marks = [*scene.agents, scene.ego, *(agent for side in sides for agent in side.changed)]
+    spots = [mark_box(camera, agent) for agent in marks]
     # What is changed and the ego weigh more than all the traffic.
-    weights = [1] * len(scene.agents)
-    weights = [1 + len(weights)] * (len(marks) - len(weights)) + weights
-    width, height = across * scale, up * scale
+    weights = [1 if n < len(scene.agents) else len(marks) for n in range(len(marks))]
+    width, height = (scale * (high - low)).tolist()
     # Along the upper and the lower edge, from the right.
-    edge = _INSET_EDGE_PX
-    lefts = np.linspace(camera.width_px - width - edge, edge, _INSET_PLACES).tolist()
-    tops = (edge, camera.height_px - height - edge)
+    lefts = np.linspace(camera.width_px - width - _EDGE_PX, _EDGE_PX, _INSET_PLACES).tolist()
+    tops = (_EDGE_PX, camera.height_px - height - _EDGE_PX)
     boxes_px = [(left, top, left + width, top + height) for top in tops for left in lefts]
-
-    def count_hidden(box: Box) -> int:
-        pairs = zip(weights, hidden, strict=True)
-        return sum(weight for weight, at in pairs if overlap(box, at, _INSET_GAP_PX))
-
-    box = min(boxes_px, key=count_hidden)
-    return replace(camera, inset=Camera.over(low, high, scale).at(box[0], box[1]))
+    hides = [[overlap(box, spot, _INSET_GAP_PX) for spot in spots] for box in boxes_px]
+    left, top, *_ = boxes_px[int(np.dot(hides, weights).argmin())]
+    return replace(camera, inset=Camera.over(low, high, scale).at(left, top))

@@ -1,6 +1,7 @@
 """The ground of a picture: road, lines, crosswalks, lights, the 5 m grid and the scale bar."""
 
 import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -148,17 +149,19 @@ def draw_goal(ground: Canvas, scene: Scene) -> None:
 
 def draw_ticks(ground: Canvas, scene: Scene) -> None:
     """Draw a bar across the ego's lane at each distance that the camera marks, with its metres."""
-    route = EgoRoute.of(scene) if ground.camera.ticks_m else None
-    if route is None:
-        return
-    for ahead_m in ground.camera.ticks_m:
-        if route.ego_s_m + ahead_m > route.line.length_m:
-            continue  # nobody knows where the lane would lead
-        pose = route.line.pose_at(route.ego_s_m + ahead_m)
-        bar = pose.to_parent(np.array([[0.0, _TICK_HALF_M], [0.0, -_TICK_HALF_M]]))
+    for ahead_m, bar in tick_bars(scene, ground.camera.ticks_m):
         ground.stroke(ground.px(bar), palette.INK, 2.0)
         x, y = ground.px(bar[1:])[0].tolist()
         ground.text((x, y + 12.0), f"{ahead_m:g} m", palette.INK, 14, halo=palette.HALO)
+
+
+def tick_bars(scene: Scene, ticks_m: Sequence[float]) -> Iterator[tuple[float, FloatArray]]:
+    """Yield distances ahead, as far as the ego's lane goes, each with its bar (2, 2) across it."""
+    route = EgoRoute.of(scene) if ticks_m else None
+    for ahead_m in ticks_m:
+        if route is not None and route.ego_s_m + ahead_m <= route.line.length_m:
+            pose = route.line.pose_at(route.ego_s_m + ahead_m)
+            yield ahead_m, pose.to_parent(np.array([[0.0, _TICK_HALF_M], [0.0, -_TICK_HALF_M]]))
 
 
 def raster(low_m: float, high_m: float) -> list[float]:
@@ -175,12 +178,11 @@ def scale_corner(scene: Scene, camera: Camera) -> Corner:
     """
     corners: list[Corner] = [(right, top) for top in (False, True) for right in (False, True)]
     places = camera.to_pixels(np.array([[agent.x_m, agent.y_m] for agent in scene.everyone]))
-    boxes = {corner: scale_box(camera, corner) for corner in corners}
     spots = [(x, y, x, y) for x, y in places.tolist() if min(x, y) > 0.0]
     inset = [camera.inset.box_px] if camera.inset else []
 
     def count_hidden(corner: Corner) -> tuple[int, int]:
-        box = boxes[corner]
+        box = scale_box(camera, corner)
         hidden = [overlap(box, at, _NEAR_PX) for at in spots]
         return sum(overlap(box, at, _INSET_PX) for at in inset), sum(hidden)
 

@@ -26,7 +26,7 @@ SCALE = scale_box(WIDE, (False, False))
 
 
 def badges(*lost: TrafficAgent, seen: tuple[TrafficAgent, ...] = ()) -> list[Badge]:
-    return place_badges(GROUND, list(lost), list(seen), taken=(SCALE,))
+    return place_badges(GROUND, scenes.scene().ego, (*lost, *seen), taken=(SCALE,))
 
 
 def apart(one: Box, other: Box) -> bool:

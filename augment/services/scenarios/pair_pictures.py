@@ -51,7 +51,7 @@ def draw_pair(
     """
     loaded, sides, camera = frame_pair(first, other, has_ticks=has_ticks)
     view, scene = picture_view(camera), loaded.scene
-    covered = [[round(edge) for edge in box] for box in covered_boxes(scene, camera)]
+    covered = [[round(edge) for edge in box] for box in covered_boxes(scene, camera, sides)]
     rows = zip((first, other), sides, strict=True)
     return PairPictures(
         names={row.pk: draw_picture(loaded, side, camera) for row, side in rows},
