@@ -10,7 +10,8 @@ function make(name, attributes = {}) {
 }
 
 export class Stage {
-  constructor(svg, scene, picture) {
+  // changed: who is in sight from the beginning, besides the road ahead.
+  constructor(svg, scene, picture, changed) {
     const { x_min_m, y_max_m, px_per_m, width_px, height_px } = scene.camera;
     this.svg = svg;
     this.scene = scene;
@@ -18,9 +19,12 @@ export class Stage {
     const [x, y, width, height] = this.whole;
     if (picture) svg.append(make("image", { href: picture, x, y, width, height, preserveAspectRatio: "none" }));
     this.layer = svg.appendChild(make("g"));
-    const { clientWidth, clientHeight } = svg;
-    const seen = (46 * (clientHeight || 2)) / (clientWidth || 3);
-    this.show([-10, -seen / 2, 46, seen]);
+    const ratio = (svg.clientHeight || 2) / (svg.clientWidth || 3);
+    const left = Math.min(-10, ...changed.map((one) => one.x_m - one.length_m));
+    const right = Math.max(36, ...changed.map((one) => one.x_m + one.length_m));
+    const aside = Math.max(0, ...changed.map((one) => Math.abs(one.y_m) + one.length_m));
+    const seen = Math.min(width, Math.max(right - left, (2 * aside) / ratio));
+    this.show([left, (-seen * ratio) / 2, seen, seen * ratio]);
   }
 
   show(box) {
