@@ -104,15 +104,14 @@ def _measure(row: Any) -> tuple[Any, float, float | None, int]:
     outside = 0
     for side in sides if camera.is_filmed else ():
         motion = loaded.ground.motion_after(side, of_all=False)
-        changed = {agent.id for agent in side.changed}
         for movement in (motion.ego, *motion.others):
-            if movement is not motion.ego and movement.agent.id not in changed:
-                continue
-            for x_m, y_m, heading_rad, _ in film_states(movement).tolist():
+            is_shown = movement is motion.ego or movement.agent in side.changed
+            for x_m, y_m, heading_rad, _ in film_states(movement).tolist() if is_shown else ():
                 agent, pose = movement.agent, Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
                 box = camera.to_pixels(corners(pose, agent.length_m, agent.width_m))
-                is_in = (box >= 0.0).all() and (box <= [camera.width_px, camera.height_px]).all()
-                outside += not is_in
+                outside += bool(
+                    (box < 0.0).any() or (box > [camera.width_px, camera.height_px]).any()
+                )
     return row, camera.px_per_m, differs_px, outside
 
 

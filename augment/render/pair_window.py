@@ -152,14 +152,12 @@ def _named(ground: Ground, intent: Intent | None) -> Iterator[FloatArray]:
     settings = {setting for ask in asks for setting in ask.spot.settings}
     if marks & _JUNCTION or settings & _BY_JUNCTION:
         marks |= _JUNCTION
-    found = [find_mark(lanes, mark) for mark in marks if mark is not None]
+    found = (find_mark(lanes, mark) for mark in marks if mark is not None)
     stations = [at_m for at_m in found if at_m is not None]
     for setting in settings - _BY_JUNCTION - {Setting.OFF_CROSSWALK}:
         stations += [end for span in list_named(setting, lanes) for end in span]
-    for at_m in stations:
-        if abs(at_m) <= FOLLOWED_M:
-            pose = lanes.route.line.pose_at(lanes.route.ego_s_m + at_m)
-            yield np.array([[pose.x_m, pose.y_m]])
+    poses = [lanes.route.line.pose_at(lanes.route.ego_s_m + at_m) for at_m in stations]
+    yield from (np.array([[pose.x_m, pose.y_m]]) for pose in poses)
 
 
 def _frame(points_m: FloatArray, around_m: float = _INSET_AROUND_M) -> FloatArray:
