@@ -77,7 +77,7 @@ class TerminalCommand(BaseCommand):
             if isinstance(error, OperationalError):
                 text = f"The database: {error}; `manage.py doctor` looks at all parts."
             elif isinstance(error, OSError) and error.strerror:
-                text = f"{error.filename or 'A file'}: {error.strerror}."
+                text = f"{error.filename or ''}: {error.strerror}.".removeprefix(": ")
             raise CommandError(f"{self.failure} {text}".lstrip()) from error
 
 

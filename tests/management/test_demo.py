@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import pytest
-from django.core.management import CommandError
+from django.core.management import CommandError, call_command
 
-from arena.management.commands.demo import Command, add_model, finish, launch_model
+from arena.management.commands.demo import add_model, finish, launch_model
 from augment.errors import AugmentError
 from augment.fake_llm.server import running
 from augment.models import Contestant, Endpoint, ModelCall
@@ -17,19 +17,10 @@ from tests.brokers import Broker
 from tests.jobs.rows import INSTRUCTION, add_scenario
 
 
-@pytest.mark.parametrize(
-    ("option", "given", "says"),
-    [
-        ("--per-type", "-1", "1 or more is needed, not -1"),
-        ("--per-type", "0", "1 or more is needed, not 0"),
-        ("--per-type", "few", "'few' is no whole number"),
-    ],
-)
-def test_a_number_that_makes_no_sense_is_refused(option: str, given: str, says: str) -> None:
-    parser = Command().create_parser("manage.py", "demo")
-    parser.called_from_command_line = False
+@pytest.mark.parametrize(("given", "says"), [("0", "1 or more"), ("few", "no whole number")])
+def test_a_number_that_makes_no_sense_is_refused(given: str, says: str) -> None:
     with pytest.raises(CommandError, match=says):
-        parser.parse_args([f"{option}={given}"])
+        call_command("demo", f"--per-type={given}")
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_a_name_in_an_error_of_a_command_is_escaped(
             OperationalError("database or disk is full"),
             "The database: .* full; `manage.py doctor`",
         ),
-        (OSError(28, "No space left on device"), "A file: No space left on device.$"),
+        (OSError(28, "No space left on device"), "No space left on device.$"),
         (OSError(13, "Permission denied", "b.csv"), "b.csv: Permission denied.$"),
     ],
 )

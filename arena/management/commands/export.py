@@ -347,8 +347,7 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
         if options["what"] in KINDS:
-            written = KINDS[options["what"]].write(options, self.stderr.write)
-            self._deliver(written, options["out"])
+            self._deliver(KINDS[options["what"]].write(options, self.stderr.write), options["out"])
             return
         if options["what"] == "benchmark":
             row = find_benchmark(options["benchmark"])

@@ -90,8 +90,6 @@ def _read(path: Path) -> tuple[votes_file.VotesTable, str]:
             return table, hashlib.file_digest(file, "sha256").hexdigest()
     except votes_file.VotesFileUnreadable as error:
         raise VotesUnreadable(str(error)) from error
-    except OSError as error:
-        raise VotesUnreadable(f"{path.name} can't be read: {error.strerror}.") from error
 
 
 def _rows(table: votes_file.VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
