@@ -38,7 +38,7 @@ export class Edit {
       if (gone.has(agent.id)) return [agent, "removed"];
       return moved.has(agent.id) ? [moved.get(agent.id), "moved"] : [agent, "kept"];
     });
-    return [...known, ...this.change.add.map((agent) => [agent, "added"])];
+    return [...recorded, ...this.change.add.map((agent) => [agent, "added"])];
   }
 
   find(id) {
