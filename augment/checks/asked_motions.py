@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -25,6 +25,7 @@ _THERE_M = 0.3
 BRAKES = Bounds(3.0, math.inf, 0.0)
 """Hard braking where no number is said, in m/s^2."""
 _TURNS_ROUND = Bounds(180.0, 180.0, 20.0)
+SLOWS = planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP
 DOOR = Bounds(0.5, 1.2, 0.3)
 """How far a door opens, in metres."""
 
@@ -40,15 +41,14 @@ def check_course(case: Case) -> Iterator[Finding]:
                 off_m, wanted = apart_m(agent, before[agent.id]), case.tolerances.distance_m
                 words = f"{{agents[0]}} is {off_m:.2f} m from where it was and is to stay."
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
-            motion = agent.motion
-            if motion is None and agent.speed_mps > 0.0:
-                motion = planned.PlannedMotion()  # it goes on as its scene has it
+            # Who drives goes on as its scene has it.
+            motion = agent.motion or (planned.PlannedMotion() if agent.speed_mps > 0.0 else None)
             if motion is None:
                 words = f"{{agents[0]}} has no motion; asked for: {wish.preset.label.lower()}."
                 yield find(FindingKind.ASKED_MOTION, False, [agent], words)
                 continue
             if wish.start is not None:
-                yield from _start(case, agent, motion, wish.start)
+                yield from _start(case, agent, motion, wish)
             states = _carry_out(case, agent, motion)
             if not len(states):
                 words = "{agents[0]} has left the map before its motion begins."
@@ -62,13 +62,17 @@ def check_course(case: Case) -> Iterator[Finding]:
 
 
 def _start(
-    case: Case, agent: TrafficAgent, motion: planned.PlannedMotion, wish: StartWish
+    case: Case, agent: TrafficAgent, motion: planned.PlannedMotion, asked: MotionWish
 ) -> Iterator[Finding]:
-    start, kind, near = motion.start, FindingKind.ASKED_START, wish.ego_distance
+    start, kind, wish = motion.start, FindingKind.ASKED_START, asked.start or StartWish()
     if wish.after_s is not None and isinstance(start, planned.AtTime):
         wanted = motion_bounds("after_s", wish.after_s.low, wish.after_s.high)
         what, value_s = "The start of {agents[0]}", start.after_s
         ends_s = value_s + (motion.speeds[-1][0] if motion.speeds else 0.0)
+        if asked.preset in SLOWS or agent.is_stopped:
+            # Who holds its speed at first has not begun.
+            same = takewhile(lambda pair: pair[1] == agent.speed_mps, motion.speeds)
+            value_s += max((after_s for after_s, _ in same), default=0.0)
         if wish.may_end and wanted.off(ends_s) < wanted.off(value_s):
             what, value_s = "The end of the motion of {agents[0]}", ends_s
         yield hold(kind, [agent], what, value_s, wanted, unit="s")
@@ -81,6 +85,7 @@ def _start(
             off_m = case.route.locate(start.x_m, start.y_m).ahead_m - mark_m
             what = f"How far past the {wish.mark} the ego is waited for by {{agents[0]}}"
             yield hold(kind, [agent], what, off_m, Bounds(0.0, 0.0, MARK_M))
+        near = wish.ego_distance
         ends_m = near.span_m if near else (planned.REACHED_M, planned.REACHED_M)
         what = "The ego's distance at the start of {agents[0]}"
         wanted = motion_bounds("within_m", *ends_m)
@@ -123,15 +128,12 @@ def check_path(
             yield find(FindingKind.ASKED_CROSSING, crosses, [agent], f"{words}.")
             if wish.side is not None and crosses:
                 fits = (first.left_m > 0.0) is (wish.side is Side.LEFT)
-                yield find(
-                    FindingKind.ASKED_SIDE, fits, [agent], f"{words}, from the {wish.side}."
-                )
+                words += f", from the {wish.side}."
+                yield find(FindingKind.ASKED_SIDE, fits, [agent], words)
         case planned.MotionPreset.EMERGENCY_STOP:
-            bend_m = find_bend_end(case.route) or 0.0
-            words = (
-                f"{{agents[0]}} stops {last.ahead_m:.1f} m ahead; the bend ends at {bend_m:.1f} m."
-            )
-            yield find(FindingKind.ASKED_DISTANCE, last.ahead_m >= bend_m, [agent], words)
+            bend_m, at_m = find_bend_end(case.route) or 0.0, last.ahead_m
+            words = f"{{agents[0]}} stops {at_m:.1f} m ahead; the bend ends at {bend_m:.1f} m."
+            yield find(FindingKind.ASKED_DISTANCE, at_m >= bend_m, [agent], words)
         case planned.MotionPreset.DOOR_OPENING:
             toward_m = abs(first.left_m) - abs(last.left_m)
             what = "How far {agents[0]} comes towards the ego's way"
@@ -146,11 +148,8 @@ def _numbers(
     states: FloatArray,
 ) -> Iterator[Finding]:
     # Speeds are linear from pair to pair, so each leg has one deceleration.
-    profile = [(0.0, agent.speed_mps), *motion.speeds]
-    slows = wish.preset in (planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP)
-    braking = [
-        (a - b) / (end - begin) for (begin, a), (end, b) in pairwise(profile) if end > begin
-    ]
+    profile, slows = [(0.0, agent.speed_mps), *motion.speeds], wish.preset in SLOWS
+    braking = [(a - b) / (to - at) for (at, a), (to, b) in pairwise(profile) if to > at]
     moves = states[:, 3] > 0.0
     if wish.preset is planned.MotionPreset.CUT_IN:
         lefts_m = np.array([case.route.locate(x, y).left_m for x, y in states[:, :2].tolist()])

@@ -18,8 +18,9 @@ from augment.scene.entities import TrafficAgent
 
 _TAPER_M = 1.0
 """Cones of which the last is this far across from the first run from one side to the other."""
-_MISPLACED = 10.0
-"""An order with somebody on the wrong side of the one before is only taken for want of another."""
+_MISPLACED = {True: 10.0, False: 0.01}
+"""Of an order with somebody on the wrong side of the one before, and by whether a side is named:
+it is only taken for want of another, and else where all the rest is the same."""
 _ROUGHLY_DEG = 2.0 * USUAL.heading_deg
 """A car that has spun stands "crosswise" only roughly."""
 
@@ -111,9 +112,8 @@ def check_across(case: Case) -> Iterator[Finding]:
                 yield _across([agent], left_m, wanted)
         elif isinstance(request, wish.ConesRequest):
             yield from _cones(case, party, request, band)
-        elif (
-            isinstance(request, wish.CrashRequest) and not party.missing
-        ):  # else the nearest may be missing, and the others lie anywhere
+        # Where one is missing it may be the nearest, and the others lie anywhere.
+        elif isinstance(request, wish.CrashRequest) and not party.missing:
             if party.is_exact:
                 first = in_order(case, party, request)[0]
             others = [agent for agent in party.everyone if agent is not first]
@@ -274,7 +274,7 @@ def _misfit(case: Case, order: Sequence[TrafficAgent], request: wish.CrashReques
             wish.Bearing.LEFT: there.left_m - here.left_m,
             wish.Bearing.RIGHT: here.left_m - there.left_m,
         }[car.bearing or wish.Bearing.AHEAD]
-        misfit += _MISPLACED if further_m < 0.0 else 0.0
+        misfit += _MISPLACED[car.bearing is not None] if further_m < 0.0 else 0.0
     return misfit
 
 

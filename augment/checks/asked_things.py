@@ -130,7 +130,7 @@ def check_walk(case: Case) -> Iterator[Finding]:
         request = party.request
         if not isinstance(request, WalkRequest):
             continue
-        crossings = [_crossing(case, agent, request.start) for agent in party.agents]
+        crossings = [_crossing(case, agent, request) for agent in party.agents]
         yield from crossings
         for agent, crossing in zip(party.agents, crossings, strict=True):
             end = end_of_walk(agent)
@@ -144,11 +144,10 @@ def check_walk(case: Case) -> Iterator[Finding]:
             yield from _in_file(case, party.agents, request)
 
 
-def _crossing(case: Case, agent: TrafficAgent, side: Side | None) -> Finding:
+def _crossing(case: Case, agent: TrafficAgent, request: WalkRequest) -> Finding:
     """The first thing that is wrong about a walk; where the side is open it is its own."""
     place, end = case.route.locate_agent(agent), end_of_walk(agent)
-    if side is None:
-        side = Side.LEFT if place.left_m >= 0.0 else Side.RIGHT
+    side = request.start or (Side.LEFT if place.left_m >= 0.0 else Side.RIGHT)
     # From here on, numbers to the side of the start are positive.
     from_m = place.left_m * side.sign
     to_m = math.nan if end is None else case.route.locate(*end).left_m * side.sign
@@ -162,6 +161,11 @@ def _crossing(case: Case, agent: TrafficAgent, side: Side | None) -> Finding:
     else:
         kind, reason = FindingKind.ASKED_CROSSING, "its walk ends elsewhere"
     fits = kind is FindingKind.ASKED_CROSSING and to_m < 0.0 and from_m > -_ON_ROAD_M
+    if fits and end and request.end is None and (agent.walk_to_m or agent.motion):
+        # Over the lanes side by side, metre by metre, up to a step past where the walk ends.
+        ahead_m, steps = case.route.locate(*end).ahead_m, range(math.ceil(_ON_ROAD_M - to_m))
+        points = [case.route.position(ahead_m, -side.sign * step) for step in steps]
+        fits = not all(any(lane.covers for lane in case.route.graph.beside(*p)) for p in points)
     words = f"{{agents[0]}} is to cross the ego's way from the {side}"
     return find(kind, fits, [agent], f"{words}, as it does." if fits else f"{words}: {reason}.")
 

@@ -143,11 +143,8 @@ def _crosses(agent: TrafficAgent, lanes: LanesAcross) -> bool:
     """Return whether somebody crosses a lane, or waits to; a worker's step does not."""
     if agent.type is not AgentType.PEDESTRIAN or agent.motion is not None:
         return agent.type is AgentType.PEDESTRIAN
-    (x_m, y_m), (first, last) = (
-        end_of_walk(agent) or (math.nan, math.nan),
-        _find_ends(agent, lanes),
-    )
-    walk_m = math.hypot(x_m - agent.x_m, y_m - agent.y_m)
+    first, last = _find_ends(agent, lanes)
+    walk_m = math.dist(agent.pose.beside(0.0), end_of_walk(agent) or (math.nan, math.nan))
     # From one side of the lane's middle to the other, or begun in it.
     is_over = first.left_m * last.left_m < 0.0 or abs(first.left_m) < _ON_ROAD_M
     return (

@@ -287,12 +287,15 @@ def assign_parties(
     counted = resolve_spots(intent, lanes)
     parties, surplus = match_to_requests(counted, modification.added, lanes)
     moved = {agent.id: agent for agent in modification.moved}
-    picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
-    for move, name in picked:
-        if name in moved:
-            parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
+    picked = [(move, agent) for move in counted.moves for agent in find_picked(lanes, move.who)]
+    for move, agent in picked:
+        keeps = move.motion is None and move.speed_mps is None
+        speed_mps = agent.speed_mps if keeps else move.speed_mps
+        if agent.id in moved:
+            request = replace(move.vehicle_request, speed_mps=speed_mps)
+            parties.append(Party(request=request, agents=(moved[agent.id],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
-    movable = {name for _, name in picked}
+    movable = {agent.id for _, agent in picked}
     if intent.purpose is not None:  # which any change may serve
         surplus, gone, movable = (), [*gone, *modification.removed], movable | moved.keys()
     return Case(

@@ -327,7 +327,7 @@ class _Fitting:
                 gap_m=gap.span_m,
                 # In file they stand further towards the side that they come from.
                 toward_rad=lane_rad + (side.sign if side else 0.0) * math.pi / 2.0,
-                aside_rad=math.pi / 2.0 if side else math.pi,
+                aside_rad=_ASIDE_RAD if side else math.pi,
             )
             for gap in behind[: len(agents) - 1]
         ]

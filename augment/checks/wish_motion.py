@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.checks.asked_motions import BRAKES, DOOR, check_path
+from augment.checks.asked_motions import BRAKES, DOOR, SLOWS, check_path
 from augment.checks.lanes_across import find_mark
 from augment.checks.motions import LIMITS, measure_bends
 from augment.checks.parties import Case
@@ -42,7 +42,6 @@ _HINGED_M = 0.15
 _OPENS_S = 0.3, 3.0
 _WIDER = 1.0, 1.005, 1.01, 1.02, 1.05
 """Bends are measured by chords, so as little more as helps than what is needed."""
-_SLOWS = planned.MotionPreset.HARD_BRAKING, planned.MotionPreset.EMERGENCY_STOP
 
 Speeds = tuple[tuple[float, float], ...]
 Span = tuple[float, float]
@@ -281,7 +280,7 @@ class _Ramp:
 
 
 def _find_ramp(case: MotionCase, wish: MotionWish) -> _Ramp:
-    from_mps, slows = case.placed.speed_mps, wish.preset in _SLOWS
+    from_mps, slows = case.placed.speed_mps, wish.preset in SLOWS
     to_mps = case.own.speeds[-1][1] if case.own.speeds else from_mps
     if wish.speed_mps is not None:
         to_mps = _shift(to_mps, 0.0, (wish.speed_mps.low, wish.speed_mps.high))
@@ -324,9 +323,9 @@ def _list_paths(
 ) -> Iterator[planned.Path | None]:
     """Yield the answer's path, the same from where it has to begin, and the usual one."""
     own = case.own.path
-    if wish.preset in (*_SLOWS, planned.MotionPreset.RED_LIGHT):
+    if wish.preset in (*SLOWS, planned.MotionPreset.RED_LIGHT):
         yield None
-    if wish.preset in _SLOWS:
+    if wish.preset in SLOWS:
         return
     if isinstance(own, planned.LanePath) and wish.duration_s is not None:
         # The sentence has seconds, a path has metres.

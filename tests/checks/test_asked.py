@@ -107,6 +107,7 @@ def test_what_is_as_asked_for_has_no_fault(
         (WALK, (replace(ACROSS[0], heading_rad=math.pi / 2.0),), FindingKind.ASKED_HEADING),
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 15.0)),), FindingKind.ASKED_HEADING),
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, 3.0)),), FindingKind.ASKED_CROSSING),
+        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -0.5)),), FindingKind.ASKED_CROSSING),
         (CRASH, CARS[:1], FindingKind.ASKED_COUNT),
         (ASIDE, CARS, FindingKind.ASKED_ACROSS),
         (CRASH, (CARS[0], replace(CARS[1], heading_rad=0.0)), FindingKind.ASKED_HEADING),
@@ -279,6 +280,7 @@ CHAIN = wish.CrashRequest(spot=SPOT, count=3, others=TURNED)
 AFTER = wish.CrashedCar(gap=GAP, bearing=wish.Bearing.BEHIND, turn_deg=40.0)
 BEHIND = wish.CrashRequest(spot=SPOT, count=2, others=(AFTER,))
 PLAIN = wish.CrashRequest(spot=SPOT, count=2)
+FURTHER = replace(CHAIN, others=(wish.CrashedCar(gap=GAP, turn_deg=80.0),) * 2)
 FIRST_ACROSS = wish.CrashRequest(spot=SPOT, count=2, facing=wish.Facing.ACROSS)
 AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
 
@@ -298,6 +300,7 @@ AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
         (BEHIND, cars((25.0, 0.0, 0.0), (29.6, 0.0, 40.0)), ["asked_distance"]),
         (PLAIN, cars((25.0, 0.0, 0.0), (29.9, 0.0, 10.0)), []),
         (PLAIN, cars((25.0, 0.0, 0.0), (33.0, 0.0, 10.0)), ["asked_spacing"]),
+        (FURTHER, cars((25.0, 0.0, 0.0), (29.6, 0.0, 80.0), (27.7, 4.2, 0.0)), []),
         (FIRST_ACROSS, cars((25.0, 0.0, -80.0), (28.7, 0.0, 0.0)), []),
         (FIRST_ACROSS, cars((25.0, 0.0, 0.0), (29.9, 0.0, 0.0)), ["asked_heading"]),
     ],

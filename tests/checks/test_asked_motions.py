@@ -124,6 +124,12 @@ def test_what_is_off_is_named_by_its_kind(
     assert kind in faults(base, spoilt, intent)
 
 
+def test_who_holds_its_speed_at_first_begins_later() -> None:
+    base, intent = WISHES["hard_braking"]
+    held = replace(LEADER, motion=PlannedMotion(speeds=((2.0, 8.0), (3.6, 0.0))))
+    assert not faults(base, Modification(moved=(held,)), intent)
+
+
 def test_ranges_are_drawn_by_the_seed() -> None:
     motion = {"preset": "u_turn", "start": {"ego_distance": {"low_m": 10.0, "high_m": 20.0}}}
     intent = added(motion, spot=ahead(30.0))

@@ -170,6 +170,9 @@ HAND_COMPUTED: list[tuple[Scene, wish.Intent, tuple[TrafficAgent, ...], list[flo
     (STREET, WALK, (pedestrian("Agent2", 17.0, 6.0, (17.0, -3.0)),), [3.0]),
     (STREET, FILE, (pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
                     pedestrian("Agent3", 20.0, 4.4, (20.0, -3.0))), [0.0, 0.4]),
+    # Abreast is no file: the second belongs within 45 degrees of behind the first.
+    (STREET, FILE, (pedestrian("Agent2", 20.0, 1.0, (20.0, -3.0)),
+        pedestrian("Agent3", 23.0, 1.0, (23.0, -3.0))), [0.0, 3.0 * math.sqrt(2.0 - 2.0**0.5)]),
     # Named places: the junction lies 20 to 36 m ahead.
     (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(10.0, 0.0),), [0.0]),
     (junction(), named(wish.Setting.BEFORE_INTERSECTION), (car(22.0, 0.0),), [2.0]),
