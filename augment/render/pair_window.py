@@ -68,10 +68,11 @@ def pair_camera(
     scene = ground.scene
     need = _around([scene.ego.box.corners_m])
     changed = [place for side in sides for place in changed_places(scene, side)]
-    # Of a walk the box and the end each on its own.
-    places = [part for place in changed for part in np.split(place, [4]) if len(part)]
+    near = [place for place in changed if np.hypot(*place.T).min() <= FOLLOWED_M]
+    places = [place[4:] for place in near if len(place) > 4]  # where walks end
     places += [*_named(ground, intent), *(bar for _, bar in tick_bars(scene, ticks_m))]
     places = [place for place in places if _middle_m(place) <= FOLLOWED_M]
+    places += [place[:4] for place in near]
     # No arrow at the edge points to who is gone.
     gone = {name for side in sides for name in side.removed}
     places += [agent.box.corners_m for agent in scene.agents if agent.id in gone]
