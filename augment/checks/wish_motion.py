@@ -10,6 +10,7 @@ Frame: the scene's. T steps.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from augment.errors import CannotPlace
 from augment.scene import planned_motion as planned
 from augment.scene import presets
 from augment.scene.entities import Point, TrafficAgent
-from augment.scene.intent import MotionWish, Request, Spot, VehicleRequest
+from augment.scene.intent import MotionWish, Request, Spot, StartWish, VehicleRequest
 from augment.scene.motion import HORIZON_S, STEP_S, FloatArray, Motion, Movement
 from augment.scene.planned_mover import walk_as_motion, way_and_speed
 
@@ -246,7 +247,7 @@ def _is_admissible(
 
 def _list_starts(case: MotionCase, wish: MotionWish, speeds: Speeds) -> Iterator[Span]:
     """Yield from when to when a motion may begin, once for each reading of the sentence."""
-    start, times_s = wish.start, case.motion.times_s
+    start = wish.start
     if start is None:
         yield case.own_start_s, case.own_start_s
     elif start.after_s is not None:
@@ -256,18 +257,33 @@ def _list_starts(case: MotionCase, wish: MotionWish, speeds: Speeds) -> Iterator
         if start.may_end and high_s >= takes_s:
             yield max(low_s - takes_s, 0.0), high_s - takes_s
     else:
-        places = case.carry_out(case.give(None, (), math.inf), times_s[-1])[:, :2]
-        mark_m = find_mark(case.whole.lanes, start.mark) if start.mark else None
-        if mark_m is not None:
-            places[:] = case.whole.route.position(mark_m)
-        # (T,) of the ego from where the agent waits, or from the place that is named.
-        apart_m = np.hypot(*(case.motion.ego.states[: len(places), :2] - places[: len(times_s)]).T)
-        near = start.ego_distance
-        # The ego comes within the farther end first: that is the earliest start.
-        reaches_m = near.span_m[::-1] if near else (planned.REACHED_M,) * 2
+        yield from _find_reached(case, start)
+
+
+@lru_cache(maxsize=16)  # a search asks for each of its motions
+def _find_reached(case: MotionCase, start: StartWish) -> list[Span]:
+    """Return when the ego is as near as is asked for: as the crow flies, and along the lane."""
+    times_s = case.motion.times_s
+    places = case.carry_out(case.give(None, (), math.inf), times_s[-1])[: len(times_s), :2]
+    mark_m = find_mark(case.whole.lanes, start.mark) if start.mark else None
+    if mark_m is not None:
+        places[:] = case.whole.route.position(mark_m)
+    # (T,) of the ego from where the agent waits, or from the place that is named.
+    egos = case.motion.ego.states[: len(places), :2]
+    readings_m = [np.hypot(*(egos - places).T)]
+    if mark_m is None:
+        locate = case.whole.route.locate
+        at_m, ego_m = ([locate(*point).ahead_m for point in both] for both in (places, egos))
+        readings_m.append(np.abs(np.subtract(at_m, ego_m)))
+    near = start.ego_distance
+    # The ego comes within the farther end first: that is the earliest start.
+    reaches_m = near.span_m[::-1] if near else (planned.REACHED_M,) * 2
+    spans = []
+    for apart_m in readings_m:
         steps = (np.flatnonzero(apart_m <= reach_m) for reach_m in reaches_m)
         first_s, last_s = (float(times_s[at[0]]) if len(at) else math.inf for at in steps)
-        yield first_s, last_s
+        spans.append((first_s, last_s))
+    return spans
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -31,7 +31,7 @@ from tests.scenes import vehicle
 
 CUT_IN, BRAKING = "cut-in-boulevard-north", "hard-braking-mill-junction"
 U_TURN, DOOR, CHILD = "u-turn-quarry-narrows", "door-lime-street", "late-pedestrian-lime-street"
-BUS = "red-light-brewery-crossing"
+BUS, TURN = "red-light-brewery-crossing", "emergency-stop-theatre-crossing"
 
 ROUND = ((2.55, -0.68), (4.42, -2.55), (5.1, -5.1), (4.42, -7.65), (2.55, -9.52), (0.0, -10.2))
 """Half a circle, from where it begins."""
@@ -89,6 +89,15 @@ def bus(y_m: float, **parts: Any) -> TrafficAgent:
     return agent(34.3, y_m, 1.571, speed_mps=8.0, lane_id="Lane16", **size, **parts)
 
 
+def stopping(within_m: float) -> TrafficAgent:
+    car: dict[str, Any] = {
+        "speed_mps": 3.0,
+        "lane_id": "Connector8",
+        "speeds": ((3.0 / 7.0, 0.0),),
+    }
+    return agent(35.75, 16.35, 1.558, start=NearEgo(within_m=within_m), **car)
+
+
 CROSSING = LanePath(lane_ids=("Lane16", "Connector13", "Lane8"))
 RIGHT = {
     "a cut-in over 22 m": (CUT_IN, cutting_in(22.0, (2.5, 7.0))),
@@ -104,6 +113,8 @@ RIGHT = {
     "a bus over the crossing": (BUS, bus(-33.46, path=CROSSING)),
     "a bus that holds its velocity": (BUS, bus(-33.46)),
     "a careless bus, where one may come from": (BUS, bus(-28.0)),
+    "who stops at 32 m round a turn": (TURN, stopping(30.21)),
+    "who stops at 32 m as the crow flies": (TURN, stopping(32.0)),
 }
 CARELESS = {
     "stops in the next lane": (CUT_IN, cutting_in(20.0, (2.0, 0.0))),
