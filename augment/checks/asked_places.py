@@ -19,8 +19,8 @@ from augment.scene.entities import TrafficAgent
 _TAPER_M = 1.0
 """Cones of which the last is this far across from the first run from one side to the other."""
 _MISPLACED = {True: 10.0, False: 0.01}
-"""Of an order with somebody on the wrong side of the one before, and by whether a side is named:
-it is only taken for want of another, and else where all the rest is the same."""
+"""Of an order with somebody on the wrong side of the one before, by whether that side is known (of
+the first two it is): taken only for want of another, else where all the rest is the same."""
 _ROUGHLY_DEG = 2.0 * USUAL.heading_deg
 """A car that has spun stands "crosswise" only roughly."""
 
@@ -274,7 +274,8 @@ def _misfit(case: Case, order: Sequence[TrafficAgent], request: wish.CrashReques
             wish.Bearing.LEFT: there.left_m - here.left_m,
             wish.Bearing.RIGHT: here.left_m - there.left_m,
         }[car.bearing or wish.Bearing.AHEAD]
-        misfit += _MISPLACED[car.bearing is not None] if further_m < 0.0 else 0.0
+        is_known = leader is order[0] or car.bearing is not None
+        misfit += _MISPLACED[is_known] if further_m < 0.0 else 0.0
     return misfit
 
 
