@@ -264,34 +264,20 @@ def test_a_report_that_can_not_be_kept_says_why(study: Study) -> None:
 
 
 WRONG: list[tuple[dict[str, object], str]] = [
-    ({"outcome": "left"}, "outcome"),
-    ({"outcome": None}, "outcome"),
-    ({"key": "1"}, "key"),
-    ({"key": 5}, "key"),
-    ({"matchup": 5}, "matchup"),
-    ({"supersedes": 5}, "supersedes"),
-    ({"matchup": None}, "matchup"),
-    ({"supersedes": "x"}, "supersedes"),
-    ({"ms_visible": -1}, "ms_visible"),
-    ({"ms_visible": "12"}, "ms_visible"),
-    ({"ms_visible": 2**31}, "ms_visible"),
-    ({"expert": "finn"}, "expert"),
-    ({"outcome": "skip"}, "reason"),
-    ({"outcome": "skip", "reason": "bored"}, "reason"),
-    ({"reason": "unclear"}, "reason"),
-    ({"reason": "\ud800"}, "reason"),
-    ({"\ud800": 1}, "\ud800"),
-    ({"both_miss": True}, "both_miss"),
+    ({"outcome": "left"}, "outcome"), ({"outcome": None}, "outcome"),
+    ({"key": "1"}, "key"), ({"key": 5}, "key"),
+    ({"matchup": 5}, "matchup"), ({"matchup": None}, "matchup"),
+    ({"supersedes": 5}, "supersedes"), ({"supersedes": "x"}, "supersedes"),
+    ({"ms_visible": -1}, "ms_visible"), ({"ms_visible": "12"}, "ms_visible"),
+    ({"ms_visible": 2**31}, "ms_visible"), ({"expert": "finn"}, "expert"),
+    ({"outcome": "skip"}, "reason"), ({"outcome": "skip", "reason": "bored"}, "reason"),
+    ({"reason": "unclear"}, "reason"), ({"reason": "\ud800"}, "reason"),
+    ({"\ud800": 1}, "\ud800"), ({"n": 0}, "n"), ({"n": 13}, "n"),
+    ({"both_miss": True}, "both_miss"), ({"both_miss": 1}, "both_miss"),
     ({"outcome": "E", "both_miss": True}, "both_miss"),
-    ({"both_miss": 1}, "both_miss"),
-    ({"comment": "x" * 1001}, "comment"),
-    ({"comment": 5}, "comment"),
-    ({"aids": ["glasses"]}, "aids"),
-    ({"aids": ["replay"]}, "aids"),
-    ({"aids": "zoom"}, "aids"),
-    ({"n": 0}, "n"),
-    ({"n": 13}, "n"),
-]
+    ({"comment": "x" * 1001}, "comment"), ({"comment": 5}, "comment"),
+    ({"aids": ["glasses"]}, "aids"), ({"aids": ["replay"]}, "aids"), ({"aids": "zoom"}, "aids"),
+]  # fmt: skip
 """What a body is changed by, and the field that is named then."""
 
 

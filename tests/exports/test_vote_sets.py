@@ -192,9 +192,11 @@ def test_a_vote_is_exported_with_all_that_was_kept_of_it() -> None:
     (line,) = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(table).decode()))
     milliseconds = kept.at.microsecond // 1000 * 1000
     assert datetime.fromisoformat(line["at"]) == kept.at.replace(microsecond=milliseconds)
-    wanted = {"position": str(first.position), "aids": "zoom ruler", "strength": "slightly"}
-    wanted |= {"augmentation_a": str(first.left.code), "augmentation_b": str(first.right.code)}
-    wanted |= {"comment": "'=both turn"}  # no formula, one line
+    wanted = {
+        "position": str(first.position), "aids": "zoom ruler", "strength": "slightly",
+        "augmentation_a": str(first.left.code), "augmentation_b": str(first.right.code),
+        "comment": "'=both turn",  # no formula, one line
+    }  # fmt: skip
     assert {name: line[name] for name in wanted} == wanted
     (row,) = parquet.read_table(io.BytesIO(VOTE_FORMATS["parquet"].write(table))).to_pylist()
     assert (row["position"], row["comment"]) == (first.position, "=both\nturn")

@@ -29,9 +29,11 @@ def box(
     sweep: int, track: str, x: float, y: float, heading: float = 0.0, **fields: Any
 ) -> dict[str, Any]:
     """A row of annotations.feather, in the ego frame (rear axle) of its sweep."""
-    row: dict[str, Any] = {"timestamp_ns": START_NS + sweep * STEP_NS, "track_uuid": track}
-    row |= {"category": "REGULAR_VEHICLE", "num_interior_pts": 9}
-    row |= {"length_m": 4.5, "width_m": 1.9, "height_m": 1.6, "tx_m": x, "ty_m": y, "tz_m": 0.5}
+    row: dict[str, Any] = {
+        "timestamp_ns": START_NS + sweep * STEP_NS, "track_uuid": track,
+        "category": "REGULAR_VEHICLE", "num_interior_pts": 9,
+        "length_m": 4.5, "width_m": 1.9, "height_m": 1.6, "tx_m": x, "ty_m": y, "tz_m": 0.5,
+    }  # fmt: skip
     return row | quaternion(heading) | fields
 
 
@@ -67,11 +69,13 @@ def points(*pairs: Point) -> list[dict[str, float]]:
 def segment(
     number: int, left: list[Point], right: list[Point], *after: int, **fields: Any
 ) -> dict[str, Any]:
-    made: dict[str, Any] = {"id": number, "is_intersection": False, "lane_type": "VEHICLE"}
-    made |= {"left_lane_boundary": points(*left), "right_lane_boundary": points(*right)}
-    made |= dict.fromkeys(("left_lane_mark_type", "right_lane_mark_type"), "NONE")
-    made |= dict.fromkeys(("left_neighbor_id", "right_neighbor_id"))
-    made |= {"successors": list(after), "predecessors": []}
+    made: dict[str, Any] = {
+        "id": number, "is_intersection": False, "lane_type": "VEHICLE",
+        "left_lane_boundary": points(*left), "right_lane_boundary": points(*right),
+        "left_lane_mark_type": "NONE", "right_lane_mark_type": "NONE",
+        "left_neighbor_id": None, "right_neighbor_id": None,
+        "successors": list(after), "predecessors": [],
+    }  # fmt: skip
     return made | fields
 
 

@@ -17,11 +17,13 @@ STEPS, OBSERVED = 110, 50
 
 
 def row(track: str, kind: str, step: int, x: float, y: float, **fields: Any) -> dict[str, Any]:
-    made: dict[str, Any] = {"track_id": track, "object_type": kind, "timestep": step}
-    made |= {"position_x": x, "position_y": y, "heading": math.pi / 2}
-    made |= {"velocity_x": 0.0, "velocity_y": 0.0, "object_category": 2, "city": "pittsburgh"}
-    made |= {"start_timestamp": 1.0, "end_timestamp": 2.0, "num_timestamps": STEPS}
-    made |= {"observed": step < OBSERVED, "scenario_id": "made", "focal_track_id": "7"}
+    made: dict[str, Any] = {
+        "track_id": track, "object_type": kind, "object_category": 2, "timestep": step,
+        "position_x": x, "position_y": y, "heading": math.pi / 2,
+        "velocity_x": 0.0, "velocity_y": 0.0, "observed": step < OBSERVED,
+        "start_timestamp": 1.0, "end_timestamp": 2.0, "num_timestamps": STEPS,
+        "scenario_id": "made", "focal_track_id": "7", "city": "pittsburgh",
+    }  # fmt: skip
     return made | fields
 
 

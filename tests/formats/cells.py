@@ -45,9 +45,11 @@ def cell(before: Scene | None = None, **changes: Any) -> Cell:
     cones = cone("Agent3", 20.0, -1.0), cone("Agent4", 22.5, -1.2)
     walker = pedestrian("Agent5", 70.0, -4.0, (70.0, 8.0))
     added = changes.pop("added", (vehicle("Agent2", 30.25, 0.5, 0.1), *cones, walker))
-    given: dict[str, Any] = {"name": "street by rule", "stem": "street--rule"}
-    given |= {"scene": before or scene(), "type": ScenarioType.NUDGE}
-    return Cell(**(given | {"modification": Modification(added=added)} | changes))
+    made: dict[str, Any] = {
+        "name": "street by rule", "stem": "street--rule", "type": ScenarioType.NUDGE,
+        "scene": before or scene(), "modification": Modification(added=added),
+    }  # fmt: skip
+    return Cell(**made | changes)
 
 
 def moving() -> Cell:

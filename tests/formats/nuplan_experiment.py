@@ -13,9 +13,11 @@ WHO = {"planner_name": "PDMClosedPlanner", "log_name": "2021.06.03.12.02.06_veh-
 
 def scored(scenario: str, score: float, **more: Any) -> dict[str, Any]:
     """A row of the aggregator for one scenario."""
-    made: dict[str, Any] = {"scenario": scenario, "score": score, "num_scenarios": None}
-    made |= {"scenario_type": "jaywalking_pedestrian", "aggregator_type": "weighted_average"} | WHO
-    return made | dict.fromkeys(METRICS, 1.0) | {"lane_changes_to_goal": None} | more
+    made: dict[str, Any] = WHO | dict.fromkeys(METRICS, 1.0) | {
+        "scenario": scenario, "score": score, "num_scenarios": None, "lane_changes_to_goal": None,
+        "scenario_type": "jaywalking_pedestrian", "aggregator_type": "weighted_average",
+    }  # fmt: skip
+    return made | more
 
 
 def summed(scenario_type: str, number: int, score: float) -> dict[str, Any]:

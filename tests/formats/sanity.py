@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-FIRST_LEVEL = {"id", "version", "length", "metadata", "tracks"}
-FIRST_LEVEL |= {"dynamic_map_states", "map_features"}
+FIRST_LEVEL = {
+    "id", "version", "length", "metadata", "tracks", "dynamic_map_states", "map_features"
+}  # fmt: skip
 METADATA = {"metadrive_processed", "coordinate", "ts"}
 OBJECT_TYPES = {
     *("VEHICLE", "PEDESTRIAN", "CYCLIST", "OTHER"),

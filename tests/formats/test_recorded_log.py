@@ -24,8 +24,10 @@ def test_cones_never_move_however_their_boxes_jitter(kind: AgentType, speed_mps:
     jittering = LoggedTrack(
         name="a", type=kind, length_m=0.4, width_m=0.4, states=np.array([[5.0, 0.0, 0.0, 0.4]])
     )
-    rest: dict[str, Any] = {"map_at": lambda _: RoadMap(place="map", segments=())}
-    rest |= {"world": "world", "title": "log", "licence": "none", "ego_size_m": (4.8, 2.0)}
+    rest: dict[str, Any] = {
+        "world": "world", "title": "log", "licence": "none", "ego_size_m": (4.8, 2.0),
+        "map_at": lambda _: RoadMap(place="map", segments=()),
+    }  # fmt: skip
     log = Log(times_s=np.zeros(1), ego=np.zeros((1, 4)), tracks=(jittering,), **rest)
     found = log.reading_at(0, "a")
     assert [agent.speed_mps for agent in found.scene.agents] == [speed_mps]

@@ -22,8 +22,10 @@ def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str
     state = {
         "position": np.column_stack([xs, np.zeros(steps), np.zeros(steps)]),
         "velocity": np.column_stack([np.full(steps, speed), np.zeros(steps)]),
-        **{"heading": np.zeros(steps), "valid": np.ones(steps)},
-        **{"length": 4.5 * column, "width": 1.9 * column},
+        "heading": np.zeros(steps),
+        "valid": np.ones(steps),
+        "length": 4.5 * column,
+        "width": 1.9 * column,
     }
     return {"type": "VEHICLE", "state": state, "metadata": {}} | fields
 
@@ -40,10 +42,14 @@ def description() -> dict[str, Any]:
     inner = {"type": "LANE_SURFACE_UNSTRUCTURE", "speed_limit_kmh": 100, "entry_lanes": ["a"]}
     ego = moving(0.0, 10.0)
     ego["state"]["length"], ego["state"]["width"] = ego["state"]["width"], ego["state"]["length"]
-    metadata = {"sdc_id": "ego", "ts": np.array([0.0, 0.1, 0.2]), "counts": defaultdict(int)}
-    metadata |= {"dataset": "nuscenes", "map": "singapore-onenorth"}
+    metadata = {
+        "sdc_id": "ego", "ts": np.array([0.0, 0.1, 0.2]), "counts": defaultdict(int),
+        "dataset": "nuscenes", "map": "singapore-onenorth",
+    }  # fmt: skip
     return {
-        **{"id": "made", "length": 3, "metadata": metadata},
+        "id": "made",
+        "length": 3,
+        "metadata": metadata,
         "tracks": {"ego": ego, "car": moving(20.0, 5.0), "cone": moving(9.0, 0.0, type="OTHER")},
         "dynamic_map_states": {
             "x": {"lane": "x", "state": {"object_state": ["LANE_STATE_GO", "LANE_STATE_STOP", ""]}}

@@ -125,21 +125,13 @@ SECRETS = ("ARENA_SECRET_KEY", "DATABASE_URL", "REDIS_URL", "AWS_SECRET_ACCESS_K
 @pytest.mark.parametrize(
     ("variable", "may"),
     [
-        ("OPENAI_API_KEY", True),
-        ("_my_API_KEY", True),
-        ("LAB_TOKEN", True),
-        ("LAB_TOKEN_2", False),
-        ("LAB_TOKE", False),
-        ("lab_token", False),
-        ("API_KEY", False),
-        ("_API_KEY", False),
-        ("OPENAI_API_KEY_FILE", False),
-        ("openai_api_key", False),
-        ("2_API_KEY", False),
-        ("MY_API_KEY\n", False),
+        ("OPENAI_API_KEY", True), ("_my_API_KEY", True), ("LAB_TOKEN", True),
+        ("LAB_TOKEN_2", False), ("LAB_TOKE", False), ("lab_token", False),
+        ("API_KEY", False), ("_API_KEY", False), ("2_API_KEY", False), ("MY_API_KEY\n", False),
+        ("OPENAI_API_KEY_FILE", False), ("openai_api_key", False),
         *((name, False) for name in SECRETS),
     ],
-)
+)  # fmt: skip
 def test_which_variables_may_hold_a_key(settings: Any, variable: str, may: bool) -> None:
     settings.KEY_VARIABLES = ["LAB_TOKEN"]
     assert may_hold_key(variable) is may

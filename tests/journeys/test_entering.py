@@ -88,15 +88,8 @@ def codes_of(study: Study) -> set[str]:
     row = study.matchups.earliest("pk")
     theirs = Augmentation.objects.filter(contestant__slug="quixotic").earliest("pk")
     scenario = Scenario.objects.filter(benchmark_items__split="test").earliest("pk")
-    found: list[Any] = [
-        study,
-        row,
-        theirs,
-        theirs.job,
-        theirs.contestant,
-        scenario,
-        scenario.base_scene,
-    ]
+    found: list[Any] = [study, row, theirs, theirs.job, theirs.contestant]
+    found += [scenario, scenario.base_scene]
     found += [*Submission.objects.all(), *Benchmark.objects.all(), row.expert.person]
     return {str(one.code) for one in found}
 

@@ -40,8 +40,9 @@ def read(document: object, least: int = 0) -> Reply:
 
 # --- No silent default -------------------------------------------------------------------------
 
-SENT: dict[str, Any] = {"temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh"}
-SENT["max_completion_tokens"] = 8192
+SENT: dict[str, Any] = {
+    "temperature": 0.2, "seed": 7, "reasoning_effort": "xhigh", "max_completion_tokens": 8192
+}  # fmt: skip
 WRONG: tuple[object, ...] = (7, -1.5, True, "word", "", [], [7], [["a"]], {}, {"a": 1}, None)
 
 

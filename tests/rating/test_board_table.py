@@ -51,13 +51,16 @@ def test_opponents_are_the_first_the_last_and_evenly_between(ranked: str, chosen
 
 def a_table() -> BoardTableDocument:
     day, sha256 = "2026-01-01", "0" * 64
-    who: dict[str, Any] = {"name": "Ann", "slug": "ann", "kind": "submission", "since": day}
-    who |= {"authors": ("Ada", "Bo"), "is_open": False, "is_simulated": False}
-    line = BoardLine(rating=1000.5, **who)
+    line = BoardLine(
+        name="Ann", slug="ann", kind="submission", since=day, authors=("Ada", "Bo"),
+        rating=1000.5, is_open=False, is_simulated=False,
+    )  # fmt: skip
     study = PooledStudy(name="Round 1", code="1", closed_at=day, votes=3, preregistration=sha256)
     texts = {"board": "City", "benchmark": "city@1", "question": "Which?", "answer": "Nobody."}
-    rated: dict[str, Any] = {"lines": (line,), "studies": (study,), "founders": ("ann",)}
-    rated |= {"votes": 3, "votes_sha256": sha256, "left_out": {"skip": 1}, "notes": ("Few.",)}
+    rated: dict[str, Any] = {
+        "lines": (line,), "studies": (study,), "founders": ("ann",), "notes": ("Few.",),
+        "votes": 3, "votes_sha256": sha256, "left_out": {"skip": 1},
+    }  # fmt: skip
     return BoardTableDocument(
         number=1,
         made_at=f"{day}T12:00:00+00:00",

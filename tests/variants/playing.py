@@ -72,9 +72,10 @@ class MemoryTranscript:
 
 
 def agent(**changes: object) -> dict[str, object]:
-    made: dict[str, object] = {"id": "Agent2", "type": "VEHICLE", "x_m": 21.4, "y_m": 0.9}
-    made |= {"heading_rad": 0.0, "width_m": 2.0, "length_m": 4.8, "speed_mps": 0.0}
-    made |= {"lane": "Lane1"}
+    made: dict[str, object] = {
+        "id": "Agent2", "type": "VEHICLE", "x_m": 21.4, "y_m": 0.9, "heading_rad": 0.0,
+        "width_m": 2.0, "length_m": 4.8, "speed_mps": 0.0, "lane": "Lane1",
+    }  # fmt: skip
     return {key: value for key, value in (made | changes).items() if value is not ...}
 
 

@@ -171,8 +171,10 @@ def test_the_database_itself_refuses_two_first_votes_and_a_winner_that_was_not_s
     stored = vote(first)
 
     def copy(**changes: object) -> Vote:
-        row = {"matchup": first, "expert": first.expert, "outcome": "left", "winner": first.left}
-        row |= {"shown_left": first.left, "shown_right": first.right, "key": uuid.uuid4()}
+        row = {
+            "matchup": first, "expert": first.expert, "key": uuid.uuid4(), "outcome": "left",
+            "winner": first.left, "shown_left": first.left, "shown_right": first.right,
+        }  # fmt: skip
         return Vote(**row | changes)
 
     twice = copy()

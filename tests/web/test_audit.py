@@ -180,6 +180,8 @@ def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
     assert 'name="back"' in answer
     admin.post(url, wanted | {"back": "1"})
     assert not Authorship.objects.exists()
+    acts = Event.objects.filter(verb__endswith=" author", actor__username="the-admin")
+    assert acts.count() == 2, "who took it back stands in the log as well"
 
 
 # --- Results -----------------------------------------------------------------------------------

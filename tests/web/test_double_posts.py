@@ -39,7 +39,7 @@ from augment.services.running.jobs import JobRequest
 from augment.services.scenarios.uploads import UPLOADS, keep_upload
 from tests import entering, study_rows
 from tests.api.asking import error_of
-from tests.api.test_making import CAR, STREET
+from tests.api.test_resources import CAR, STREET
 from tests.api.tokens import secret_of
 from tests.board_rows import newcomer
 from tests.jobs.models import Model, add_llama, ran

@@ -151,8 +151,8 @@ def test_a_stopped_job_is_raised_and_resumed_from_its_page(admin: Client) -> Non
     assert "Stopped at its cap." in shown
     progress = admin.get(reverse("job-progress", args=[job.code])).json()
     assert (progress["state"], progress["is_over"]) == ("stopped_at_cap", True)
-    answer = admin.post(resume, {"cap_tokens": "many"}, follow=True)
-    assert "A cap is a number" in answer.content.decode()
+    for wrong, sentence in (("3", "must be higher"), ("many", "A cap is a number")):
+        assert sentence in admin.post(resume, {"cap_tokens": wrong}, follow=True).content.decode()
     job.refresh_from_db()
     assert (job.state, job.cap_tokens) == (GenerationJob.State.STOPPED_AT_CAP, 5)
     admin.post(resume, {"cap_tokens": "90000"})

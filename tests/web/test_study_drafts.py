@@ -51,19 +51,11 @@ def value(answer: Any, name: str) -> str:
 def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
     study_rows.cast_of()
     sent = {
-        "name": "Round 1",
-        "contestants": ["bob"],
-        "experts": ["finn"],
-        "scenarios": ["place-0", "place-3"],
-        "votes_per_expert": "",
-        "seed": "77",
-        "repeats": "12.5",
-        "checks": "99",
-        "hypotheses": "ann above",
-        "allow_replay": "on",
-        "samples": "all",
-        "keep": "1",
-    }
+        "name": "Round 1", "contestants": ["bob"], "experts": ["finn"],
+        "scenarios": ["place-0", "place-3"], "votes_per_expert": "", "seed": "77",
+        "repeats": "12.5", "checks": "99", "hypotheses": "ann above", "allow_replay": "on",
+        "samples": "all", "keep": "1",
+    }  # fmt: skip
     answer = admin.post(NEW, sent)
     draft = StudyDraft.objects.get()
     assert answer.headers["Location"] == page_of(draft)

@@ -302,15 +302,8 @@ def test_the_answer_says_nothing_of_where_it_comes_from() -> None:
     address = reverse("replay", args=[first.code])
     answer = signed_in(User.objects.get(username="eva")).get(address)
     assert set(answer.json()) == {"a", "b"}
-    assert set(answer.json()["a"]) == {
-        "format",
-        "version",
-        "step_s",
-        "steps",
-        "ego",
-        "road",
-        "objects",
-    }
+    told = {"format", "version", "step_s", "steps", "ego", "road", "objects"}
+    assert set(answer.json()["a"]) == told
     assert answer["Cache-Control"] == "private, no-store"
     assert not {"ETag", "Last-Modified", "Content-Disposition"} & set(answer.headers)
     assert signed_in(User.objects.get(username="finn")).get(address).status_code == 404
