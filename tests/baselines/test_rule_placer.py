@@ -307,6 +307,7 @@ def test_walks_begin_and_end_beside_those_of_the_reference(slug: str) -> None:
     )
     for walker, wanted in pairs:
         assert (walker.x_m, walker.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1.5)
+        assert wanted.walk_to_m
         assert walker.walk_to_m == pytest.approx(wanted.walk_to_m, abs=2.0)
 
 
