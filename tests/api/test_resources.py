@@ -1,4 +1,4 @@
-"""What is made and read by the wire: the services, roles and bytes of pages; lists with ETags."""
+"""Resources of the wire: the services, roles and bytes of pages; studies; lists with ETags."""
 
 import json
 from collections.abc import Callable

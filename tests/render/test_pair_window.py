@@ -21,7 +21,7 @@ from augment.scene.planned_motion import AtTime, PlannedMotion
 from augment.services.scenarios.catalogue import read_catalogue
 from tests import scenes
 from tests.properties import examples
-from tests.render.pictures import at_camera_size
+from tests.render.pictures import at_camera_size, pixel_at
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 STREET = Ground.of(scenes.scene())
@@ -111,10 +111,10 @@ def test_distances_that_are_named_are_ticked_on_the_egos_lane_as_far_as_it_goes(
     assert camera.x_max_m == 40.0
     plain = replace(camera, ticks_m=())
     for side in sides:
-        ticked, bare = (
-            at_camera_size(draw(STREET.scene, side, one), one) for one in (camera, plain)
-        )
-        columns = np.flatnonzero((ticked != bare).any(axis=(0, 2)))
+        ticked, bare = (draw(STREET.scene, side, one) for one in (camera, plain))
+        changed = at_camera_size(ticked, camera) != at_camera_size(bare, plain)
+        columns = np.flatnonzero(changed.any(axis=(0, 2)))
+        assert all(max(pixel_at(ticked, camera, 30.0, y_m)) < 60 for y_m in (-1.0, 1.0))
         # Metres ahead of the ego; a label is about 3 m wide.
         assert np.abs(camera.x_min_m + columns / camera.px_per_m - 30.0).max() < 4.0
 

@@ -1,4 +1,4 @@
-"""Displacement of stored rows; the street's reference has cones at (20, 0.5) and (25, -0.5)."""
+"""Displacement and scores of stored rows; the street's cones are at (20, 0.5) and (25, -0.5)."""
 
 import math
 
