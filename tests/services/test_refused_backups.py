@@ -60,12 +60,13 @@ def with_member(name: str) -> Mend:
 def taken(django_db_setup: None, django_db_blocker: Any, tmp_path_factory: Any) -> list[bytes]:
     """Backups of an empty installation and of a full one."""
     folder: Path = tmp_path_factory.mktemp("backups")
-    names, own = ("empty.zip", "full.zip"), {"MEDIA_ROOT": folder / "media", "VAR_DIR": folder}
+    own = {"MEDIA_ROOT": folder / "media", "VAR_DIR": folder}
     with django_db_blocker.unblock(), override_settings(**own):
-        for name in names:
-            take_backup(folder / name, now=NOW, say=quiet)
-            a_full_house() if name == "empty.zip" else empty()
-    return [(folder / name).read_bytes() for name in names]
+        take_backup(folder / "empty.zip", now=NOW, say=quiet)
+        a_full_house()
+        take_backup(folder / "full.zip", now=NOW, say=quiet)
+        empty()
+    return [(folder / name).read_bytes() for name in ("empty.zip", "full.zip")]
 
 
 @pytest.fixture
