@@ -16,7 +16,7 @@ from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, 
 from arena.exports.leaderboard import VOTES_FILE, list_columns, print_lines
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
-from arena.rating.lines import notes_by_reason, votes_text
+from arena.rating.lines import count_text, notes_by_reason, votes_text
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
 from arena.rating.rules import (
@@ -142,10 +142,8 @@ def run(
         board = replace(board, lines=tuple(lines))
     notes = [*_notes(board, there, unseen), table.note]
     if repeats:
-        notes.append(
-            f"{repeats} votes repeat an earlier one of the same judge, item and pair; all are "
-            "counted."
-        )
+        again = f"{count_text(repeats, 'vote|')} repeat{'s' * (repeats == 1)} an earlier one"
+        notes.append(f"{again} of the same judge, item and pair; all are counted.")
     told_apart = None if unseen else board.told_apart
     return FORMATS[format](RatedCsv(board, tuple(filter(None, notes)), told_apart))
 

@@ -7,7 +7,7 @@ FEWEST_DRAWS, MOST_DRAWS = 100, 100_000
 """Rounds that may be asked for; of fewer, what 95 % of them say is chance."""
 ROUNDS, BOOTSTRAP_ROUNDS = 10_000, 4000
 """Where nobody says how many: of single votes, and of random effects, by which ends of intervals
-move by one percent of the width from seed to seed (docs/rating.md)."""
+move by one percent of the width from seed to seed."""
 ROUNDS_OF_MANY, MANY_VOTES, MANY_CONTESTANTS = 1000, 500_000, 100
 """Above so many votes or, but for the closed form, contestants a round takes long."""
 
