@@ -163,7 +163,8 @@ def _crossing(case: Case, agent: TrafficAgent, request: WalkRequest) -> Finding:
     fits = kind is FindingKind.ASKED_CROSSING and to_m < 0.0 and from_m > -_ON_ROAD_M
     if fits and end and request.end is None and (agent.walk_to_m or agent.motion):
         # Over the lanes side by side, metre by metre, up to a step past where the walk ends.
-        ahead_m, steps = case.route.locate(*end).ahead_m, range(math.ceil(_ON_ROAD_M - to_m))
+        ahead_m, past_m = case.route.locate(*end).ahead_m, _ON_ROAD_M - to_m
+        steps = (*range(math.ceil(past_m)), past_m)
         points = [case.route.position(ahead_m, -side.sign * step) for step in steps]
         fits = not all(any(lane.covers for lane in case.route.graph.beside(*p)) for p in points)
     words = f"{{agents[0]}} is to cross the ego's way from the {side}"

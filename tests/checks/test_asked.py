@@ -75,6 +75,7 @@ def faults(
         (DRIVING, (vehicle("Agent2", 30.0, 0.0, speed_mps=9.0),)),
         (ONCOMING, (vehicle("Agent2", 20.0, 3.5, math.pi),)),
         (FILE, IN_FILE),
+        (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -0.9)),)),  # the road ends 0.85 m on
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (28.0, -3.0)),)),
         (NARROWED, TAPER),
     ],
