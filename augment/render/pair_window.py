@@ -58,8 +58,8 @@ def pair_camera(
         sides: Both changes.
         intent: Of the instruction, None without one.
         is_filmed: Whether the pictures have films.
-        differing: Objects that stand for each other, and how many metres apart; those of changes
-            that nobody confuses are not needed.
+        differing: Objects that stand for each other, and how many metres apart, more than 0; those
+            of changes that nobody confuses are not needed.
         ticks_m: Distances ahead of the ego that are marked on its lane.
 
     Raises:
@@ -180,7 +180,8 @@ def _with_inset(
     differing: tuple[tuple[TrafficAgent, TrafficAgent, float], ...],
 ) -> Camera:
     """Return the camera with an inset of what differs, where that is hard to see and it helps."""
-    apart = sorted((pair for pair in differing if pair[2] > 0.0), key=lambda pair: -pair[2])
+    # Of equal ones the rearmost first, whichever side is which.
+    apart = sorted(differing, key=lambda pair: (-round(pair[2], 6), pair[0].x_m + pair[1].x_m))
     seen_m = [m for *both, m in apart if any(camera.shows(one.box.corners_m) for one in both)]
     if not apart or max(seen_m, default=0.0) * camera.px_per_m >= INSET_BELOW_PX:
         return camera

@@ -105,6 +105,13 @@ def test_what_differs_little_has_an_inset(one: TrafficAgent, change: Any, place_
     assert pair_camera(STREET, (added(20.0), added(22.0)), differing=far).inset is None
 
 
+def test_of_objects_that_differ_alike_the_same_is_enlarged_whichever_comes_first() -> None:
+    cars = [[scenes.vehicle(f"New{x_m}", x_m, y_m) for x_m in (15, 50)] for y_m in (0.0, 0.2)]
+    near, far = zip(*cars, (0.2, 0.2), strict=True)
+    first = pair_camera(STREET, (added(15.0), added(50.0)), differing=(near, far))
+    assert first == pair_camera(STREET, (added(15.0), added(50.0)), differing=(far, near))
+
+
 def test_distances_that_are_named_are_ticked_on_the_egos_lane_as_far_as_it_goes() -> None:
     sides, ends_m = (added(12.0), added(18.0)), find_end_m()
     camera = pair_camera(STREET, sides, ticks_m=(30.0, ends_m + 5.0))

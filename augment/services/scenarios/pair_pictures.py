@@ -69,7 +69,7 @@ def frame_pair(
     loaded = LoadedScenario(first.scenario)
     sides = find_modification(first), find_modification(other)
     shown = [change for change in (loaded.reference, *sides) if change is not None]
-    shifts = find_shifts(*sides) or ()
+    shifts = [shift for shift in find_shifts(*sides) or () if shift.metres > 0.0]
     camera = pair_camera(
         loaded.ground,
         sides,
