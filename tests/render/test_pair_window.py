@@ -17,8 +17,11 @@ from augment.render.camera import Camera
 from augment.render.pair_window import AROUND_M, covered_boxes, film_states, pair_camera
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, TrafficAgent, without_traffic
+from augment.scene.intent import Intent, Relation, Spot, VehicleRequest
+from augment.scene.intent_parts import Length
 from augment.scene.planned_motion import AtTime, PlannedMotion
 from augment.services.scenarios.catalogue import read_catalogue
+from augment.services.scenarios.pair_pictures import list_distances
 from tests import scenes
 from tests.properties import examples
 from tests.render.pictures import at_camera_size, pixel_at
@@ -124,6 +127,14 @@ def test_distances_that_are_named_are_ticked_on_the_egos_lane_as_far_as_it_goes(
         assert all(max(pixel_at(ticked, camera, 30.0, y_m)) < 60 for y_m in (-1.0, 1.0))
         # Metres ahead of the ego; a label is about 3 m wide.
         assert np.abs(camera.x_min_m + columns / camera.px_per_m - 30.0).max() < 4.0
+
+
+def test_what_is_ticked_is_what_the_sentence_says() -> None:
+    about = Length(low_m=21.5, high_m=21.5, is_approximate=True)
+    spots = [Spot(distance=about, relation=side) for side in Relation]
+    spots.append(Spot(distance=Length(low_m=5.0, high_m=9.0), relation=Relation.AHEAD, anchor="a"))
+    requests = tuple(VehicleRequest(spot=spot) for spot in spots)
+    assert list_distances(Intent(requests=requests)) == (-21.5, 21.5)
 
 
 def find_end_m() -> float:

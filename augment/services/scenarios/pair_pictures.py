@@ -9,7 +9,7 @@ from augment.render.camera import Camera
 from augment.render.legend import change_keys, scene_keys
 from augment.render.pair_window import covered_boxes, pair_camera
 from augment.scene.entities import Modification
-from augment.scene.intent import Intent, Length
+from augment.scene.intent import Intent, Relation
 from augment.services.scenarios.pictures import draw_picture, find_modification, picture_view
 from augment.services.scenarios.scenes import LoadedScenario
 
@@ -76,16 +76,20 @@ def frame_pair(
         intent=loaded.intent,
         is_filmed=any(change.has_motion for change in shown),
         differing=tuple((shift.one, shift.other, shift.metres) for shift in shifts),
-        ticks_m=_list_distances(loaded.intent) if has_ticks else (),
+        ticks_m=list_distances(loaded.intent) if has_ticks else (),
     )
     return loaded, sides, camera
 
 
-def _list_distances(intent: Intent | None) -> tuple[float, ...]:
-    """Return the metres ahead of the ego that an instruction names, sorted."""
+def list_distances(intent: Intent | None) -> tuple[float, ...]:
+    """Return the metres ahead of the ego that an instruction names, sorted; behind it negative."""
     asks = (*intent.requests, *intent.moves) if intent else ()
-    spots = [ask.spot for ask in asks]
     # Only what counts from the ego itself.
-    own = [spot for spot in spots if not (spot.anchor or spot.landmark or spot.mark or spot.via)]
-    spans = [spot.span_m for spot in own if isinstance(spot.distance, Length)]
-    return tuple(sorted({end for span in spans if span for end in span}))
+    own = [
+        (spot.distance, -1.0 if spot.relation is Relation.BEHIND else 1.0)
+        for spot in (ask.spot for ask in asks)
+        if spot.distance
+        and spot.relation
+        and not (spot.anchor or spot.landmark or spot.mark or spot.via)
+    ]
+    return tuple(sorted({sign * at_m for at, sign in own for at_m in (at.low_m, at.high_m)}))
