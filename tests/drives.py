@@ -34,10 +34,10 @@ def short_drive() -> tuple[bytes, dict[str, Any]]:
 
 
 def driven(
-    job: GenerationJob, *, before: float = 1.0, after: float = 0.25, planner: str = "pdm-closed"
+    job: GenerationJob, *, before: float = 1.0, after: float = 0.25, **how: Any
 ) -> list[Simulation]:
     """Every outcome of a job as driven, with these scores; the augmentations' rows last."""
-    options = Options(planner=planner)
+    options = Options(**how)
     simulations.plan_job(job=job, options=options)
     trace, document = short_drive()
     rows = list(options.of(Simulation.objects.order_by("augmentation_id", "pk")))

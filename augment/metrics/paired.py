@@ -142,6 +142,9 @@ Scores = Mapping[Hashable, tuple[Hashable, float]]
 
 ALPHA = 0.05
 
+_ROUNDING = 1e-9
+"""Scores that differ by no more are equal: sums of the same numbers do."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusteredMean:
@@ -247,7 +250,8 @@ def _difference(table: Mapping[str, Scores], first: str, second: str) -> Cluster
     mean, se, g = _estimate(scenes, values)
     low = high = p = None
     # Of fewer scenes no spread can be estimated: with one that differs the mean is its own se.
-    if len({scene for scene, value in zip(scenes, values, strict=True) if value}) >= FEWEST_PAIRS:
+    differ = {scene for scene, value in zip(scenes, values, strict=True) if abs(value) > _ROUNDING}
+    if len(differ) >= FEWEST_PAIRS:
         from scipy.stats import t
 
         half = _quantile(g) * se
@@ -265,7 +269,8 @@ def _estimate(scenes: Sequence[Hashable], values: ArrayLike) -> tuple[float, flo
         return mean, 0.0, g
     # (G,) sums of residuals by scene; se^2 = G / (G - 1) sum of their squares / N^2.
     sums = np.bincount([number[scene] for scene in scenes], weights=observed - mean)
-    return mean, math.sqrt(g / (g - 1) * float(sums @ sums)) / len(observed), g
+    se = math.sqrt(g / (g - 1) * float(sums @ sums)) / len(observed)
+    return mean, se if se > _ROUNDING else 0.0, g
 
 
 def _quantile(scenes: int) -> float:

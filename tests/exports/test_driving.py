@@ -7,6 +7,7 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.urls import reverse
 
+from augment.models import Simulation
 from tests.drives import driven, finished
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
@@ -46,3 +47,15 @@ def test_planners_of_a_job_stand_in_one_table() -> None:
     assert r"50.0 [17.9, 82.1] b" in tex
     page = signed_in(people()["researcher"]).get(reverse("job-tab", args=[job.code, "driving"]))
     assert "Planners beside each other" in page.content.decode()
+
+
+def test_who_is_better_on_the_same_drives_comes_first_where_some_are_missing() -> None:
+    job = finished(rows.launch(scenarios=10))
+    for row in driven(job, before=0.9, after=0.9)[-3:]:
+        Simulation.objects.filter(pk=row.pk).update(nuplan_score=0.1)
+    unfinished = driven(job, planner="idm", offsets="original", before=0.9, after=0.8)[-3:]
+    Simulation.objects.filter(pk__in=[row.pk for row in unfinished]).update(state="failed")
+    text = exported("--planners", "pdm-closed", "idm", "--format", "latex")
+    # Of 0.8 seven times no spread is left but of rounding; offsets are PDM-Closed's alone.
+    assert r"reference & 7 to 10 & 66.0 [37.7, 86.2] a & 80.0 [35.7, 96.7] b\\" in text
+    assert "Not all planners finished the same drives" in text

@@ -136,14 +136,17 @@ FEW_SCENES = 12
 
 def planner_notes(table: PlannerTable) -> list[str]:
     """Return the sentences that belong beneath every form of the table of planners."""
-    few = table.fewest_scenes < FEW_SCENES
-    return [
+    notes = {
         f"Mean of {SCORE_LABELS[table.score]}'s score, drives of version {table.version}; 95 % "
         "intervals clustered by scene. Planners with a common letter can't be told apart at 5 % "
-        "for all differences of the table (paired t tests on the same drives, Holm).",
-        *([f"The fewest scenes behind a line: {table.fewest_scenes}."] if few else []),
-        DIFFERENCE,
-    ]
+        "for all differences of the table (paired t tests on the same drives, Holm).": True,
+        "Not all planners finished the same drives: a mean is of a planner's own, differences and "
+        "letters are of those that both finished.": table.is_uneven,
+        f"The fewest scenes behind a line: {table.fewest_scenes}.": table.fewest_scenes
+        < FEW_SCENES,
+        DIFFERENCE: True,
+    }
+    return [note for note, holds in notes.items() if holds]
 
 
 def planner_context(table: PlannerTable) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Several planners on the drives of one job: means, differences, sets, by contestant."""
 
+from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -67,6 +68,11 @@ class PlannerTable:
         """The fewest scenes that a line rests on."""
         return min((line.estimate.scenes for lines in self.groups for line in lines), default=0)
 
+    @property
+    def is_uneven(self) -> bool:
+        """True if not all planners finished the same drives."""
+        return any(len({line.estimate.drives for line in lines}) > 1 for lines in self.groups)
+
 
 def ways_to_compare(job: GenerationJob, specs: Sequence[str] = ()) -> list[Options]:
     """Return the ways of the newest version in which a job was driven.
@@ -88,7 +94,7 @@ def ways_to_compare(job: GenerationJob, specs: Sequence[str] = ()) -> list[Optio
             way = Options(planner=planner, offsets=offsets or Options().offsets, version=newest)
             if way.name not in ways:
                 raise UnknownName("planner that drove the job", way.name, list(ways))
-            chosen.append(way)
+            chosen.append(ways[way.name])
         ways = {way.name: way for way in chosen}
     if len(ways) < 2:
         raise Conflict(f"“{job.name}” was not driven by two planners; manage.py simulate does it.")
@@ -134,7 +140,13 @@ def _lines(
     differences: Sequence[PlannerDifference],
 ) -> tuple[PlannerLine, ...]:
     means = {planner: estimate_score(drives) for planner, drives in scores.items()}
-    sets = find_sets(sorted(means, key=lambda planner: -means[planner].mean), differences)
+    # Who is told apart comes first by that: a mean may be of fewer, easier drives.
+    lead: Counter[str] = Counter()
+    for one in (one for one in differences if one.is_apart):
+        sign = 1 if one.estimate.mean > 0.0 else -1
+        lead.update({one.first: sign, one.second: -sign})
+    ranked = sorted(means, key=lambda planner: (-lead[planner], -means[planner].mean))
+    sets = find_sets(ranked, differences)
     name = contestant.name if contestant else str(subject.label)
     line = partial(PlannerLine, name=name, contestant=contestant)
     return (
