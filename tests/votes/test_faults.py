@@ -13,7 +13,7 @@ from arena.errors import LabellingClosed, NotYours
 from arena.jobs.exports.faults import COUNTS, FORMATS, fault_table, tabulate_votes
 from arena.jobs.queries import labelling_progress, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
-from arena.models import FaultLabel, LabellingRound, LabelTask, Study
+from arena.models import FaultLabel, LabellingRound, LabelTask, Person, Study
 from arena.studies.services.opening import close_study
 from arena.voting.services.casting import FaultMark
 from augment.errors import Conflict
@@ -116,16 +116,22 @@ def test_of_several_experts_more_than_half_must_see_a_fault(job: GenerationJob, 
 
 
 def test_marks_on_ballots_of_closed_studies_are_labels_of_who_made_them() -> None:
-    study = a_study(scenarios=2, votes_per_expert=3)
+    study = a_study(scenarios=2, votes_per_expert=3, questions=("instruction", "realism"))
     change = modification_to_document(Modification(added=(vehicle("car", 12.0, 1.0),)))
     Augmentation.objects.update(modification=change)
     Study.objects.update(ask_why=True)
     job = GenerationJob.objects.earliest("pk")
     Augmentation.objects.update(job=job)
-    first, second, *_ = matchups_of(study, "eva")
+    first, second, skipped = matchups_of(study, "eva")
     marks = [FaultMark("left", 0, P), FaultMark("left", 0, L)]
     vote(first, "equal", supersedes=vote(first, faults=[FaultMark("right", 0, H)]).key)
     vote(second, "right", faults=marks)
+    answered = vote(skipped, faults=[FaultMark("left", 0, H)])
+    vote(skipped, question="realism", faults=[FaultMark("left", 0, H)])
+    vote(skipped, "skip", reason="unclear", supersedes=answered.key)
+    Person.objects.filter(user__username="finn").update(is_simulated=True)
+    for matchup in matchups_of(study, "finn"):
+        vote(matchup)
     assert tabulate_votes(job).labels == 0, "the study is open"
     close_study(study=study)
     table = tabulate_votes(job)
@@ -142,6 +148,7 @@ def test_marks_on_ballots_of_closed_studies_are_labels_of_who_made_them() -> Non
     options = ("--from", "votes", "--format", "latex", "--out", "-")
     call_command("export", "faults", str(job.code), *options, stdout=out)
     assert out.getvalue() == FORMATS["latex"].write(table).decode()
+    assert "lower bounds" in out.getvalue()
 
 
 def test_a_closed_labelling_takes_and_asks_for_nothing(job: GenerationJob, eva: User) -> None:

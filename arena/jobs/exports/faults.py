@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
 
@@ -19,6 +19,7 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging import FaultClass
 
 _MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+MARKED = "Marked on ballots, where nobody has to mark: lower bounds; n is what was judged."
 _LABEL = (
     *("augmentation", "position", "heading", "logic", "augmentation__contestant"),
     *("guessed_position", "guessed_heading", "guessed_logic"),
@@ -38,11 +39,13 @@ class FaultTable:
         agreement: A dict a class of faults. `kappa` is Cohen's, of the checks' first guess and the
             experts over `n` labels; `alpha` is Krippendorff's, nominal, of the experts among
             themselves over the `pictures` that two or more have labelled. None is undefined.
+        note: How to read it, empty for labels by hand.
     """
 
     job: str
     lines: list[dict[str, Any]]
     agreement: list[dict[str, Any]]
+    note: str = ""
 
     @property
     def labels(self) -> int:
@@ -71,8 +74,10 @@ def tabulate_votes(job: GenerationJob) -> FaultTable:
     counts are lower bounds. `labelled` are all that were judged, marked or not.
     """
     asks = Q(matchup__study__ask_why=True, matchup__study__state=Study.State.CLOSED)
-    votes = Vote.objects.filter(asks, superseded_by=None, matchup__kind=Matchup.Kind.MAIN)
-    votes = votes.exclude(outcome=Vote.Outcome.SKIP).order_by("pk")
+    current = Vote.objects.filter(asks, superseded_by=None, is_simulated=False)
+    skips = current.filter(outcome=Vote.Outcome.SKIP)  # of pairs, whatever else was answered
+    votes = current.filter(matchup__kind=Matchup.Kind.MAIN).order_by("pk")
+    votes = votes.exclude(matchup__in=skips.values("matchup"))
     judged: dict[int, Augmentation] = {}
     marks: defaultdict[tuple[int, int], set[str]] = defaultdict(set)
     for side in ("left", "right"):
@@ -92,7 +97,8 @@ def tabulate_votes(job: GenerationJob) -> FaultTable:
         )
         for (pk, expert), classes in sorted(marks.items())
     ]
-    return _tabulate(job, labels, Counter(row.contestant_id for row in judged.values()))
+    counts = Counter(row.contestant_id for row in judged.values())
+    return replace(_tabulate(job, labels, counts), note=MARKED)
 
 
 def _tabulate(
@@ -136,7 +142,8 @@ COLUMNS: Columns = {
 
 def fault_sheet(table: FaultTable) -> Sheet:
     """Return one row a contestant; counts are empty where nothing was labelled."""
-    return make_sheet(table.lines, COLUMNS, name="faults", facts={"job": table.job})
+    facts = {"job": table.job} | ({"note": table.note} if table.note else {})
+    return make_sheet(table.lines, COLUMNS, name="faults", facts=facts)
 
 
 def fault_latex(table: FaultTable) -> bytes:
@@ -158,7 +165,7 @@ def fault_latex(table: FaultTable) -> bytes:
         "n": itemgetter("counted"),
     }
     counted = [line for line in table.lines if line["counted"]]
-    caption, label = "Error Count per Category.", "tab:manual_eval"
+    caption, label = f"Error Count per Category. {table.note}".rstrip(), "tab:manual_eval"
     return latex_values(counted, columns, comments=comments, caption=caption, label=label)
 
 
