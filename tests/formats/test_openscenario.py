@@ -95,10 +95,18 @@ def test_a_catalogs_entry_has_the_box_that_was_assigned(tmp_path: Path) -> None:
         + BOX.replace('"5"', '"$long"')
         + "</Vehicle>"
     )
-    assigned = '<ParameterAssignment parameterRef="long" value="12"/>'
+    assigned = '<ParameterAssignment parameterRef="$long" value="$long"/>'
     refers = '<CatalogReference catalogName="Cars" entryName="{}">{}</CatalogReference>'
     other = refers.format("lorry", f"<ParameterAssignments>{assigned}</ParameterAssignments>")
-    file = write(tmp_path, scenario(other=other), **{"sub/cars.xosc": catalog(entry)})
+    head = (
+        '<ParameterDeclarations><ParameterDeclaration name="long" value="12"/>'
+        "</ParameterDeclarations><CatalogLocations><VehicleCatalog>"
+        '<Directory path="a/b/c/d/e/f"/></VehicleCatalog></CatalogLocations>'
+    )
+    # Another of the name is not the one that is meant.
+    files = {"sub/cars.xosc": catalog(entry.replace('width="2"', 'width="3"'))}
+    files |= {"a/b/c/d/e/f/cars.xosc": catalog(entry)}
+    file = write(tmp_path, scenario(other=other, head=head), **files)
     (agent,) = read(file).scene.agents
     assert (agent.type, agent.size_m) == (AgentType.BUS, (12.0, 2.0))
     for wrong, says in (
@@ -176,7 +184,7 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
         (scenario(event("<RoutingAction><AssignRouteAction/></RoutingAction>")),
          "needs a Route of two waypoints"),
         (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>', "Ego"))),
-         "its conditions never hold"),
+         "its conditions never hold in 15 s"),
         (scenario(event(BRAKES, by_entity("<OffroadCondition duration='1'/>"))),
          "event acts: unknown 'OffroadCondition'"),
         (scenario(other=CAR.replace('"car">', '"hovercraft">')),
@@ -204,6 +212,8 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
             "<LaneChangeAction>", '<LaneChangeAction targetLaneOffset="0.5">'))),
          "The offset after a lane change was left out"),
         (scenario(event(BRAKES, AFTER.replace("acts", "x"))), "event acts: unknown 'x'"),
+        (scenario(event(BRAKES), event(speed(9), by_time(70), "late")),
+         "event late: begins over 60 s after the first"),
         (scenario(event(speed(-3))), "backwards, is not read"),
         (scenario(event(CHANGE.format("time", 2, RIGHT), by_time(50)), other_does=(speed(40),)),
          "event acts: is past the map when it begins"),
@@ -249,6 +259,7 @@ def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path
         (scenario(logic="../out.xodr"), "the map '../out.xodr' is not beside"),
         (scenario(logic="/etc/passwd"), "is not beside"),
         (scenario(logic=""), "names no LogicFile"),
+        (scenario(logic="x" * 5_000), "the map 'xxxx"),
         (scenario(ego="A"), "nobody is called Ego or ego or EGO or hero"),
         (scenario().replace('Minor="1"', 'Minor="9"'), "of version '1.9'"),
         (scenario(logic="$map"), "LogicFile.filepath: unknown parameter 'map'"),

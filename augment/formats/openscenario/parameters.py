@@ -56,7 +56,10 @@ def resolve(
         values = {**values, name: (assigned or {}).get(name, own)}
     copy = Element(element.tag)
     for name, text in element.items():
-        copy.set(name, read(text, f"{element.tag}.{name}"))
+        place = f"{element.tag}.{name}"
+        # What is assigned to is a name in the entry; nothing goes by a condition's.
+        is_name = place in ("ParameterAssignment.parameterRef", "Condition.name")
+        copy.set(name, text if is_name else read(text, place))
     copy.text = element.text
     for child in element:
         if child.tag != "ParameterDeclarations":

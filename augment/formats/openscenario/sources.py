@@ -26,7 +26,7 @@ _REFERRING = (
 _DEEPEST, _MOST_ENTRIES = 3, 1_000
 """Entries in each other, as of a route in a maneuver, and in all."""
 _IGNORED = ("EntitySelection", "VariableDeclaration", "MonitorDeclaration", "TrafficDefinition")
-_MOST_FILES = 500
+_MOST_FILES, _LONGEST_PATH = 500, 250
 _DEPTHS = ("*", "*/*", "*/*/*", "*/*/*/*", "*/*/*/*/*")
 _CLASSES = foreign.name_all(
     {
@@ -71,6 +71,10 @@ def is_catalog(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return _CATALOG in file.read(10_000)
+
+
+def _is_path(text: str) -> bool:
+    return text.isprintable() and len(text) < _LONGEST_PATH
 
 
 class ScenarioSource:
@@ -165,7 +169,7 @@ class ScenarioSource:
             raise fault_at(
                 place, "is not in the folder of the scenario, or the zip that it came in"
             )
-        entries = {child.get("name"): child for found in known for child in found}
+        entries = {child.get("name"): child for found in known[::-1] for child in found}
         assigned = {
             row.get("parameterRef", "").removeprefix("$"): row.get("value", "")
             for row in reference.findall("ParameterAssignments/ParameterAssignment")
@@ -174,7 +178,7 @@ class ScenarioSource:
 
     def _find(self, name: str) -> Path | None:
         wanted = PurePosixPath(name.replace("\\", "/"))
-        if not name.isprintable():
+        if not _is_path(name):
             return None
         beside = (self._within(f"{depth[:-1]}{glob.escape(wanted.name)}") for depth in _DEPTHS)
         candidates = [self._path.parent / wanted, *(file for files in beside for file in files)]
@@ -186,13 +190,18 @@ class ScenarioSource:
 
     @cached_property
     def _catalogs(self) -> list[Element]:
-        """The catalogs in the folder, as their files have them."""
+        """The catalogs that the file names, then others in the folder; as their files are."""
+        rows = self.root.iterfind("CatalogLocations/*/Directory")
+        names = filter(_is_path, (row.get("path", "") for row in rows))
+        folders = [(self._path.parent / name).resolve() for name in names]
+        inside = [f.relative_to(self._folder) for f in folders if f.is_relative_to(self._folder)]
+        patterns = [*(f"{glob.escape(str(f))}/*" for f in inside), *_DEPTHS]
+        files = [file.resolve() for p in patterns for file in self._within(f"{p}.xosc")]
         catalogs = []
-        for depth in _DEPTHS:
-            for file in self._within(f"{depth}.xosc"):
-                if file.resolve().is_relative_to(self._folder) and is_catalog(file):
-                    with self.doubts.about("catalogs"):
-                        catalogs += read_xml(file, what=foreign.WHAT).findall("Catalog")
+        for file in dict.fromkeys(files):
+            if file.is_relative_to(self._folder) and is_catalog(file):
+                with self.doubts.about("catalogs"):
+                    catalogs += read_xml(file, what=foreign.WHAT).findall("Catalog")
         return catalogs
 
     def _read_entity(self, element: Element) -> Entity | None:
