@@ -15,6 +15,7 @@ from tests.formats.openscenario_files import (
     GAP,
     OF_EGO,
     RIGHT,
+    ROADS,
     STEP,
     TIMING,
     by_entity,
@@ -211,6 +212,28 @@ def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path)
     assert other.started_s == pytest.approx(5.0, abs=0.01)
 
 
+def test_who_follows_times_later_holds_speed_until_then_and_brakes(tmp_path: Path) -> None:
+    braking = vertices((0, 120), (2, 134), (4, 144), (8, 152))  # from 8 m/s, by 1 m/s each second
+    timed = event(follow(braking, TIMING.format("relative")), by_time(5), "b")
+    other = move_other(tmp_path, event(speed(8), by_time(0)), timed)
+    gone_m = other.states[[25, 50, 110, 130], 0] - other.states[0, 0]
+    assert gone_m == pytest.approx([20.0, 40.0, 70.0, 72.0], abs=0.03)
+
+
+def test_a_speed_never_reached_costs_no_lane_change(tmp_path: Path) -> None:
+    never = speed(9, STEP.replace("step", "linear").replace("time", "rate"))
+    action = f"<Action><PrivateAction>{never}</PrivateAction></Action>"
+    change = event(CHANGE.format("rate", 1, RIGHT), by_time(1))
+    both = change.replace("<StartTrigger>", f"{action}<StartTrigger>")
+    text = scenario(both, other_does=(speed(8),))
+    narrow = {"roads.xodr": ROADS.replace('a="3.5"', 'a="3"')}
+    (other,) = moves(read(write(tmp_path, text, **narrow))).others
+    # Across 3 m at 1 m/s.
+    y_m = other.states[:, 1] - other.states[0, 1]
+    assert y_m[[10, 25, 40]] == pytest.approx([0.0, -1.5, -3.0], abs=0.06)
+    assert other.states[-1, 3] == pytest.approx(8.0, abs=0.001)
+
+
 @pytest.mark.parametrize("times_s", [(0, 5), (5, 0), ("", "")])
 def test_times_that_do_not_count_are_not_read(times_s: tuple[object, ...], tmp_path: Path) -> None:
     line = vertices(*((time_s, 80 + 40 * n) for n, time_s in enumerate(times_s)))
@@ -279,9 +302,16 @@ SPLINE = (
     f"<ClothoidSpline>{SEGMENT.format('<PositionStart>{}</PositionStart>')}"
     f"{SEGMENT.format('')}</ClothoidSpline>"
 )
+NOWHERE = (
+    SPLINE.replace("Segment ", "ClothoidSplineSegment ")
+    .replace("/Segment", "/ClothoidSplineSegment")
+    .replace("<PositionStart>{}</PositionStart>", "")
+)
 
 
-@pytest.mark.parametrize(("start_s", "made"), [(0.0, CLOTHOID), (2.0, CLOTHOID), (2.0, SPLINE)])
+@pytest.mark.parametrize(
+    ("start_s", "made"), [(0.0, CLOTHOID), (2.0, CLOTHOID), (2.0, SPLINE), (2.0, NOWHERE)]
+)
 def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
     start_s: float, made: str, tmp_path: Path
 ) -> None:

@@ -149,8 +149,8 @@ def find_step(event: StoryEvent, expected: Expectation) -> tuple[int, list[str]]
         if groups:
             holds, names = _find_holding(groups, event, step, expected)
             if not holds.any():
-                text = "its conditions never hold while everybody goes on as at t0"
-                raise fault_at(event.place, text)
+                text = f"its conditions never hold in {expected.times_s[-1]:g} s while everybody"
+                raise fault_at(event.place, f"{text} goes on as at t0")
             step, watched = int(holds.argmax()), watched + names
     return step, watched
 

@@ -47,9 +47,9 @@ _MOTION = Codec("motion", TypeAdapter(PlannedMotion))
 _MOST_SPEEDS, _MOST_POINTS, _MOST_LANES = 50, 200, 20
 _BESIDE_ROUTE_M = 15.0
 """Lanes of a route end no further from its roads' middles."""
-_STEP_S = 0.01
-"""A step in speed takes so long."""
-_LANE_M, _ON_M, _THIN_M = 3.5, 1_000.0, 0.0005
+_STEP_S, _JUMP_S = 0.01, 0.001
+"""A step in speed takes so long, and one onto a trajectory with times."""
+_ON_M, _THIN_M, _LATEST_S = 1_000.0, 0.0005, 60.0
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
     "step": lambda share: share,
@@ -112,7 +112,7 @@ class Stage:
         self, name: str, action: Element, place: str, step: int
     ) -> tuple[FloatArray, FloatArray | None]:
         """Return somebody's middles (V, 3) along a trajectory from a step on; see `trace`."""
-        placer = self._placer.at(self._poses_at(step))
+        placer = self._placer.at(self._poses_at(step), name)
         world, times_s = trace(action, self.expected.centres_m[name], placer, place)
         local = self._origin.to_local(world[:, :2])
         return np.column_stack([local, world[:, 2] - self._origin.heading_rad]), times_s
@@ -202,6 +202,8 @@ class _Draft:
     def add(self, event: StoryEvent) -> None:
         """Add what an event does; raises InvalidDocument if it can't be."""
         begins_s, ends_s = self._begin(event), 0.0
+        if begins_s >= _LATEST_S:
+            raise fault_at(event.place, f"begins over {_LATEST_S:g} s after the first")
         start, times_s = self.start, self._stage.expected.times_s
         assert start is not None
         for kind, action in event.actions:
@@ -281,33 +283,31 @@ class _Draft:
         value = abs(read_float(dynamics, "value", place, default=0.0))
         shape = foreign.look_up(_SHAPES, dynamics.get("dynamicsShape"), place)
         change_mps, mean_mps = abs(goal_mps - now_mps), max((goal_mps + now_mps) / 2.0, 0.1)
-        spans = {
-            "time": value,
-            "rate": change_mps / max(value, 1e-3),
-            "distance": value / mean_mps,
-        }
-        lasts_s = foreign.look_up(spans, by, f"{place}.dynamicsDimension")
+        rated_s, way_s = change_mps / max(value, 1e-6), value / mean_mps
+        spans_s = {"time": value, "rate": rated_s, "distance": way_s}
+        lasts_s = foreign.look_up(spans_s, by, f"{place}.dynamicsDimension")
         lasts_s = _STEP_S if dynamics.get("dynamicsShape") == "step" else max(lasts_s, _STEP_S)
         self.speeds = [row for row in self.speeds if row[0] < at_s - _STEP_S]
         shares = (0.0, 1.0) if shape(0.25) == 0.25 else np.linspace(0.0, 1.0, 7).tolist()
-        self.speeds += [
-            (round(at_s + s * lasts_s, 4), now_mps + shape(s) * (goal_mps - now_mps))
-            for s in shares
-        ]
+        # So much of it as is over by the last moment.
+        for share in np.multiply(shares, min((_LATEST_S - at_s) / lasts_s, 1.0)).tolist():
+            mps = now_mps + shape(share) * (goal_mps - now_mps)
+            self.speeds.append((round(at_s + share * lasts_s, 4), mps))
         return lasts_s
 
     def _change_lane(self, action: Element, at_s: float, place: str) -> float:
         gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)
         dynamics = _find(action, "LaneChangeActionDynamics", place)
         value = abs(read_float(dynamics, "value", place))
-        by = {"time": value, "rate": _LANE_M / max(value, 1e-3), "distance": 0.0}
-        lasts_s = foreign.look_up(by, dynamics.get("dynamicsDimension"), place)
-        later_m = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s + lasts_s)[0]
-        change_m = (later_m - gone_m) or value
         here = self._pose_after(gone_m, place)
         graph, target = self._stage.graph, _find(action, "LaneChangeTarget/*", place)
         step = self._step_since(at_s)
         goal = self._stage.find_lane(self._name, here, target, step, place)
+        apart_m = math.hypot(goal.x_m - here.x_m, goal.y_m - here.y_m)
+        by = {"time": value, "rate": apart_m / max(value, 1e-3), "distance": 0.0}
+        lasts_s = foreign.look_up(by, dynamics.get("dynamicsDimension"), place)
+        later_m = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s + lasts_s)[0]
+        change_m = (later_m - gone_m) or value
         onto = graph.under(goal.x_m, goal.y_m, goal.heading_rad)
         if onto is None or not self._drives_along(onto, here):
             raise fault_at(place, "there is no lane in its direction to change to")
@@ -387,6 +387,7 @@ class _Draft:
             return float(ways_m[-1]) / max(now_mps, 0.1)
         fitted = fit_speeds(times_s - times_s[0], ways_m)
         before = [row for row in self.speeds if row[0] < at_s - _STEP_S]
+        before += [(round(at_s - _JUMP_S, 4), now_mps)] * (at_s > _STEP_S)
         self.speeds = [*before, *((round(at_s + since_s, 4), mps) for since_s, mps in fitted)]
         return float(times_s[-1] - times_s[0])
 
@@ -418,26 +419,17 @@ def fit_speeds(times_s: FloatArray, ways_m: FloatArray) -> list[tuple[float, flo
     if not len(mps):
         return []
     # Who stops at once does so at the last point, where a path ends by itself.
-    last = int(np.flatnonzero(mps > 1e-6)[-1]) if (mps > 1e-6).any() else 0
+    last, end_s = int(np.flatnonzero(mps > 1e-6)[-1]) if (mps > 1e-6).any() else 0, times_s[-1]
     drops = -np.diff(mps, prepend=mps[:1])
     if last >= 2 and drops[last : last + 2].max() > 2.0 * abs(drops[last - 1]) + 0.05:
         middles_s, mps = middles_s[:last], mps[:last]
+        end_s = 2.0 * middles_s[-1] - middles_s[-2]
     # Between two middles the mean speed of each half; at the ends the slope goes on.
-    ends = (
-        [mps[0] - (mps[1] - mps[0]) / 2.0, mps[-1] + (mps[-1] - mps[-2]) / 2.0]
-        if len(mps) > 1
-        else mps[[0, 0]]
-    )
-    knots = np.column_stack(
-        [
-            [
-                times_s[0],
-                *middles_s,
-                2.0 * middles_s[-1] - middles_s[-2] if len(mps) > 1 else times_s[-1],
-            ],
-            np.maximum([ends[0], *mps, ends[1]], 0.0),
-        ]
-    )
+    slopes = np.diff(mps) / np.diff(middles_s) if len(mps) > 1 else np.zeros(1)
+    first_mps = mps[0] - slopes[0] * (middles_s[0] - times_s[0])
+    last_mps = mps[-1] + slopes[-1] * (end_s - middles_s[-1])
+    fitted_mps = np.maximum([first_mps, *mps, last_mps], 0.0)
+    knots = np.column_stack([[times_s[0], *middles_s, end_s], fitted_mps])
     within_mps = 0.001
     while True:
         line = shapely.LineString(knots).simplify(within_mps, preserve_topology=False)

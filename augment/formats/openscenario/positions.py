@@ -46,11 +46,12 @@ class PositionReader:
 
     def __init__(self, network: RoadNetwork, positions: Mapping[str, Element]) -> None:
         self._network, self._positions = network, positions
-        self._poses, self._open = dict[str, Pose](), set[str]()
+        self._poses, self._open, self.actor = dict[str, Pose](), set[str](), ""
 
-    def at(self, poses: Mapping[str, Pose]) -> "PositionReader":
-        """Return a reader for whom entities are elsewhere."""
+    def at(self, poses: Mapping[str, Pose], actor: str) -> "PositionReader":
+        """Return a reader for what somebody does, for whom entities are elsewhere."""
         later = PositionReader(self._network, self._positions)
+        later.actor = actor
         later._poses |= poses
         return later
 

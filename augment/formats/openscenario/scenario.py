@@ -280,7 +280,7 @@ class _Scenario:
         for event in sorted(timed, key=lambda event: event.time_s or 0.0):
             (_, action), *_ = event.actions
             centre_m = self._entities[name].centre_m
-            middles, times_s = trace(action, centre_m, self._placer, event.place)
+            middles, times_s = trace(action, centre_m, self._placer.at({}, name), event.place)
             if times_s is None:
                 return
             start_s, timing = event.time_s or 0.0, action.find("TimeReference/Timing")

@@ -29,7 +29,7 @@ def trace(
     Args:
         action: Follows it.
         centre_m: From the point of reference to the middle, ahead and to the left.
-        placer: Knows where others are.
+        placer: Knows where everybody is, and who follows it.
         place: Where it stands.
 
     Raises:
@@ -107,7 +107,9 @@ def _follow_vertices(
 def _follow_spirals(shape: Element, action: Element, placer: PositionReader, place: str) -> Traced:
     """Rows a metre apart along a clothoid, or several that go on from each other."""
     parts, pose, names = list[FloatArray](), None, ("startTime", "stopTime")
-    segments, bounds = shape.findall("Segment") or [shape], (-SHARPEST_PM, SHARPEST_PM)
+    # Some call a segment by its type.
+    segments = shape.findall("Segment") + shape.findall("ClothoidSplineSegment") or [shape]
+    bounds = -SHARPEST_PM, SHARPEST_PM
     if shape.tag == "ClothoidSpline":
         names = "timeStart", "timeEnd"
     for segment in segments:
@@ -121,8 +123,7 @@ def _follow_spirals(shape: Element, action: Element, placer: PositionReader, pla
             last_pm = foreign.read_number(last_pm, f"{place}: curvature at its end", *bounds)
         for position in (*segment.findall("Position"), *segment.findall("PositionStart")):
             pose = placer.find_pose(position, place)
-        if pose is None:
-            raise fault_at(place, "needs a Position")
+        pose = pose or placer.entity_pose(placer.actor)
         pose = pose.turn(read_float(segment, "hOffset", place, default=0.0))
         piece = LinePiece(start=pose, length_m=length_m, curvatures_pm=(first_pm, last_pm))
         parts.append(piece.poses_at(np.linspace(0.0, length_m, math.ceil(length_m) + 1)))
