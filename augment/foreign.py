@@ -111,7 +111,7 @@ _UNITS_MPS = {
     **{"km/h": _KMH, "kmh": _KMH, "kph": _KMH, "kmph": _KMH, "mph": _MPH, "mi/h": _MPH},
     **{"m/s": 1.0, "mps": 1.0},
 }
-_SPEED = re.compile(r"\s*([0-9]+(?:[.,][0-9]+)?)\s*([a-z/]*)\s*", re.IGNORECASE)
+_SPEED = re.compile(r"\s*([0-9]+(?:[.,][0-9]*)?(?:e[+-]?[0-9]+)?)\s*([a-z/]*)\s*", re.IGNORECASE)
 FASTEST_MPS: Final = 100.0
 
 

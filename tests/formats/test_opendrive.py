@@ -113,6 +113,13 @@ def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
         ({"type": '<type s="0"><speed max="50" unit="km/h"/></type>'}, "speed_limit_mps=13.889"),
         ({"type": '<type s="0"><speed max="30" unit="mph"/></type>'}, "speed_limit_mps=13.411"),
         ({"width": f'{WIDTH}<speed sOffset="0" max="7" unit="m/s"/>'}, "speed_limit_mps=7.0"),
+        (
+            {
+                "type": '<type s="0"><speed max="1.25e+01" unit="m/s"/></type>',
+                "header": '<offset x="0.0e+00" y="-0.0E+00" z="0" hdg="0"/>',
+            },
+            "speed_limit_mps=12.5",
+        ),
         ({"width": '<border sOffset="0" a="-3" b="0" c="0" d="0"/>', "x": "0"}, "width_m=3.0"),
         ({"outer": f'<lane id="-2" type="bus">{WIDTH}</lane>'}, "right_neighbor='Lane2'"),
         ({"offset": '<laneOffset s="0" a="1" b="0" c="0" d="0"/>'}, "y_m=-0.75"),
@@ -122,8 +129,9 @@ def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
     ],
 )
 def test_a_construct_of_a_lane_is_read(parts: dict[str, str], says: str, tmp_path: Path) -> None:
-    scene = read_text(tmp_path, by_hand(**parts)).scene
-    assert says in f"{scene.lanes[0]}{scene.origin}"
+    reading = read_text(tmp_path, by_hand(**parts))
+    assert says in f"{reading.scene.lanes[0]}{reading.scene.origin}"
+    assert not any("offset was left out" in note for note in reading.notes)
 
 
 @pytest.mark.parametrize(

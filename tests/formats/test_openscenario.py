@@ -288,10 +288,11 @@ def test_the_ego_is_who_is_asked_for(tmp_path: Path) -> None:
         read(file, "Nobody")
 
 
-def test_a_light_shows_what_its_controller_or_action_says(tmp_path: Path) -> None:
+@pytest.mark.parametrize("state", ["red", "on;off;off"])
+def test_a_light_shows_what_its_controller_or_action_says(state: str, tmp_path: Path) -> None:
     action = (
         "<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction "
-        'name="7" state="red"/></TrafficSignalAction></InfrastructureAction></GlobalAction>'
+        f'name="7" state="{state}"/></TrafficSignalAction></InfrastructureAction></GlobalAction>'
     )
     roads = {"roads.xodr": by_hand(end=SIGNAL, rest=JUNCTION)}
     reading = read(write(tmp_path, scenario(more=action), **roads))

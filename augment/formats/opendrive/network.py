@@ -160,7 +160,7 @@ class RoadNetwork:
             raise fault_at(f"{path.name}: header", f"version {version[:20]!r} is not read; 1.x is")
         self.doubts, self._roads = Doubts(), dict[str, MapRoad]()
         offset = self.root.find("header/offset")
-        if offset is not None and any(value.strip("0.+-") for value in offset.attrib.values()):
+        if offset is not None and any(value.strip("0.+-eE") for value in offset.attrib.values()):
             self.doubts.assume("The header's offset was left out: places are the file's own")
         self.elements = {element.get("id", ""): element for element in self.root.findall("road")}
         if not self.elements:

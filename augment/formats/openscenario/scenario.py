@@ -40,10 +40,10 @@ LONGEST_S = 60.0
 """Trajectories are read so far."""
 _STATES = foreign.name_all(
     {
-        TrafficLight.GREEN: "green go",
-        TrafficLight.YELLOW: "yellow amber attention",
-        TrafficLight.RED: "red stop",
-        TrafficLight.UNKNOWN: "off",
+        TrafficLight.GREEN: "green go off;off;on",
+        TrafficLight.YELLOW: "yellow amber attention off;on;off",
+        TrafficLight.RED: "red stop on;off;off on;on;off",
+        TrafficLight.UNKNOWN: "off off;off;off",
     }
 )
 NO_EGO = (
