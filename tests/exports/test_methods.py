@@ -6,15 +6,19 @@ import json
 import pytest
 from django.core.management import call_command
 
+from arena.models import Study
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study, preregistration_sha256
 from tests.study_rows import a_study, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
 
-def exported(form: str) -> str:
+def exported(form: str, *more: str) -> str:
     out = io.StringIO()
-    call_command("export", "methods", "Round 1", "--format", form, "--out", "-", stdout=out)
+    options = ("--format", form, "--out", "-", *more)
+    call_command("export", "methods", "Round 1", *options, stdout=out)
     return out.getvalue()
 
 
@@ -39,3 +43,18 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     assert "Counted: 8 votes; left out: 2 repeat." in text
     assert r"Recruitment: \textbf{[BLANK]}" in text
     assert "finn" not in text + json.dumps(sheet)
+
+
+def test_whether_both_miss_is_said_of_the_question_that_offers_it() -> None:
+    study = a_study(votes_per_expert=4, questions=("instruction", "realism"))
+    Study.objects.update(allow_both_miss=True)
+    for matchup in matchups_of(study, "eva"):
+        vote(matchup)
+        vote(matchup, question="realism")
+    study = close_study(study=study)
+    for question, size in (("instruction", "3 + 1"), ("realism", "3")):
+        rating = rate(study=study, rounds=50, filters=Filters(question=question))
+        sheet = json.loads(exported("json", "--rating", str(rating.code)))
+        answers = {line["number"]: line["answer"] for line in sheet["questions"]}
+        assert answers["4.3.3"] == size
+        assert ("both miss" in answers["4.3.4"]) == (question == "instruction")

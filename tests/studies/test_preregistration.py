@@ -15,7 +15,7 @@ from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import FORMATS, bundle_files, plain_text
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study, preregistration_sha256
-from arena.studies.services.plan import HypothesisVerdict
+from arena.studies.services.plan import HypothesisVerdict, answer_hypotheses
 from augment.models import Contestant
 from tests import study_rows
 from tests.opening import open_study
@@ -112,3 +112,7 @@ def test_the_results_answer_the_pairs_and_every_export_names_the_hash() -> None:
     page = signed_in(person).get(reverse("results", args=[study.code])).content.decode()
     assert sha in page
     assert "contradicted" in page
+    assert table.hypotheses[0].difference is not None
+    apart = replace(snapshot.results.board, parts={"ann": 0, "bob": 0, "cid": 1})
+    snapshot.results = replace(snapshot.results, board=apart)
+    assert {one.difference for one in answer_hypotheses(snapshot)} == {None}

@@ -1,6 +1,7 @@
 """The results page: its table and tabs, what each shows, to whom, and what is shared of it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -239,6 +240,10 @@ def test_questions_stand_side_by_side_and_are_never_averaged(researcher: Client)
     (link,) = compare_questions(newest).links  # type: ignore[union-attr]
     assert (link.spearman, link.pairs) == (pytest.approx(-1.0), 17)
     assert link.same.value == pytest.approx(4 / 17), "three slips, and one that both like"
+    apart = replace(newest.results.board, parts={"ann": 0, "bob": 0, "cid": 1})
+    newest.results = replace(newest.results, board=apart)
+    (link,) = compare_questions(newest).links  # type: ignore[union-attr]
+    assert link.spearman is None, "of ratings that can't be compared"
     shown = page(researcher, study)
     assert "rank correlation of ratings −1.00 (Spearman)" in shown
     assert "of 17 pairs decided in both" in shown

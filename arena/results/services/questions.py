@@ -29,8 +29,8 @@ class TwoQuestions:
     """Dependence between the answers to two questions.
 
     Attributes:
-        spearman: Of the ratings of the contestants that both rate, None for fewer than three or
-            ratings that are all equal.
+        spearman: Of the ratings of the contestants that both rate, None for fewer than three,
+            ratings that are all equal, or not all of one question rated together.
         same: The share of pairs with a preference for the same side, of those where both
             questions have one, clustered by expert and scenario.
         pairs: Where both have one.
@@ -116,7 +116,8 @@ def _link(
         for slug, row in standings[primary].items()
         if slug in standings[other]
     ]
-    pairs = [(x, y) for x, y in rated if x is not None and y is not None]
+    is_apart = any(len({*ratings[name].results.board.parts.values()}) > 1 for name in pair)
+    pairs = [] if is_apart else [(x, y) for x, y in rated if x is not None and y is not None]
     return TwoQuestions(
         one=primary,
         other=other,

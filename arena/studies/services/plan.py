@@ -46,7 +46,8 @@ class HypothesisAnswer:
 
     Attributes:
         verdict: None for a line in words.
-        difference: Points from the other to the one expected to be better.
+        difference: Points from the other to the one expected to be better; None where they are
+            not rated together.
         p: Adjusted for all pairs of the table.
     """
 
@@ -109,6 +110,8 @@ def answer_hypotheses(snapshot: Snapshot) -> tuple[HypothesisAnswer, ...]:
             answers.append(HypothesisAnswer(hypothesis=hypothesis))
             continue
         high, low = (ratings.get(slug) for slug in hypothesis.above)
+        if len({board.parts.get(slug) for slug in hypothesis.above}) > 1:
+            high = None
         answers.append(
             HypothesisAnswer(
                 hypothesis=hypothesis,
