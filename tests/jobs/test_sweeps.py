@@ -16,7 +16,7 @@ from augment.models import Scenario, Simulation, Sweep
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent, Shape
-from augment.services.driving.driving_scores import options_driven
+from augment.services.driving.driving_scores import drives_of_job, options_driven
 from augment.services.driving.simulations import DRIVES, Options
 from augment.services.driving.sweeps import (
     SweepRequest,
@@ -244,4 +244,4 @@ def test_drives_of_a_sweep_are_not_among_those_of_a_job() -> None:
     job = rows.launch()
     scenario = Scenario.objects.get()
     plan_sweep(scenario=scenario, request=asked(number="add[0].x_m", low=20.0, high=25.0))
-    assert options_driven(job) == []
+    assert options_driven(drives_of_job(job)) == []

@@ -18,9 +18,10 @@ from arena.results.services.questions import compare_questions
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.importing import import_votes
 from arena.studies.services.opening import close_study
-from augment.models import Contestant, Event
+from augment.models import Augmentation, Contestant, Event
 from augment.scene.entities import ScenarioType
 from tests import study_rows
+from tests.drives import drive_pictures
 from tests.full_study import Size, full_study
 from tests.opening import open_study
 from tests.web.cast import people, signed_in
@@ -327,3 +328,10 @@ def test_two_studies_stand_side_by_side(
     found = [[line and line["row"].slug for _, line in cells] for cells in answer.context["lines"]]
     assert found == [["ann", "ann"], ["bob", None], ["cid", None], [None, "dot"]]
     assert researcher.get(address, {"other": "x"}).status_code == 422
+
+
+def test_drives_of_another_planner_than_the_papers_are_shown(rated: Snapshot) -> None:
+    drive_pictures(Augmentation.objects.all(), planner="idm")
+    text = shown(rated.study, tab="driving")
+    assert "by the planner idm" in text
+    assert "Nothing was driven" not in text

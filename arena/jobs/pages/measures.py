@@ -137,7 +137,8 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
 
 def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]:
     """Return how the job was driven, the last way first, and which the address asks for."""
-    ways = driving_scores.options_driven(job) or [Options()]
+    drives = driving_scores.drives_of_job(job)
+    ways = driving_scores.options_driven(drives) or [Options()]
     numbers = [str(number) for number in range(len(ways))]
     return ways, int(choice_asked(request, "driven", numbers) or 0)
 

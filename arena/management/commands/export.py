@@ -32,7 +32,7 @@ from augment.errors import Conflict, check_names
 from augment.models import BaseScene
 from augment.services import TerminalCommand
 from augment.services.benchmarks import find_benchmark
-from augment.services.driving import options_driven, simulations, ways_to_compare
+from augment.services.driving import drives_of_job, options_driven, simulations, ways_to_compare
 from augment.services.driving.simulations import SCORES
 from augment.services.judging import list_warnings, scenario_export, scene_source
 from augment.services.judging.analyses import ANALYSES
@@ -155,7 +155,8 @@ def _write_driving(options: Chosen, say: Say) -> ExportedFile:
     how = simulations.Options(
         planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
     )
-    driven = [one for one in options_driven(job) if replace(one, version=how.version) == how]
+    ways = options_driven(drives_of_job(job))
+    driven = [one for one in ways if replace(one, version=how.version) == how]
     if not driven:
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
     newest = max(driven, key=lambda one: one.version)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from django.db.models import Q
 from django.db.models.fields.json import KT
 
 from arena.jobs.exports.driving import driving_context
@@ -30,8 +31,8 @@ from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
 from arena.results.services.analysis import FEW_VOTES
 from arena.results.services.questions import compare_questions
-from augment.models import EndpointModel, Simulation
-from augment.services.driving import scores_of_augmentations
+from augment.models import EndpointModel, NuplanResult
+from augment.services.driving import options_driven, scores_of_augmentations
 from augment.services.driving.simulations import SCORES, Options
 
 Context = dict[str, Any]
@@ -228,10 +229,12 @@ def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The drives of the augmentations that the study shows."""
-    if not Simulation.objects.exists():
-        return {"drivings": []}
     ids = list_shown_ids(snapshot.study)
-    how = Options().newest_in(Simulation.objects.filter(augmentation__in=ids))
+    ways = options_driven(Q(augmentation__in=ids))
+    if not ways and not NuplanResult.objects.exists():
+        return {"drivings": []}
+    # The paper's planner where it drove, else whichever drove last.
+    how = next((way for way in ways if way.name == Options().name), ways[0]) if ways else Options()
     scores = [
         scores_of_augmentations(ids, title=snapshot.study.name, options=how, score=score)
         for score in SCORES

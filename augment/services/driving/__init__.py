@@ -5,6 +5,7 @@ from augment.services.driving.driving_scores import (
     DrivingLine,
     DrivingScores,
     clearance_text,
+    drives_of_job,
     options_driven,
     scores_of_augmentations,
     scores_of_job,

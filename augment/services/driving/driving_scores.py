@@ -119,7 +119,7 @@ def scores_of_job(
         options: How they were driven; None for the way in which they were driven last.
         score: One of `SCORES`.
     """
-    options = options or next(iter(options_driven(job)), Options())
+    options = options or next(iter(options_driven(drives_of_job(job))), Options())
     results = NuplanResult.objects.filter(augmentation__job=job, rules=score)
     return _scores(job.name, drives_of_job(job), results, options, score)
 
@@ -158,9 +158,9 @@ def clearance_text(least_distance_m: float | None) -> str:
     return f"{least_distance_m:.2f} m{mark}"
 
 
-def options_driven(job: GenerationJob) -> list[Options]:
-    """Return every way in which drives of a job were asked for, the latest first."""
-    rows = Simulation.objects.filter(drives_of_job(job)).order_by("-pk")
+def options_driven(which: Q) -> list[Options]:
+    """Return every way in which drives were asked for, the latest first."""
+    rows = Simulation.objects.filter(which).order_by("-pk")
     ways = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive", "version"))
     return [
         Options(planner=planner, offsets=offsets, is_reactive=reactive, version=version)

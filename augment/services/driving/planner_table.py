@@ -85,7 +85,7 @@ def ways_to_compare(job: GenerationJob, specs: Sequence[str] = ()) -> list[Optio
         Conflict: Fewer than two are left.
         UnknownName: The job was not driven by one of them.
     """
-    driven = options_driven(job)
+    driven = options_driven(drives_of_job(job))
     newest = max((way.version for way in driven), default=0)
     ways = {way.name: way for way in reversed(driven) if way.version == newest}
     if specs:
