@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from augment.formats.apart import UntrustedInput
+from augment.scene.planned_motion import NearEgo
 from tests.formats.openscenario_files import (
     AFTER,
     BRAKES,
@@ -201,6 +202,22 @@ def test_an_event_waits_for_what_an_actor_does_first(tmp_path: Path) -> None:
     assert other.states[[49, 60], 3] == pytest.approx([12.0, 8.0], abs=0.5)
     assert other.states[-1, 3] == 0.0
     assert any("event brakes begins so long after the first" in n for n in reading.notes)
+
+
+def test_carlas_steps_last_and_a_standing_ego_sets_off(tmp_path: Path) -> None:
+    # At 1.1 s, and at t0 alone: who meets both does so once both have been met.
+    both = by_entity(GAP.format(50, "false")) + by_time(0).replace("greaterThan", "equalTo")
+    goes = event(speed(8, STEP.replace('"0"', '"2"')), both)
+    waits = event(speed(0, STEP.replace("time", "rate")), AFTER, name="waits")
+    text = scenario(goes, waits).replace('revMinor="1"', 'revMinor="1" description="CARLA:made"')
+    standing = text.replace('value="10"', 'value="0"').replace('y="-1.75"', 'y="1.75"')
+    reading = read(write(tmp_path, standing))
+    motion = reading.scene.agents[0].motion
+    assert motion is not None
+    assert isinstance(motion.start, NearEgo)
+    assert motion.start.within_m == pytest.approx(49.001, abs=0.001)
+    assert motion.speeds == ((0.0, 0.0), (0.01, 8.0), (2.0, 8.0), (2.01, 0.0))
+    assert "The ego stands: events that wait for it see it at 10 m/s." in reading.notes
 
 
 def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path) -> None:

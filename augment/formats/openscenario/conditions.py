@@ -29,6 +29,7 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "rising": lambda now, before: now & ~before,
     "falling": lambda now, before: ~now & before,
     "risingOrFalling": lambda now, before: now != before,
+    "latched": lambda now, before: np.maximum.accumulate(now),
 }
 _STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}

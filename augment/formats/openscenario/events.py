@@ -22,6 +22,7 @@ _TIME = "ByValueCondition/SimulationTimeCondition"
 WAIT = "ByValueCondition/StoryboardElementStateCondition"
 BEGUN = ("startTransition", "runningState")
 ENDED = ("endTransition", "completeState", "stopTransition")
+_ONSETS = ("none", "rising", "latched")
 _SINCE = ("greaterThan", "greaterOrEqual", "equalTo")
 """The rules by which a time is one from which on something holds."""
 Groups = tuple[tuple[Element, ...], ...]
@@ -135,7 +136,7 @@ def _find_time(groups: Groups, place: str) -> float | None:
         return 0.0
     time, edge = conditions[0].find(_TIME), conditions[0].get("conditionEdge", "none")
     is_since = time is not None and time.get("rule", _SINCE[0]) in _SINCE
-    if time is None or not is_since or len(conditions) > 1 or edge not in ("none", "rising"):
+    if time is None or not is_since or len(conditions) > 1 or edge not in _ONSETS:
         return None
     delay_s = foreign.read_number(conditions[0].get("delay") or "0", place)
     return max(read_float(time, "value", place) + delay_s, 0.0)

@@ -16,7 +16,7 @@ import shapely
 from pydantic import TypeAdapter
 
 from augment import foreign
-from augment.errors import InvalidModification
+from augment.errors import InvalidDocument, InvalidModification
 from augment.foreign import Doubts, FloatArray, fault_at
 from augment.formats.opendrive.geometry import read_float
 from augment.formats.opendrive.network import RoadNetwork
@@ -49,10 +49,10 @@ _BESIDE_ROUTE_M = 15.0
 """Lanes of a route end no further from its roads' middles."""
 _STEP_S, _JUMP_S = 0.01, 0.001
 """A step in speed takes so long, and one onto a trajectory with times."""
-_ON_M, _THIN_M, _LATEST_S = 1_000.0, 0.0005, 60.0
+_ON_M, _THIN_M, _LATEST_S, _USUAL_MPS = 1_000.0, 0.0005, 60.0, 10.0
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
-    "step": lambda share: share,
+    **dict.fromkeys(("step", "hold"), lambda share: share),
     "cubic": lambda share: share * share * (3.0 - 2.0 * share),
     "sinusoidal": lambda share: (1.0 - math.cos(math.pi * share)) / 2.0,
 }
@@ -78,6 +78,7 @@ class Stage:
         ids: Mapping[str, str],
     ) -> None:
         self.scene, self._recording, self._ids = scene, recording, ids
+        self._ego_mps = scene.ego.speed_mps
         self._network, self._placer = network, placer
         self._origin, self.graph = scene.origin.pose, LaneGraph(scene)
         motion = find_motion(scene, recording=recording)
@@ -103,6 +104,22 @@ class Stage:
             needed[name], motion = by_id[name], by_id[name].motion
             name = motion.start.agent_id if motion and isinstance(motion.start, AtPlace) else ""
         self._expect(replace(self.scene, agents=tuple(needed.values())))
+
+    def find_start(self, event: StoryEvent, name: str, doubts: Doubts) -> tuple[Trigger, int]:
+        """Return how an event begins, and the step; an ego that stands may have to set off."""
+        try:
+            return find_trigger(event, name, self.expected, doubts)
+        except InvalidDocument:
+            if self._recording is not None or self._ego_mps > 0.0:
+                raise
+        self._set_off(_USUAL_MPS)
+        try:
+            found = find_trigger(event, name, self.expected, doubts)
+        except InvalidDocument:
+            self._set_off(0.0)
+            raise
+        doubts.assume(f"The ego stands: events that wait for it see it at {_USUAL_MPS:g} m/s")
+        return found
 
     def find_point(self, position: Element, place: str) -> Pose:
         """Return the pose that a Position says at t0."""
@@ -148,7 +165,12 @@ class Stage:
         rows = [leg.road.line.poses_at(np.linspace(leg.from_m, leg.to_m, 100)) for leg in legs]
         return self._origin.to_local(np.vstack(rows)[:, :2])
 
+    def _set_off(self, mps: float) -> None:
+        self._ego_mps = mps
+        self._expect(replace(self.scene, agents=()))
+
     def _expect(self, scene: Scene) -> None:
+        scene = replace(scene, ego=replace(scene.ego, speed_mps=self._ego_mps))
         motion = find_motion(scene, recording=self._recording)
         states = {one.agent.id: one.states for one in (motion.ego, *motion.others)}
         self.expected.states.update(
@@ -215,13 +237,8 @@ class _Draft:
             }
             lasts_s = foreign.look_up(act, kind, event.place)(action, begins_s, event.place)
             ends_s = max(ends_s, begins_s + lasts_s)
-        done = Done(
-            actor=self._name,
-            start=start,
-            started_s=float(times_s[self._step]),
-            begins_s=begins_s,
-            ends_s=ends_s,
-        )
+        started_s, name = float(times_s[self._step]), self._name
+        done = Done(actor=name, start=start, started_s=started_s, begins_s=begins_s, ends_s=ends_s)
         self._stage.expected.done.update(dict.fromkeys(event.names, done))
 
     def _begin(self, event: StoryEvent) -> float:
@@ -241,7 +258,7 @@ class _Draft:
             time_s = done.start.after_s + since_s
             start, step = AtTime(after_s=time_s), self._step_at(time_s)
         elif self.start is None:
-            start, step = find_trigger(event, self._name, expected, doubts)
+            start, step = self._stage.find_start(event, self._name, doubts)
         elif event.time_s is None:
             step, _ = find_step(event, expected)
             if step < self._step:
@@ -251,9 +268,11 @@ class _Draft:
         else:
             start = AtTime(after_s=event.time_s)
         if self.start is None:
+            x_m, y_m, heading_rad, _ = expected.states[self._name][step].tolist()
+            if not math.isfinite(x_m):
+                raise fault_at(event.place, "is past the map when it begins")
             self.start, self._step = start, step
-            state_row = expected.states[self._name][step].tolist()
-            self._here = Pose(x_m=state_row[0], y_m=state_row[1], heading_rad=state_row[2])
+            self._here = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
             return 0.0
         assert isinstance(start, AtTime)
         if not isinstance(self.start, AtTime) or start.after_s < self.start.after_s:
@@ -281,19 +300,21 @@ class _Draft:
         dynamics = _find(action, "SpeedActionDynamics", place)
         by = dynamics.get("dynamicsDimension")
         value = abs(read_float(dynamics, "value", place, default=0.0))
-        shape = foreign.look_up(_SHAPES, dynamics.get("dynamicsShape"), place)
-        change_mps, mean_mps = abs(goal_mps - now_mps), max((goal_mps + now_mps) / 2.0, 0.1)
+        kind = dynamics.get("dynamicsShape")
+        shape = foreign.look_up(_SHAPES, kind, place)
+        change_mps = abs(goal_mps - now_mps)
+        mean_mps = max(goal_mps if kind == "hold" else (goal_mps + now_mps) / 2.0, 0.1)
         rated_s, way_s = change_mps / max(value, 1e-6), value / mean_mps
         spans_s = {"time": value, "rate": rated_s, "distance": way_s}
-        lasts_s = foreign.look_up(spans_s, by, f"{place}.dynamicsDimension")
-        lasts_s = _STEP_S if dynamics.get("dynamicsShape") == "step" else max(lasts_s, _STEP_S)
+        held_s = max(foreign.look_up(spans_s, by, f"{place}.dynamicsDimension"), _STEP_S)
+        lasts_s = _STEP_S if kind in ("hold", "step") else held_s
         self.speeds = [row for row in self.speeds if row[0] < at_s - _STEP_S]
         shares = (0.0, 1.0) if shape(0.25) == 0.25 else np.linspace(0.0, 1.0, 7).tolist()
         # So much of it as is over by the last moment.
         for share in np.multiply(shares, min((_LATEST_S - at_s) / lasts_s, 1.0)).tolist():
             mps = now_mps + shape(share) * (goal_mps - now_mps)
             self.speeds.append((round(at_s + share * lasts_s, 4), mps))
-        return lasts_s
+        return held_s if kind == "hold" else lasts_s
 
     def _change_lane(self, action: Element, at_s: float, place: str) -> float:
         gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)
@@ -346,8 +367,7 @@ class _Draft:
         kept = rows[apart]
         thinned = np.round(_thin(kept), 4)
         self.path = PointPath(points_m=tuple((float(x), float(y)) for x, y in thinned))
-        begin = self._find_begin(place)
-        here = np.array([[begin.x_m, begin.y_m]])
+        here = np.array([[self._here.x_m, self._here.y_m]])
         line = np.vstack([here, kept])
         self._line = Polyline(line[np.append(True, np.hypot(*np.diff(line, axis=0).T) > 0.005)])
 
@@ -355,7 +375,7 @@ class _Draft:
         """Return where it is so far after its start."""
         if self._line is not None:
             return self._line.pose_at(gone_m)
-        here = self._find_begin(place)
+        here = self._here
         agent = replace(
             self._agent, x_m=here.x_m, y_m=here.y_m, heading_rad=here.heading_rad, lane_id=None
         )
@@ -363,12 +383,6 @@ class _Draft:
         if row is None:
             raise fault_at(place, "is past the map when it begins")
         return Pose(x_m=row[0], y_m=row[1], heading_rad=row[2])
-
-    def _find_begin(self, place: str) -> Pose:
-        """Return where it is at its start."""
-        if not math.isfinite(self._here.x_m):
-            raise fault_at(place, "is past the map when it begins")
-        return self._here
 
     def _follow(self, action: Element, at_s: float, place: str) -> float:
         middles, times_s = self._stage.trace(self._name, action, place, self._step_since(at_s))

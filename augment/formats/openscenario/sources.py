@@ -100,7 +100,7 @@ class ScenarioSource:
         self._fill_references(self.root)
         # Also those of catalogs.
         if header is not None and header.get("description", "").startswith("CARLA:"):
-            self._mirror_places()
+            self._take_as_carla()
         for tag in _IGNORED:
             self.doubts.assume(f"{tag} was left out", len([*self.root.iter(tag)]))
         stops = len(self.root.findall(".//Act/StopTrigger//Condition"))
@@ -121,8 +121,17 @@ class ScenarioSource:
                     self._fill_references(entry, depth + 1)
                     holder.append(entry)
 
-    def _mirror_places(self) -> None:
-        """Turn world positions of CARLA's own frame, which counts y to the right, into ours."""
+    def _take_as_carla(self) -> None:
+        """Turn CARLA's own frame, which counts y to the right, and its own player's ways to ours.
+
+        It looks at no edges, a condition that held once goes on to, and a step in speed lasts as
+        long as its value says.
+        """
+        for part in self.root.iterfind("Storyboard/Story//*"):
+            if part.tag == "Condition":
+                part.set("conditionEdge", "latched")
+            elif part.tag == "SpeedActionDynamics" and part.get("dynamicsShape") == "step":
+                part.set("dynamicsShape", "hold")
         worlds = [*self.root.iter("WorldPosition")]
         for world in worlds:
             # Without a heading a vertex has that of the way on.
