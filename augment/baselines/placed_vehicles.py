@@ -88,7 +88,8 @@ def place_vehicles(
     if request.spacing is not None:
         apart_m = request.spacing.draw(rng)
     d_m = _offset_m(request, ground, distance_m, rng)
-    turn_rad = _FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
+    open_to = Facing.ACROSS if body is Body.BARRIER else Facing.WITH_LANE
+    turn_rad = _FACING_RAD[request.facing or open_to] + math.radians(request.turn_deg)
     added = []
     for index in range(request.count or 1):
         centre = ground.beside(distance_m + index * apart_m, lane)

@@ -96,6 +96,8 @@ def check_heading(case: Case) -> Iterator[Finding]:
             if band is None:
                 continue
             turn_rad = agent.heading_rad - band.tangent_rad
+            if request.body is Body.BARRIER and agent.width_m > agent.length_m:
+                turn_rad += math.pi / 2.0  # its longer side is what leads across
             turns_deg = [unwrap_deg(turn_rad, wanted_deg)]
             # Across is either way, and what has no front may be turned round.
             if facing is Facing.ACROSS or request.body in _NO_FRONT:

@@ -140,6 +140,11 @@ def test_a_car_in_the_oncoming_lane_faces_as_its_lane_leads() -> None:
     assert abs(car.heading_rad) == pytest.approx(math.pi, abs=1e-4)
 
 
+def test_a_barrier_lies_across_where_nothing_else_is_said() -> None:
+    (barrier,) = added(scene(), parked(20.0, body=Body.BARRIER))
+    assert barrier.heading_rad == pytest.approx(math.pi / 2.0, abs=1e-4)
+
+
 def test_a_place_that_is_taken_is_refused() -> None:
     busy = scene(agents=(vehicle("Agent2", 21.0, 0.0),))
     assert "it would stand in Agent2" in refusal(busy, parked())

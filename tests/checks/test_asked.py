@@ -54,6 +54,8 @@ TAPER = (
 )
 CONES = tuple(cone(f"Agent{n + 2}", 20.0 + 2.5 * n, -1.5) for n in range(3))
 A_BUS = vehicle("Agent2", 35.0, 0.0, type=AgentType.BUS, length_m=7.456, width_m=2.079)
+CLOSED = parked(20.0, body=wish.Body.BARRIER, facing=wish.Facing.ACROSS)
+A_BAR = vehicle("Agent2", 20.0, 0.0, type=AgentType.BARRIER, length_m=0.6)
 
 
 def faults(
@@ -78,6 +80,7 @@ def faults(
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -0.9)),)),  # the road ends 0.85 m on
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (28.0, -3.0)),)),
         (NARROWED, TAPER),
+        *((CLOSED, (A_BAR,)), (CLOSED, (replace(A_BAR, heading_rad=math.pi),))),
     ],
 )
 def test_what_is_as_asked_for_has_no_fault(
@@ -103,6 +106,7 @@ def test_what_is_as_asked_for_has_no_fault(
         (CAR, (cone("Agent2", 20.0, 1.2),), FindingKind.ASKED_TYPE),
         (MIDDLE, (vehicle("Agent2", 20.0, 1.2),), FindingKind.ASKED_ACROSS),
         (FACING, (vehicle("Agent2", 20.0, 0.0),), FindingKind.ASKED_HEADING),
+        (CLOSED, (replace(A_BAR, heading_rad=math.pi / 2.0),), FindingKind.ASKED_HEADING),
         (WALK, (pedestrian("Agent2", 30.0, 6.0, (30.0, -3.0)),), FindingKind.ASKED_DISTANCE),
         (WALK, (pedestrian("Agent2", 20.0, -3.0, (20.0, 6.0)),), FindingKind.ASKED_SIDE),
         (WALK, (replace(ACROSS[0], heading_rad=math.pi / 2.0),), FindingKind.ASKED_HEADING),
