@@ -17,6 +17,7 @@ import numpy as np
 
 from augment.baselines.rule_placer import place
 from augment.checks import Ground
+from augment.checks.parties import apart_m
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.fake_llm import careless, sight
@@ -149,7 +150,7 @@ def review_problems(task: Task) -> list[Problem]:
     )
     problems = []
     for agent in changed:
-        meant = min(right, key=lambda candidate: _distance_m(candidate, agent))
+        meant = min(right, key=lambda candidate: apart_m(candidate, agent))
         right.remove(meant)
         problem = _difference(agent, meant)
         if problem is None and some_move:
@@ -240,7 +241,7 @@ def _compare_pictures(request: ChatRequest, *, leans: bool) -> str:
 
 
 def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
-    gap_m = _distance_m(agent, meant)
+    gap_m = apart_m(agent, meant)
     turned = abs(difference(agent.heading_rad, meant.heading_rad))
     if agent.type is not meant.type:
         return _problem(f"{agent.id} is a {agent.type}, not a {meant.type}.", "Use that type.")
@@ -277,10 +278,6 @@ def _motion_difference(
 def _problem(sentence: str, action: str) -> Problem:
     reason = "The wish, worked out along the lanes, says otherwise."
     return {"problem": sentence, "reason": reason, "corrective_action": action}
-
-
-def _distance_m(agent: TrafficAgent, other: TrafficAgent) -> float:
-    return math.hypot(agent.x_m - other.x_m, agent.y_m - other.y_m)
 
 
 # --- Calls of the function ---------------------------------------------------------------------

@@ -136,14 +136,17 @@ FEW_SCENES = 12
 
 def planner_notes(table: PlannerTable) -> list[str]:
     """Return the sentences that belong beneath every form of the table of planners."""
+    estimates = [[line.estimate for line in lines] for lines in table.groups]
+    fewest = min((one.scenes for group in estimates for one in group), default=0)
     notes = {
         f"Mean of {SCORE_LABELS[table.score]}'s score, drives of version {table.version}; 95 % "
         "intervals clustered by scene. Planners with a common letter can't be told apart at 5 % "
         "for all differences of the table (paired t tests on the same drives, Holm).": True,
         "Not all planners finished the same drives: a mean is of a planner's own, differences and "
-        "letters are of those that both finished.": table.is_uneven,
-        f"The fewest scenes behind a line: {table.fewest_scenes}.": table.fewest_scenes
-        < FEW_SCENES,
+        "letters are of those that both finished.": any(
+            len({one.drives for one in group}) > 1 for group in estimates
+        ),
+        f"The fewest scenes behind a line: {fewest}.": fewest < FEW_SCENES,
         DIFFERENCE: True,
     }
     return [note for note, holds in notes.items() if holds]

@@ -63,16 +63,6 @@ class PlannerTable:
     planners: tuple[str, ...]
     groups: tuple[tuple[PlannerLine, ...], ...]
 
-    @property
-    def fewest_scenes(self) -> int:
-        """The fewest scenes that a line rests on."""
-        return min((line.estimate.scenes for lines in self.groups for line in lines), default=0)
-
-    @property
-    def is_uneven(self) -> bool:
-        """True if not all planners finished the same drives."""
-        return any(len({line.estimate.drives for line in lines}) > 1 for lines in self.groups)
-
 
 def ways_to_compare(job: GenerationJob, specs: Sequence[str] = ()) -> list[Options]:
     """Return the ways of the newest version in which a job was driven.
@@ -141,12 +131,10 @@ def _lines(
 ) -> tuple[PlannerLine, ...]:
     means = {planner: estimate_score(drives) for planner, drives in scores.items()}
     # Who is told apart comes first by that: a mean may be of fewer, easier drives.
-    lead: Counter[str] = Counter()
-    for one in (one for one in differences if one.is_apart):
-        sign = 1 if one.estimate.mean > 0.0 else -1
-        lead.update({one.first: sign, one.second: -sign})
-    ranked = sorted(means, key=lambda planner: (-lead[planner], -means[planner].mean))
-    sets = find_sets(ranked, differences)
+    apart = [one for one in differences if one.is_apart]
+    behind = Counter(one.second if one.estimate.mean > 0.0 else one.first for one in apart)
+    ranked = sorted(means, key=lambda planner: (behind[planner], -means[planner].mean))
+    sets = find_sets(ranked, apart)
     name = contestant.name if contestant else str(subject.label)
     line = partial(PlannerLine, name=name, contestant=contestant)
     return (
