@@ -98,15 +98,14 @@ def check_heading(case: Case) -> Iterator[Finding]:
             turn_rad = agent.heading_rad - band.tangent_rad
             if request.body is Body.BARRIER and agent.width_m > agent.length_m:
                 turn_rad += math.pi / 2.0  # its longer side is what leads across
-            turns_deg = [unwrap_deg(turn_rad, wanted_deg)]
             # Across is either way, and what has no front may be turned round.
-            if facing is Facing.ACROSS or request.body in _NO_FRONT:
-                turns_deg.append(unwrap_deg(turn_rad + math.pi, wanted_deg))
+            is_round = facing is Facing.ACROSS or request.body in _NO_FRONT
+            turns_rad = (turn_rad, turn_rad + math.pi) if is_round else (turn_rad,)
             yield hold(
                 FindingKind.ASKED_HEADING,
                 [agent],
                 "The turn of {agents[0]} to the left of its lane's direction",
-                min(turns_deg, key=wanted.off),
+                min((unwrap_deg(turn, wanted_deg) for turn in turns_rad), key=wanted.off),
                 wanted,
                 unit="degrees",
             )

@@ -12,8 +12,8 @@ from augment.geometry import frames
 from augment.scene.entities import STEERED, STOPPED_BELOW_MPS, AgentType, Point, TrafficAgent
 from augment.scene.planned_motion import PointPath
 
-TOUCH_M = 0.01
-"""Depths below this are rounding."""
+TOUCH_M = 0.02
+"""Depths below this are rounding: prompts have places and sizes to the centimetre."""
 CRASH_SHARE = 0.10
 """Crashed cars that people placed for interPlan overlap by up to 5.6 % of a box."""
 GROSS_CRASH_SHARE = 0.20

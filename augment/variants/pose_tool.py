@@ -23,6 +23,7 @@ import pydantic
 from pydantic import Field
 
 from augment.checks import Ground
+from augment.checks.bodies import TOUCH_M
 from augment.errors import InvalidModification, ToolError
 from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts import vectors
@@ -49,7 +50,6 @@ FREE_GAP_M = 0.5
 _OF_A_PLACE = frozenset({"distance_m", "lateral_m", "x_m", "y_m", "heading_rad", "error"})
 """What stands at every place of an answer about several, be it the same everywhere."""
 _ROUNDING_M = 0.005
-_TOUCH_M = 0.01
 _SEARCHED_M, _STEP_M = 50.0, 0.5
 
 _Several = (pydantic.BeforeValidator(lambda value: value if isinstance(value, list) else [value]),)
@@ -371,7 +371,7 @@ class PoseTool(LaneTool):
             for name, agent in self.agents.items()
             if math.dist((pose.x_m, pose.y_m), (agent.x_m, agent.y_m))
             <= reach_m + math.hypot(agent.length_m, agent.width_m) / 2.0
-            and overlap(box, agent.box).depth_m > _TOUCH_M
+            and overlap(box, agent.box).depth_m > TOUCH_M
         ]
 
     def _nearest_free_m(

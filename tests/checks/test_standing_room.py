@@ -34,7 +34,10 @@ def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
 
 @pytest.mark.parametrize(
     ("gap_m", "severity"),
-    [(0.1, None), (-0.24, Severity.FACT), (-0.72, Severity.DOUBTFUL), (-2.0, Severity.WRONG)],
+    [
+        *((0.1, None), (-0.015, None), (-0.24, Severity.FACT)),
+        *((-0.72, Severity.DOUBTFUL), (-2.0, Severity.WRONG)),
+    ],
 )
 def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> None:
     cars = vehicle("Agent2", 30.0, 0.0), vehicle("Agent3", 34.8 + gap_m, 0.0)
