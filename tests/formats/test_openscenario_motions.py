@@ -217,7 +217,7 @@ def test_carlas_steps_last_and_a_standing_ego_sets_off(tmp_path: Path) -> None:
     assert isinstance(motion.start, NearEgo)
     assert motion.start.within_m == pytest.approx(49.001, abs=0.001)
     assert motion.speeds == ((0.0, 0.0), (0.01, 8.0), (2.0, 8.0), (2.01, 0.0))
-    assert "The ego stands: events that wait for it see it at 10 m/s." in reading.notes
+    assert "The ego stands: who waits for it sees it at 10 m/s." in reading.notes
 
 
 def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path) -> None:

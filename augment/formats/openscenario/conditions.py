@@ -184,10 +184,8 @@ def _watch(
 ) -> tuple[np.ndarray, Sequence[str]]:
     """When a condition holds (T,), and whose motion it depends on."""
     place = event.place
-    element = next(
-        (e for path in ("ByValueCondition/*", "ByEntityCondition/EntityCondition/*")
-         for e in condition.findall(path)), None)  # fmt: skip
-    kind = "nothing" if element is None else element.tag
+    paths = "ByValueCondition/*", "ByEntityCondition/EntityCondition/*"
+    element = next((e for p in paths for e in condition.findall(p)), Element("nothing"))
     if (wait := condition.find(WAIT)) is not None:
         if has_begun(wait, event.around):
             return expected.times_s >= begun_s - 1e-9, []
@@ -210,17 +208,16 @@ def _watch(
         "StandStillCondition": _measure_standing,
         "SimulationTimeCondition": lambda _, __, e, ___: e.times_s,
     }
-    measure = foreign.look_up(measures, kind, place)
-    assert element is not None
-    place = f"{place}.{kind}"
-    attribute, usual = _USUAL.get(kind, ("value", None))
+    measure = foreign.look_up(measures, element.tag, place)
+    place = f"{place}.{element.tag}"
+    attribute, usual = _USUAL.get(element.tag, ("value", None))
     value = read_float(element, attribute, place)
     rule = foreign.look_up(_RULES, element.get("rule", usual), place)
     # Of other directions nobody knows how fast anything goes.
     foreign.look_up({"longitudinal": ""}, element.get("direction", "longitudinal"), place)
     triggering = condition.find("ByEntityCondition/TriggeringEntities")
     names = [] if triggering is None else [e.get("entityRef", "") for e in triggering]
-    if kind == "SimulationTimeCondition":
+    if element.tag == "SimulationTimeCondition":
         return rule(expected.times_s + 1e-9, value), []
     with np.errstate(all="ignore"):
         met = [rule(measure(name, element, expected, place), value) for name in names]

@@ -7,6 +7,7 @@ V vertices.
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -77,8 +78,8 @@ class Stage:
         entities: Mapping[str, Entity],
         ids: Mapping[str, str],
     ) -> None:
-        self.scene, self._recording, self._ids = scene, recording, ids
-        self._ego_mps = scene.ego.speed_mps
+        self.scene, self._ego_mps = scene, scene.ego.speed_mps
+        self._recording, self._ids = recording, ids
         self._network, self._placer = network, placer
         self._origin, self.graph = scene.origin.pose, LaneGraph(scene)
         motion = find_motion(scene, recording=recording)
@@ -107,19 +108,16 @@ class Stage:
 
     def find_start(self, event: StoryEvent, name: str, doubts: Doubts) -> tuple[Trigger, int]:
         """Return how an event begins, and the step; an ego that stands may have to set off."""
-        try:
+        with suppress(InvalidDocument):
             return find_trigger(event, name, self.expected, doubts)
-        except InvalidDocument:
-            if self._recording is not None or self._ego_mps > 0.0:
-                raise
-        self._set_off(_USUAL_MPS)
-        try:
-            found = find_trigger(event, name, self.expected, doubts)
-        except InvalidDocument:
+        if self._recording is None and self._ego_mps == 0.0:
+            self._set_off(_USUAL_MPS)
+            with suppress(InvalidDocument):
+                found = find_trigger(event, name, self.expected, doubts)
+                doubts.assume(f"The ego stands: who waits for it sees it at {_USUAL_MPS:g} m/s")
+                return found
             self._set_off(0.0)
-            raise
-        doubts.assume(f"The ego stands: events that wait for it see it at {_USUAL_MPS:g} m/s")
-        return found
+        return find_trigger(event, name, self.expected, doubts)  # says why not
 
     def find_point(self, position: Element, place: str) -> Pose:
         """Return the pose that a Position says at t0."""
@@ -298,13 +296,11 @@ class _Draft:
         is_kept = action.find(".//RelativeTargetSpeed[@continuous='true']") is not None
         self._doubts.assume("A speed that is kept relative to somebody is taken once", is_kept)
         dynamics = _find(action, "SpeedActionDynamics", place)
-        by = dynamics.get("dynamicsDimension")
+        by, kind = dynamics.get("dynamicsDimension"), dynamics.get("dynamicsShape")
         value = abs(read_float(dynamics, "value", place, default=0.0))
-        kind = dynamics.get("dynamicsShape")
         shape = foreign.look_up(_SHAPES, kind, place)
-        change_mps = abs(goal_mps - now_mps)
         mean_mps = max(goal_mps if kind == "hold" else (goal_mps + now_mps) / 2.0, 0.1)
-        rated_s, way_s = change_mps / max(value, 1e-6), value / mean_mps
+        rated_s, way_s = abs(goal_mps - now_mps) / max(value, 1e-6), value / mean_mps
         spans_s = {"time": value, "rate": rated_s, "distance": way_s}
         held_s = max(foreign.look_up(spans_s, by, f"{place}.dynamicsDimension"), _STEP_S)
         lasts_s = _STEP_S if kind in ("hold", "step") else held_s

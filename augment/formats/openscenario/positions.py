@@ -79,21 +79,19 @@ class PositionReader:
         Raises:
             InvalidDocument: It is of another kind, or leads off the map.
         """
-        element = next(iter(position), None)
-        kind = "nothing" if element is None else element.tag
+        element = next(iter(position), Element("nothing"))
         finders: dict[str, Callable[[Element, str], Pose]] = {
             "WorldPosition": self._find_world,
             "LanePosition": self._find_lane,
             "RoadPosition": self._find_road,
             "RelativeLanePosition": self._find_relative_lane,
             "RelativeRoadPosition": self._find_relative_road,
-            "RelativeObjectPosition": self._find_relative_object,
-            "RelativeWorldPosition": self._find_relative_world,
+            "RelativeObjectPosition": self._find_beside,
+            "RelativeWorldPosition": self._find_beside,
             "RoutePosition": self._find_on_route,
         }
-        find = foreign.look_up(finders, kind, place)
-        assert element is not None
-        place = f"{place}.{kind}"
+        find = foreign.look_up(finders, element.tag, place)
+        place = f"{place}.{element.tag}"
         pose, orientation = find(element, place), element.find("Orientation")
         if orientation is None:
             return pose
@@ -137,13 +135,11 @@ class PositionReader:
         return road.pose_at(s_m, read_float(element, "t", place))
 
     def _find_on_route(self, element: Element, place: str) -> Pose:
-        inside = element.find("InRoutePosition/*")
-        kind = "nothing" if inside is None else inside.tag
-        if inside is not None and kind == "FromCurrentEntity":
+        inside = next(element.iterfind("InRoutePosition/*"), Element("nothing"))
+        if inside.tag == "FromCurrentEntity":
             return self.entity_pose(inside.get("entityRef", ""))
         names = {"FromLaneCoordinates": "laneId", "FromRoadCoordinates": "t"}
-        name = foreign.look_up(names, kind, place)
-        assert inside is not None
+        name = foreign.look_up(names, inside.tag, place)
         places = self.find_waypoints(element, place)
         s_name = "s" if "pathS" not in inside.attrib else "pathS"
         way_m = read_float(inside, s_name, place, 0.0)
@@ -190,15 +186,11 @@ class PositionReader:
         pose = road.pose_at(s_m, turns * (t_m + _number(element, "dt")))
         return pose if is_forward == (turns > 0) else pose.turn(math.pi)
 
-    def _find_relative_object(self, element: Element, place: str) -> Pose:
+    def _find_beside(self, element: Element, place: str) -> Pose:
         pose = self.entity_pose(element.get("entityRef", ""))
-        ahead_m, left_m = _number(element, "dx"), _number(element, "dy")
-        x_m, y_m = pose.to_parent(np.array([[ahead_m, left_m]]))[0].tolist()
-        return replace(pose, x_m=x_m, y_m=y_m)
-
-    def _find_relative_world(self, element: Element, place: str) -> Pose:
-        pose = self.entity_pose(element.get("entityRef", ""))
-        x_m, y_m = pose.x_m + _number(element, "dx"), pose.y_m + _number(element, "dy")
+        axes = replace(pose, heading_rad=0.0) if element.tag == "RelativeWorldPosition" else pose
+        away = np.array([[_number(element, "dx"), _number(element, "dy")]])
+        x_m, y_m = axes.to_parent(away)[0].tolist()
         return replace(pose, x_m=x_m, y_m=y_m)
 
     def _advance(

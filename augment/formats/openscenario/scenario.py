@@ -136,8 +136,7 @@ class _Scenario:
             ego[0] = [*self._put, 0.0]
         assert ego is not None
         pose = Pose(x_m=ego[0, 0], y_m=ego[0, 1], heading_rad=wrap(ego[0, 2]))
-        licence = self._source.root.find("FileHeader/License")
-        named = "" if licence is None else (licence.get("name") or "").strip()[:200]
+        licences = (e.get("name", "") for e in self._source.root.iterfind("FileHeader/License"))
         return Log(
             times_s=times_s,
             ego=ego,
@@ -146,7 +145,7 @@ class _Scenario:
             map_at=lambda _: map_around(self._network, pose, self._reach_m, self._lights()),
             world=f"OpenSCENARIO frame of {self._stem}",
             title=f"OpenSCENARIO scenario {self._stem}",
-            licence=named or "no licence named",
+            licence=next(licences, "").strip()[:200] or "no licence named",
             is_free=True,
             item=self.ego_name,
         )

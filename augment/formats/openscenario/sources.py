@@ -4,6 +4,7 @@ Nothing is followed out of the folder of the file, or of the zip that it came in
 """
 
 import glob
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -147,8 +148,8 @@ class ScenarioSource:
         Raises:
             InvalidDocument: It names none, it is not there, or it can't be read.
         """
-        logic = self.root.find("RoadNetwork/LogicFile")
-        name = "" if logic is None else logic.get("filepath", "")
+        logic = self.root.iterfind("RoadNetwork/LogicFile")
+        name = next((file.get("filepath", "") for file in logic), "")
         if not name:
             raise fault_at("RoadNetwork", "names no LogicFile: a scene needs a map")
         suffix = "" if name.lower().endswith(".xodr") else ".xodr"
@@ -186,29 +187,27 @@ class ScenarioSource:
         return resolve(foreign.look_up(entries, entry, place), {}, self.doubts, assigned)
 
     def _find(self, name: str) -> Path | None:
-        wanted = PurePosixPath(name.replace("\\", "/"))
         if not _is_path(name):
             return None
-        beside = (self._within(f"{depth[:-1]}{glob.escape(wanted.name)}") for depth in _DEPTHS)
-        candidates = [self._path.parent / wanted, *(file for files in beside for file in files)]
-        inside = (file.resolve() for file in candidates)
-        return next((f for f in inside if f.is_relative_to(self._folder) and f.is_file()), None)
+        wanted = PurePosixPath(name.replace("\\", "/"))
+        return next(iter(self._list_files([str(wanted.parent)], glob.escape(wanted.name))), None)
 
-    def _within(self, pattern: str) -> list[Path]:
-        return sorted(islice(self._folder.glob(pattern), _MOST_FILES))
+    def _list_files(self, folders: Iterable[str], pattern: str) -> list[Path]:
+        """Files like that in folders as seen from the scenario, then anywhere inside."""
+        named = (f.replace("\\", "/") for f in folders if _is_path(f))
+        told = [(self._path.parent / name).resolve() for name in named]
+        inside = [f.relative_to(self._folder) for f in told if f.is_relative_to(self._folder)]
+        places = [*(f"{glob.escape(str(f))}/*" for f in inside), *_DEPTHS]
+        found = (islice(self._folder.glob(f"{p[:-1]}{pattern}"), _MOST_FILES) for p in places)
+        files = dict.fromkeys(file.resolve() for row in found for file in sorted(row))
+        return [f for f in files if f.is_relative_to(self._folder) and f.is_file()]
 
     @cached_property
     def _catalogs(self) -> list[Element]:
         """The catalogs that the file names, then others in the folder; as their files are."""
-        rows = self.root.iterfind("CatalogLocations/*/Directory")
-        names = filter(_is_path, (row.get("path", "") for row in rows))
-        folders = [(self._path.parent / name).resolve() for name in names]
-        inside = [f.relative_to(self._folder) for f in folders if f.is_relative_to(self._folder)]
-        patterns = [*(f"{glob.escape(str(f))}/*" for f in inside), *_DEPTHS]
-        files = [file.resolve() for p in patterns for file in self._within(f"{p}.xosc")]
-        catalogs = []
-        for file in dict.fromkeys(files):
-            if file.is_relative_to(self._folder) and is_catalog(file):
+        rows, catalogs = self.root.iterfind("CatalogLocations/*/Directory"), []
+        for file in self._list_files([row.get("path", "") for row in rows], "*.xosc"):
+            if is_catalog(file):
                 with self.doubts.about("catalogs"):
                     catalogs += read_xml(file, what=foreign.WHAT).findall("Catalog")
         return catalogs

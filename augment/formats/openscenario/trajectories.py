@@ -35,7 +35,8 @@ def trace(
     Raises:
         InvalidDocument: It has no shape that is read, or leads off the map.
     """
-    shape, timing = action.find(".//Shape/*"), action.find("TimeReference/Timing")
+    shape = next(action.iterfind(".//Shape/*"), Element("no Shape"))
+    timing = action.find("TimeReference/Timing")
     if read_float(action, "initialDistanceOffset", place, default=0.0) > 0.0:
         raise fault_at(place, "begins inside its trajectory, by initialDistanceOffset")
     shapes: dict[str, Callable[[Element, Element, PositionReader, str], Traced]] = {
@@ -44,10 +45,8 @@ def trace(
         "ClothoidSpline": _follow_spirals,
         "Nurbs": _follow_nurbs,
     }
-    kind = "no Shape" if shape is None else shape.tag
-    follow = foreign.look_up(shapes, kind, place)
-    assert shape is not None
-    rows, times_s = follow(shape, action, placer, f"{place}.{kind}")
+    follow = foreign.look_up(shapes, shape.tag, place)
+    rows, times_s = follow(shape, action, placer, f"{place}.{shape.tag}")
     if timing is None:
         times_s = None
     elif times_s is not None:
@@ -106,15 +105,14 @@ def _follow_vertices(
 
 def _follow_spirals(shape: Element, action: Element, placer: PositionReader, place: str) -> Traced:
     """Rows a metre apart along a clothoid, or several that go on from each other."""
-    parts, pose, names = list[FloatArray](), None, ("startTime", "stopTime")
+    parts, pose, bounds = list[FloatArray](), None, (-SHARPEST_PM, SHARPEST_PM)
+    is_spline = shape.tag == "ClothoidSpline"
+    names = ("timeStart", "timeEnd") if is_spline else ("startTime", "stopTime")
     # Some call a segment by its type.
     segments = shape.findall("Segment") + shape.findall("ClothoidSplineSegment") or [shape]
-    bounds = -SHARPEST_PM, SHARPEST_PM
-    if shape.tag == "ClothoidSpline":
-        names = "timeStart", "timeEnd"
     for segment in segments:
         length_m = read_float(segment, "length", place, 0.01, LONGEST_M)
-        if shape.tag == "ClothoidSpline":
+        if is_spline:
             first_pm, last_pm = (read_float(segment, n, place, *bounds) for n in _ENDS)
         else:
             first_pm = read_float(segment, "curvature", place, *bounds)
