@@ -84,9 +84,7 @@ def place_vehicles(
         pose, lane_id = find_arm(ground, wish.side, speed_mps, nearer_m=distance_m)
         vehicle = build_agent(_agent_type(body), pose, lane_id, _size_m(body), speed_mps=speed_mps)
         return (give_motion(wish, ground, vehicle, rng),)
-    apart_m = _size_m(body)[0] + BUMPER_GAP_M
-    if request.spacing is not None:
-        apart_m = request.spacing.draw(rng)
+    apart_m = request.spacing.draw(rng) if request.spacing else _size_m(body)[0] + BUMPER_GAP_M
     d_m = _offset_m(request, ground, distance_m, rng)
     open_to = Facing.ACROSS if body is Body.BARRIER else Facing.WITH_LANE
     turn_rad = _FACING_RAD[request.facing or open_to] + math.radians(request.turn_deg)
