@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import dropwhile
 from typing import Any
 
 from augment.errors import ReplyUnreadable
@@ -200,7 +201,9 @@ def _by_schema(text: str) -> str:
         agent.setdefault("walk_to" if is_walker else "motion", None)
     for agent in lists["add"]:
         del agent["id"]
-    return json.dumps(lists)
+    filled = dropwhile(lambda name: not lists[name], ("add", "move", "remove"))
+    change = {name: lists[name] for name in filled} or {"unchanged": "The sections say why."}
+    return json.dumps({"block": change})
 
 
 _good = _as(playing.GOOD)

@@ -34,8 +34,8 @@ from augment.scene.planned_motion import EGO_ID, PlannedMotion, PointPath
 from augment.scene.planned_mover import check_motions
 
 MOST_AGENTS = 64
-MOST_BY_SCHEMA = 10
-"""Agents in a list of a block by schema: a small model adds more until it is cut off."""
+# A small model fills each list of a block by schema until it is cut off.
+_MOST_ADDED, _MOST_MOVED, _MOST_LANES, _MOST_SPEEDS = 10, 4, 8, 6
 LONGEST_NOTES = 4000
 NOTHING_TO_PLACE = "it asks for nothing that can be placed"
 FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
@@ -44,6 +44,8 @@ MOST_FEEDBACK = 20
 _MOST_PROBLEMS = 8
 _HEADS = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
 
+_LISTS = frozenset({"add", "move", "remove"})
+_BY_SCHEMA = _LISTS | {"block", "unchanged"}
 _TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 
 
@@ -92,6 +94,7 @@ class _Block(Strict):
     add: _Several[_Agent] = []
     move: _Several[_Agent] = []
     remove: _Several[_Id] = []
+    unchanged: _Words | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,16 +207,14 @@ def read_reply(
         is_bare = answer.lstrip().startswith("{")
         answer = f"{sections}\n\n" + (f"```json\n{answer}\n```" if is_bare else answer)
     try:
-        document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
+        document, mended = last_object(answer, _BY_SCHEMA if sections else _LISTS)
     except ReplyUnreadable:
         if not refuses(answer):
             raise
         notes = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
         return ReadReply(modification=Modification(), notes=notes, is_refusal=True)
     names = vectors.short_names(scene)
-    if sections:
-        _number_added(document, names)
-    block = validate(_Block, document)
+    block = validate(_Block, _unwrap(document, names) if sections else document)
     problems = _find_problems(block, names, radius_m)
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
@@ -221,7 +222,7 @@ def read_reply(
     actions = _sections(answer, _HEADS).get("Modification Dict", "")
     return ReadReply(
         modification=modification,
-        notes=answer_notes(answer),
+        notes=answer_notes(answer) or block.unchanged or "",
         mended=mended,
         is_refusal=modification.is_empty and "{" not in actions,
     )
@@ -230,7 +231,8 @@ def read_reply(
 def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
     """Return the JSON schema of a modifier's block: ids are those that its prompt shows.
 
-    Every field is required, as strict endpoints insist: what may be left out is null instead.
+    Every field is required, as strict endpoints insist: what may be left out is null instead. It
+    changes something or says why not, for a small model's lists are empty by mere likelihood.
     """
     names = vectors.short_names(scene)
     lanes = [names.lanes[name] for name in find_spans(scene, radius_m)]
@@ -248,7 +250,7 @@ def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
         ),
     ]
     along = _object_schema(
-        kind=_one_of(["lanes"]), lane_ids=_list_schema(of_lane, 1, 20), change_m=number
+        kind=_one_of(["lanes"]), lane_ids=_list_schema(of_lane, 1, _MOST_LANES), change_m=number
     )
     over = _object_schema(
         kind=_one_of(["points"]),
@@ -258,7 +260,7 @@ def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
     motion = _object_schema(
         start={"anyOf": start},
         path={"anyOf": [*([along] if lanes else []), over, _NULL]},
-        speeds=_list_schema(point, 0, 20),
+        speeds=_list_schema(point, 0, _MOST_SPEEDS),
     )
     numbers = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
     body = dict.fromkeys(numbers, number) | {
@@ -268,16 +270,24 @@ def block_schema(scene: Scene, *, radius_m: float) -> dict[str, object]:
     walker["walk_to"] = {"anyOf": [point, _NULL]}
     mover = {"type": _one_of(_TYPES)} | body | {"motion": {"anyOf": [_NULL, motion]}}
 
-    def agents(**named: _Schema) -> _Schema:
-        kinds = [_object_schema(**named, **fields) for fields in (mover, walker)]
-        return _list_schema({"anyOf": kinds}, 0, MOST_BY_SCHEMA)
+    def agent(**named: _Schema) -> _Schema:
+        return {"anyOf": [_object_schema(**named, **fields) for fields in (mover, walker)]}
 
-    if not others:
-        return _object_schema(add=agents())
-    chosen = _one_of(others)
-    return _object_schema(
-        add=agents(), move=agents(id=chosen), remove=_list_schema(chosen, 0, len(others))
-    )
+    lists = {"add": (agent(), _MOST_ADDED)}
+    if others:
+        chosen = _one_of(others)
+        lists |= {"move": (agent(id=chosen), _MOST_MOVED), "remove": (chosen, len(others))}
+    changes = [
+        _object_schema(
+            **{
+                name: _list_schema(items, int(name == first), most)
+                for name, (items, most) in [*lists.items()][index:]
+            }
+        )
+        for index, first in enumerate(lists)
+    ]
+    unchanged = _object_schema(unchanged={"type": "string"})
+    return _object_schema(block={"anyOf": [*changes, unchanged]})
 
 
 def answer_notes(answer: str) -> str:
@@ -406,6 +416,8 @@ def _object_schema(**fields: _Schema) -> _Schema:
 
 def _find_problems(block: _Block, names: vectors.ShortNames, radius_m: float) -> list[str]:
     problems = []
+    if block.unchanged and (block.add or block.move or block.remove):
+        problems.append("unchanged: a block that changes something has none")
     for agent in [*block.add, *block.move]:
         ends = (agent.x_m, agent.y_m, *(agent.walk_to or ()))
         far_m = 2.0 * radius_m  # who moves may leave what is shown
@@ -422,13 +434,15 @@ def _find_problems(block: _Block, names: vectors.ShortNames, radius_m: float) ->
     return problems
 
 
-def _number_added(document: dict[str, object], names: vectors.ShortNames) -> None:
-    """Give added agents without an id those from the first new one on."""
-    added = document.get("add")
+def _unwrap(document: dict[str, object], names: vectors.ShortNames) -> object:
+    """Return the block of `block_schema`, its added agents numbered from the first new id on."""
+    block = document.get("block", document)
+    added = block.get("add") if isinstance(block, dict) else None
     first = int(names.next_agent.removeprefix("Agent"))
     for number, agent in enumerate(added if isinstance(added, list) else [], start=first):
         if isinstance(agent, dict):
             agent.setdefault("id", f"Agent{number}")
+    return block
 
 
 def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Modification:
@@ -436,8 +450,9 @@ def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Mod
     shown = vectors.with_short_ids(scene, names)
     change = Modification(
         added=tuple(_agent(agent) for agent in block.add),
-        moved=tuple(_agent(agent) for agent in block.move),
-        removed=tuple(block.remove),
+        # Whoever says the same twice says it.
+        moved=tuple(dict.fromkeys(map(_agent, block.move))),
+        removed=tuple(dict.fromkeys(block.remove)),
     )
     try:
         check_motions(shown, change)

@@ -3,6 +3,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import partial
+from itertools import dropwhile
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -139,6 +140,7 @@ def test_mending_leaves_strings_alone() -> None:
         (block(agent(walk_to=[1.0, 2.0])), "Agent2: only a PEDESTRIAN has walk_to"),
         (block(agent(type="PEDESTRIAN", walk_to=[1.0])), "add.0.walk_to"),
         (block(agent(), agent()), "named more than once: Agent2"),
+        (block(agent(), unchanged="No bus stop."), "unchanged: a block that changes something"),
         (block(agent(id="Agent7")), "Agent7 is in the scene already"),
         (block(agent(id="Agent1")), "Agent1 is in the scene already"),
         (block(agent(id="Agent 2; drop")), "add.0.id: String should match"),
@@ -320,10 +322,25 @@ def test_references_can_be_written_by_the_schema(slug: str) -> None:
     }
     schema = block_schema(shown, radius_m=80.0)
     Draft202012Validator.check_schema(schema)
-    required = schema["required"]
-    assert isinstance(required, list)
-    filled = json.loads(json.dumps({name: document[name] for name in required}))
-    problems = [error.message for error in Draft202012Validator(schema).iter_errors(filled)]
-    assert problems == []
-    read = read_reply(json.dumps(filled), shown, sections="Insights: It can.")
+    usable = [*document][: 3 if shown.agents else 1]
+    filled = dropwhile(lambda name: not document[name], usable)
+    change = {name: document[name] for name in filled} or {"unchanged": "It can't."}
+    written = json.loads(json.dumps({"block": change}))
+    keeps_to = Draft202012Validator(schema).is_valid
+    assert keeps_to(written)
+    assert not keeps_to({"block": {name: [] for name in usable}})
+    read = read_reply(json.dumps(written), shown, sections="Insights: It can.")
     assert displacement(read.modification, wanted).missing == ()
+
+
+def test_a_block_by_schema_that_changes_nothing_says_why() -> None:
+    why = {"block": {"unchanged": "There is no bus stop."}}
+    assert Draft202012Validator(block_schema(scene(), radius_m=80.0)).is_valid(why)
+    read = read_reply(json.dumps(why), scene(), sections="It can't.")
+    assert (read.is_refusal, read.notes) == (True, "There is no bus stop.")
+
+
+def test_the_same_change_said_twice_counts_once() -> None:
+    moved = agent(id="Agent7", x_m=38.0)
+    read = read_reply(block(move=[moved, moved], remove=[]), BUSY)
+    assert [one.x_m for one in read.modification.moved] == [38.0]
