@@ -203,15 +203,15 @@ def read_reply(
     Raises:
         ReplyUnreadable: Whatever is wrong with the answer.
     """
-    if sections:
-        is_bare = answer.lstrip().startswith("{")
-        answer = f"{sections}\n\n" + (f"```json\n{answer}\n```" if is_bare else answer)
+    # A block by schema stands for the one in the sections.
+    whole = f"{sections}\n\n{answer}"
+    written, keys = (answer if "{" in answer else whole), _BY_SCHEMA if sections else _LISTS
     try:
-        document, mended = last_object(answer, _BY_SCHEMA if sections else _LISTS)
+        document, mended = last_object(written, keys)
     except ReplyUnreadable:
-        if not refuses(answer):
+        if not refuses(whole):
             raise
-        notes = answer_notes(answer) or without_thoughts(answer).strip()[:LONGEST_NOTES]
+        notes = answer_notes(whole) or without_thoughts(whole).strip()[:LONGEST_NOTES]
         return ReadReply(modification=Modification(), notes=notes, is_refusal=True)
     names = vectors.short_names(scene)
     block = validate(_Block, _unwrap(document, names) if sections else document)
@@ -219,10 +219,10 @@ def read_reply(
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = fit_boxes(scene, _modification(block, scene, names))
-    actions = _sections(answer, _HEADS).get("Modification Dict", "")
+    actions = _sections(sections or answer, _HEADS).get("Modification Dict", "")
     return ReadReply(
         modification=modification,
-        notes=answer_notes(answer) or block.unchanged or "",
+        notes=answer_notes(sections or answer) or block.unchanged or "",
         mended=mended,
         is_refusal=modification.is_empty and "{" not in actions,
     )
@@ -436,7 +436,7 @@ def _find_problems(block: _Block, names: vectors.ShortNames, radius_m: float) ->
 
 def _unwrap(document: dict[str, object], names: vectors.ShortNames) -> object:
     """Return the block of `block_schema`, its added agents numbered from the first new id on."""
-    block = document.get("block", document)
+    block = document["block"] if document.keys() == {"block"} else document
     added = block.get("add") if isinstance(block, dict) else None
     first = int(names.next_agent.removeprefix("Agent"))
     for number, agent in enumerate(added if isinstance(added, list) else [], start=first):

@@ -329,7 +329,9 @@ def test_references_can_be_written_by_the_schema(slug: str) -> None:
     keeps_to = Draft202012Validator(schema).is_valid
     assert keeps_to(written)
     assert not keeps_to({"block": {name: [] for name in usable}})
-    read = read_reply(json.dumps(written), shown, sections="Insights: It can.")
+    # The draft among the sections does not count.
+    sections = f"Insights: It can.\n\nModified Vectors:\n```json\n{block(agent())}\n```"
+    read = read_reply(json.dumps(written), shown, sections=sections)
     assert displacement(read.modification, wanted).missing == ()
 
 
@@ -338,6 +340,8 @@ def test_a_block_by_schema_that_changes_nothing_says_why() -> None:
     assert Draft202012Validator(block_schema(scene(), radius_m=80.0)).is_valid(why)
     read = read_reply(json.dumps(why), scene(), sections="It can't.")
     assert (read.is_refusal, read.notes) == (True, "There is no bus stop.")
+    with pytest.raises(ReplyUnreadable):
+        read_reply(json.dumps(why | {"add": [agent()]}), scene(), sections="It can't.")
 
 
 def test_the_same_change_said_twice_counts_once() -> None:
