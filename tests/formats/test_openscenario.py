@@ -259,7 +259,7 @@ def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path
         (scenario(logic="../out.xodr"), "the map '../out.xodr' is not beside"),
         (scenario(logic="/etc/passwd"), "is not beside"),
         (scenario(logic=""), "names no LogicFile"),
-        (scenario(logic="x" * 5_000), "the map 'xxxx"),
+        (scenario(logic="ü" * 200), "the map 'üüüü"),
         (scenario(ego="A"), "nobody is called Ego or ego or EGO or hero"),
         (scenario().replace('Minor="1"', 'Minor="9"'), "of version '1.9'"),
         (scenario(logic="$map"), "LogicFile.filepath: unknown parameter 'map'"),

@@ -75,7 +75,7 @@ def is_catalog(path: Path) -> bool:
 
 
 def _is_path(text: str) -> bool:
-    return text.isprintable() and len(text) < _LONGEST_PATH
+    return text.isprintable() and len(text.encode()) < _LONGEST_PATH
 
 
 class ScenarioSource:
