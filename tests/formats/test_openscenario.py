@@ -185,6 +185,10 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
          "needs a Route of two waypoints"),
         (scenario(event(BRAKES, by_entity('<StandStillCondition duration="1"/>', "Ego"))),
          "its conditions never hold in 15 s"),
+        # CARLA's own player looks at an event's conditions once its act has begun.
+        (scenario(event(BRAKES, by_entity(GAP.format(10, "false")))).replace(
+            by_time(0), by_time(9)).replace('y="-1.75"', 'y="1.75"').replace(
+            'revMinor="1"', 'revMinor="1" description="CARLA:"'), "never hold in 15 s"),
         (scenario(event(BRAKES, by_entity("<OffroadCondition duration='1'/>"))),
          "event acts: unknown 'OffroadCondition'"),
         (scenario(other=CAR.replace('"car">', '"hovercraft">')),

@@ -24,12 +24,12 @@ _RULES: dict[str, Callable[[FloatArray, float], np.ndarray]] = {
     **{"lessThan": np.less, "lessOrEqual": np.less_equal, "equalTo": np.isclose},
     **{"greaterThan": np.greater, "greaterOrEqual": np.greater_equal, "notEqualTo": np.not_equal},
 }
-_EDGES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
-    "none": lambda now, before: now,
-    "rising": lambda now, before: now & ~before,
-    "falling": lambda now, before: ~now & before,
-    "risingOrFalling": lambda now, before: now != before,
-    "latched": lambda now, before: np.maximum.accumulate(now),
+_EDGES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    "none": lambda now, before, begun: now,
+    "rising": lambda now, before, begun: now & ~before,
+    "falling": lambda now, before, begun: ~now & before,
+    "risingOrFalling": lambda now, before, begun: now != before,
+    "latched": lambda now, before, begun: np.maximum.accumulate(now & begun),
 }
 _STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}
@@ -164,13 +164,13 @@ def _find_holding(
 ) -> tuple[np.ndarray, list[str]]:
     """When groups of conditions hold (T,) from a step on, and whose motion they watch."""
     times_s, watched = expected.times_s, list[str]()
-    holds = np.zeros(len(times_s), dtype=bool)
+    holds, begun = np.zeros(len(times_s), dtype=bool), np.arange(len(times_s)) >= since
     for group in groups:
-        all_hold = np.arange(len(times_s)) >= since
+        all_hold = begun.copy()
         for condition in group:
             met, names = _watch(condition, expected, event, float(times_s[since]))
             edge = foreign.look_up(_EDGES, condition.get("conditionEdge", "none"), event.place)
-            met = edge(met, np.append(met[:1], met[:-1]))  # nothing is before t0
+            met = edge(met, np.append(met[:1], met[:-1]), begun)  # nothing is before t0
             delay_s = foreign.read_number(condition.get("delay") or "0", event.place, 0.0, 1e3)
             steps = min(round(delay_s / float(times_s[1])), len(met))
             all_hold &= np.concatenate([np.zeros(steps, dtype=bool), met[: len(met) - steps]])
