@@ -118,6 +118,8 @@ def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -
         "El coche no puede ser adelantado y está a 20 m.",
         "无法超车，因此车辆放在20米处。",
         "None of the lanes bends, so the car is at (20, 0).",
+        "The truck blocks the lane, so overtaking is impossible. The car is at (20, 0).",
+        "No changes in speed are needed. The car is at (20, 0).",
         "Nothing can be placed between the cars, so he starts behind them.",
         "It is not possible to pass on the left. The car is in the middle.",
         "I refuse to let the car stand on the line, so it's 0.3 m left.",
