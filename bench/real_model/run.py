@@ -1,4 +1,4 @@
-"""Run four variants over a scenario of each type, each with its block in the text and by a schema.
+"""Run four variants over ten scenarios, each with its block in the text and by a schema.
 
 A real, tiny language model answers on this computer.
 
@@ -34,9 +34,9 @@ VARIANTS = ("otm", "fc", "tqa", "fc+geo")
 BLOCKS = ("text", "schema")
 # Both ways of a variant in turn: the server keeps what it has read of the last prompt.
 CONTESTANTS = tuple((block, variant) for variant, block in product(VARIANTS, BLOCKS))
-PER_TYPE = 1
+PER_TYPE = 2
 CONTEXT_TOKENS = 8192
-MOST_TOKENS = 2048
+MOST_TOKENS = 1024
 """Of an answer: by a schema it writes as many objects as there may be, and has to end."""
 PATIENT = {"ARENA_LLM_TIMEOUT_S": "600", "ARENA_LLM_QUEUE_S": "600"}
 # Instructions of this processor alone (AMX) have crashed llama.cpp in a virtual machine.
@@ -171,7 +171,7 @@ def report(installation: Machine, before: str) -> str:
     return "\n".join(
         [
             "`make real-model`: SmolLM2-135M-Instruct (Q4_1), served by llama-cpp-python with "
-            f"{CONTEXT_TOKENS} tokens of context, {PER_TYPE} scenario of each type, answers of "
+            f"{CONTEXT_TOKENS} tokens of context, {PER_TYPE} scenarios of each type, answers of "
             f"at most {MOST_TOKENS} tokens; medians per call; {before}.",
             "",
             table(head, lines),
