@@ -344,6 +344,17 @@ def test_a_clothoid_from_where_its_actor_is_then_bends_as_it_says(
     assert other.states[-1, 2:] == pytest.approx([0.8, 8.0], abs=0.001)
 
 
+@pytest.mark.parametrize("made", [NOWHERE, SPLINE])
+def test_a_clothoid_by_the_clock_begins_where_its_actor_is_then(made: str, tmp_path: Path) -> None:
+    shape = made.format('<RelativeObjectPosition entityRef="Other" dx="0" dy="0"/>')
+    shape = shape.replace("Spline>", 'Spline timeEnd="5">', 1).replace("0.02", "0")
+    for start_s in (0, 2.5):
+        shape = shape.replace('hOffset="0">', f'hOffset="0" timeStart="{start_s}">', 1)
+    timed = event(follow(shape, TIMING.format("relative")), by_time(2))
+    gone_m = move_other(tmp_path, timed, mps=8).states[:, 0] - 60.0
+    assert gone_m[[10, 19, 30, 50]] == pytest.approx([8.0, 15.2, 24.0, 40.0], abs=0.05)
+
+
 def test_a_nurbs_that_is_a_circle_is_followed_as_one(tmp_path: Path) -> None:
     # A quarter of 40 m radius round (88, 38.25); its middle is 1.4 m ahead of the point on it.
     places = ((88, -1.75, 1), (128, -1.75, math.sqrt(0.5)), (128, 38.25, 1))

@@ -278,13 +278,14 @@ class _Scenario:
         rows = np.empty((0, 4))
         for event in sorted(timed, key=lambda event: event.time_s or 0.0):
             (_, action), *_ = event.actions
-            centre_m = self._entities[name].centre_m
-            middles, times_s = trace(action, centre_m, self._placer.at({}, name), event.place)
+            start_s, centre_m = event.time_s or 0.0, self._entities[name].centre_m
+            # What goes by where somebody is later is read as an event.
+            is_later = start_s > 0.0 and name != self.ego_name
+            placer = PositionReader(self._network, {} if is_later else self._positions)
+            middles, times_s = trace(action, centre_m, placer.at({}, name), event.place)
             if times_s is None:
                 return
-            start_s, timing = event.time_s or 0.0, action.find("TimeReference/Timing")
-            assert timing is not None
-            if timing.get("domainAbsoluteRelative") == "relative":
+            if action.find("TimeReference/Timing[@domainAbsoluteRelative='relative']") is not None:
                 times_s = times_s + start_s
             rows = rows[rows[:, 0] < start_s - 1e-6]
             made = np.column_stack([times_s, middles])[times_s >= start_s - 1e-6]
