@@ -159,7 +159,7 @@ def test_more_is_better_and_what_is_unknown_is_missing() -> None:
     Augmentation.objects.filter(pk=rows["none"].pk).update(
         state=Augmentation.State.UNREADABLE, modification=None
     )
-    driven(rows["good"].job, after=0.25)
+    driven(rows["good"].job, after=0.25, planner="idm")
     rows["good"].simulations.update(interplan_score=0.75)
 
     found = {scores.name: scores for scores in metric_scores([row.pk for row in rows.values()])}

@@ -31,9 +31,9 @@ from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
 from arena.results.services.analysis import FEW_VOTES
 from arena.results.services.questions import compare_questions
-from augment.models import EndpointModel, NuplanResult
-from augment.services.driving import options_driven, scores_of_augmentations
-from augment.services.driving.simulations import SCORES, Options
+from augment.models import EndpointModel, NuplanResult, Simulation
+from augment.services.driving import find_shown, scores_of_augmentations
+from augment.services.driving.simulations import SCORES
 
 Context = dict[str, Any]
 
@@ -230,11 +230,9 @@ def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The drives of the augmentations that the study shows."""
     ids = list_shown_ids(snapshot.study)
-    ways = options_driven(Q(augmentation__in=ids))
-    if not ways and not NuplanResult.objects.exists():
+    if not (Simulation.objects.exists() or NuplanResult.objects.exists()):
         return {"drivings": []}
-    # The paper's planner where it drove, else whichever drove last.
-    how = next((way for way in ways if way.name == Options().name), ways[0]) if ways else Options()
+    how = find_shown(Q(augmentation__in=ids))
     scores = [
         scores_of_augmentations(ids, title=snapshot.study.name, options=how, score=score)
         for score in SCORES

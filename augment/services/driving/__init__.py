@@ -6,6 +6,7 @@ from augment.services.driving.driving_scores import (
     DrivingScores,
     clearance_text,
     drives_of_job,
+    find_shown,
     options_driven,
     scores_of_augmentations,
     scores_of_job,

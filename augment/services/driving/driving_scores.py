@@ -158,6 +158,12 @@ def clearance_text(least_distance_m: float | None) -> str:
     return f"{least_distance_m:.2f} m{mark}"
 
 
+def find_shown(which: Q) -> Options:
+    """Return the last way of the paper's planner where it drove, else the last one."""
+    ways = options_driven(which)
+    return next((way for way in ways if way.name == Options().name), [*ways, Options()][0])
+
+
 def options_driven(which: Q) -> list[Options]:
     """Return every way in which drives were asked for, the latest first."""
     rows = Simulation.objects.filter(which).order_by("-pk")

@@ -3,12 +3,12 @@
 import json
 import zlib
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Max, QuerySet
+from django.db.models import QuerySet
 
 from augment.errors import CannotDrive, Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
@@ -48,13 +48,6 @@ class Options:
         """Planner, with its offsets and traffic where they matter."""
         offsets = f", {self.offsets}" if self.planner == PDM_CLOSED else ""
         return f"{self.planner}{offsets}{', reactive' * self.is_reactive}"
-
-    def newest_in(self, rows: QuerySet[Simulation]) -> "Options":
-        """Return these options in the newest version in which some of the rows were driven."""
-        how = asdict(self)
-        del how["version"]
-        newest = rows.filter(**how).aggregate(Max("version"))["version__max"]
-        return replace(self, version=newest or VERSION)
 
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Return the drives with these options."""

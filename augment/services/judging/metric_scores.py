@@ -5,9 +5,12 @@ from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from django.db.models import Q
+
 from augment.checks import Severity
 from augment.models import Augmentation, Contestant, Simulation
-from augment.services.driving.simulations import SCORES, Options
+from augment.services.driving.driving_scores import find_shown
+from augment.services.driving.simulations import SCORES
 from augment.services.judging.displacement import of_rows
 from augment.services.judging.findings import read_findings
 
@@ -74,8 +77,8 @@ def _checks(ids: Collection[int]) -> MetricScores:
 
 def _driving(ids: Collection[int]) -> list[MetricScores]:
     """The lower the ego scores, the better: a change is to make a scene harder to drive."""
-    all_drives = Simulation.objects.filter(augmentation__in=ids)
-    drives = Options().newest_in(all_drives).of(all_drives)
+    which = Q(augmentation__in=ids)
+    drives = find_shown(which).of(Simulation.objects.filter(which))
     done = drives.filter(state=Simulation.State.DONE)
     rows = list(done.values_list("augmentation__code", *SCORES.values()))
     names = {"nuplan": "Driving score (nuPlan)", "interplan": "Driving score (interPlan)"}
