@@ -219,6 +219,9 @@ TWO = "".join(f'<Vertex time="{n}">{PLACE.format(60 + 8 * n)}</Vertex>' for n in
         (scenario(event(BRAKES), event(speed(9), by_time(70), "late")),
          "event late: begins over 60 s after the first"),
         (scenario(event(speed(-3))), "backwards, is not read"),
+        (scenario(event(BRAKES.replace("linear", "hold"))), "event acts: unknown 'hold'"),
+        (scenario(event(BRAKES, by_entity(GAP.format(20, "false")).replace(
+            "<Condition>", '<Condition conditionEdge="latched">'))), "unknown 'latched'"),
         (scenario(event(CHANGE.format("time", 2, RIGHT), by_time(50)), other_does=(speed(40),)),
          "event acts: is past the map when it begins"),
         (scenario(*(event(speed(n), by_time(n), name=f"{n}") for n in range(30))),

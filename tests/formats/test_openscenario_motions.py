@@ -207,8 +207,8 @@ def test_an_event_waits_for_what_an_actor_does_first(tmp_path: Path) -> None:
 def test_carlas_steps_last_and_a_standing_ego_sets_off(tmp_path: Path) -> None:
     # At 1.1 s, and at t0 alone: who meets both does so once both have been met.
     both = by_entity(GAP.format(50, "false")) + by_time(0).replace("greaterThan", "equalTo")
-    goes = event(speed(8, STEP.replace('"0"', '"2"')), both)
-    waits = event(speed(0, STEP.replace("time", "rate")), AFTER, name="waits")
+    goes = event(speed(8, STEP.replace("time", "rate").replace('"0"', '"2"')), both)
+    waits = event(speed(0), AFTER, name="waits")
     text = scenario(goes, waits).replace('revMinor="1"', 'revMinor="1" description="CARLA:made"')
     standing = text.replace('value="10"', 'value="0"').replace('y="-1.75"', 'y="1.75"')
     reading = read(write(tmp_path, standing))

@@ -29,7 +29,7 @@ _EDGES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = 
     "rising": lambda now, before, begun: now & ~before,
     "falling": lambda now, before, begun: ~now & before,
     "risingOrFalling": lambda now, before, begun: now != before,
-    "latched": lambda now, before, begun: np.maximum.accumulate(now & begun),
+    "carla:latched": lambda now, before, begun: np.maximum.accumulate(now & begun),
 }
 _STRAIGHT = ("", "cartesianDistance", "euclidianDistance", "euclideanDistance")
 _SWITCH = {"true": True, "1": True, "false": False, "0": False}

@@ -22,7 +22,7 @@ _TIME = "ByValueCondition/SimulationTimeCondition"
 WAIT = "ByValueCondition/StoryboardElementStateCondition"
 BEGUN = ("startTransition", "runningState")
 ENDED = ("endTransition", "completeState", "stopTransition")
-_ONSETS = ("none", "rising", "latched")
+_ONSETS = ("none", "rising", "carla:latched")
 _SINCE = ("greaterThan", "greaterOrEqual", "equalTo")
 """The rules by which a time is one from which on something holds."""
 Groups = tuple[tuple[Element, ...], ...]

@@ -53,7 +53,7 @@ _STEP_S, _JUMP_S = 0.01, 0.001
 _ON_M, _THIN_M, _LATEST_S, _USUAL_MPS = 1_000.0, 0.0005, 60.0, 10.0
 _SHAPES: dict[str, Callable[[float], float]] = {
     "linear": lambda share: share,
-    **dict.fromkeys(("step", "hold"), lambda share: share),
+    **dict.fromkeys(("step", "carla:hold"), lambda share: share),
     "cubic": lambda share: share * share * (3.0 - 2.0 * share),
     "sinusoidal": lambda share: (1.0 - math.cos(math.pi * share)) / 2.0,
 }
@@ -299,18 +299,19 @@ class _Draft:
         by, kind = dynamics.get("dynamicsDimension"), dynamics.get("dynamicsShape")
         value = abs(read_float(dynamics, "value", place, default=0.0))
         shape = foreign.look_up(_SHAPES, kind, place)
-        mean_mps = max(goal_mps if kind == "hold" else (goal_mps + now_mps) / 2.0, 0.1)
+        is_held = kind == "carla:hold"
+        mean_mps = max(goal_mps if is_held else (goal_mps + now_mps) / 2.0, 0.1)
         rated_s, way_s = abs(goal_mps - now_mps) / max(value, 1e-6), value / mean_mps
-        spans_s = {"time": value, "rate": rated_s, "distance": way_s}
+        spans_s = {"time": value, "rate": value if is_held else rated_s, "distance": way_s}
         held_s = max(foreign.look_up(spans_s, by, f"{place}.dynamicsDimension"), _STEP_S)
-        lasts_s = _STEP_S if kind in ("hold", "step") else held_s
+        lasts_s = _STEP_S if is_held or kind == "step" else held_s
         self.speeds = [row for row in self.speeds if row[0] < at_s - _STEP_S]
         shares = (0.0, 1.0) if shape(0.25) == 0.25 else np.linspace(0.0, 1.0, 7).tolist()
         # So much of it as is over by the last moment.
         for share in np.multiply(shares, min((_LATEST_S - at_s) / lasts_s, 1.0)).tolist():
             mps = now_mps + shape(share) * (goal_mps - now_mps)
             self.speeds.append((round(at_s + share * lasts_s, 4), mps))
-        return held_s if kind == "hold" else lasts_s
+        return held_s if is_held else lasts_s
 
     def _change_lane(self, action: Element, at_s: float, place: str) -> float:
         gone_m, now_mps = way_and_speed(tuple(self.speeds), self._agent.speed_mps, at_s)

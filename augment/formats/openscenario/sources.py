@@ -126,13 +126,13 @@ class ScenarioSource:
         """Turn CARLA's own frame, which counts y to the right, and its own player's ways to ours.
 
         It looks at no edges, a condition that held once goes on to, and a step in speed lasts as
-        long as its value says.
+        many seconds or metres as its value says. No file has the words for these.
         """
         for part in self.root.iterfind("Storyboard/Story//*"):
             if part.tag == "Condition":
-                part.set("conditionEdge", "latched")
+                part.set("conditionEdge", "carla:latched")
             elif part.tag == "SpeedActionDynamics" and part.get("dynamicsShape") == "step":
-                part.set("dynamicsShape", "hold")
+                part.set("dynamicsShape", "carla:hold")
         worlds = [*self.root.iter("WorldPosition")]
         for world in worlds:
             # Without a heading a vertex has that of the way on.
