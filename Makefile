@@ -13,7 +13,7 @@ PURE := geometry scene checks llm prompts variants metrics rating pairing result
 # Compiled once, not by each of the many processes that the tests start.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo serve test quick-tests test-all check lint fuzz chromium screenshots bench figures real-model mutants receivers lock clean
+.PHONY: demo serve test sqlite-tests postgres-tests test-all check lint fuzz chromium screenshots bench figures real-model mutants receivers lock clean
 
 demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERVE=0: don't); with ENDPOINT, MODEL and KEY a model of yours takes part
 	$(BIN)/python manage.py demo --port $(PORT) $(if $(filter 0,$(SERVE)),--no-serve) \
@@ -24,11 +24,14 @@ serve: $(VENV)/.runtime ## Serve what is there
 	$(BIN)/python manage.py serve --port $(PORT)
 
 test: chromium receivers ## Style, floors, types and every test that is not slow, on SQLite, Redis, PostgreSQL and in a browser
-	@$(MAKE) --no-print-directory -j 2 lint quick-tests
+	@$(MAKE) --no-print-directory -j 2 sqlite-tests postgres-tests
 
-quick-tests: # beside lint, whose types need a core for a minute; a third process fills what browsers wait for
+# Side by side: what waits for a browser leaves a core to the others.
+sqlite-tests:
 	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not slow"
-	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow" -n 3
+
+postgres-tests: lint
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow"
 
 test-all: chromium receivers ## The slow tests: whole journeys, kills, all roles of the API
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow

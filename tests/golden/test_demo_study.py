@@ -132,6 +132,7 @@ def digest(path: Path) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+@pytest.mark.slow
 def test_tables_and_folder_of_the_study_are_what_they_were(
     demo_folder: Path, check: Check, tmp_path: Path
 ) -> None:

@@ -45,6 +45,7 @@ def simulate(source: Path, out: Path, shard: str = "1/1") -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in sorted(out.iterdir())}
 
 
+@pytest.mark.slow
 def test_the_parts_together_are_one_run_byte_for_byte(scenarios: Path, tmp_path: Path) -> None:
     whole = simulate(scenarios, tmp_path / "whole")
     assert list(whole) == [f"cone-{n}.drive.json" for n in range(5)]

@@ -128,6 +128,7 @@ def test_who_loses_all_direct_votes_is_worse_where_that_is_no_chance() -> None:
     assert write_sentence(rate(named(wins[:4]))) == "a and b can’t be told apart with 4 votes."
 
 
+@pytest.mark.slow
 def test_a_boards_intervals_hold_for_founders_and_newcomers() -> None:
     held = measure_boards(board_worlds()[0], studies=60)
     assert 0.92 <= held["founders"] <= 0.98

@@ -125,6 +125,7 @@ def test_what_the_fit_leaves_is_that_of_a_weighted_mean(
     assert found >= exact - 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "world",
     [

@@ -151,6 +151,7 @@ def test_a_drive_takes_the_way_to_the_goal_where_there_is_one(
     assert find_route(scene, LaneGraph(scene), None) == route
 
 
+@pytest.mark.slow
 def test_half_the_experts_speed_scores_alike_however_long_was_recorded() -> None:
     road = Road(*recorded_street())
     ratios, scores = [], []

@@ -234,6 +234,7 @@ def grid_of(researcher: Client, job: GenerationJob, query: str = "") -> str:
     return researcher.get(reverse("job-tab", args=[job.code, "grid"]) + query).content.decode()
 
 
+@pytest.mark.slow
 def test_ten_thousand_cells_cost_as_much_as_a_page_of_them(
     researcher: Client, django_assert_max_num_queries: Questions
 ) -> None:

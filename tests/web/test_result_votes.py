@@ -65,6 +65,7 @@ def links_of(page: str) -> dict[str, int | None]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "filters", [Filters(), Filters(leave_out_own=True, kinds=("main", "repeat"))]
 )
