@@ -78,9 +78,8 @@ def _checks(ids: Collection[int]) -> MetricScores:
 def _driving(ids: Collection[int]) -> list[MetricScores]:
     """The lower the ego scores, the better: a change is to make a scene harder to drive."""
     which = Q(augmentation__in=ids)
-    drives = find_shown(which).of(Simulation.objects.filter(which))
-    done = drives.filter(state=Simulation.State.DONE)
-    rows = list(done.values_list("augmentation__code", *SCORES.values()))
+    done = Simulation.objects.filter(which, state=Simulation.State.DONE)
+    rows = list(find_shown(which).of(done).values_list("augmentation__code", *SCORES.values()))
     names = {"nuplan": "Driving score (nuPlan)", "interplan": "Driving score (interPlan)"}
     return [
         MetricScores(
