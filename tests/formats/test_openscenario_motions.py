@@ -220,6 +220,19 @@ def test_carlas_steps_last_and_a_standing_ego_sets_off(tmp_path: Path) -> None:
     assert "The ego stands: who waits for it sees it at 10 m/s." in reading.notes
 
 
+def test_an_ego_that_set_off_for_one_stands_for_another(tmp_path: Path) -> None:
+    stands = by_entity('<StandStillCondition duration="2"/>', "Ego")
+    waits = event(speed(5), stands, "b").replace("</Event>", "</Event></Maneuver></ManeuverGroup>")
+    text = scenario(event(speed(3), by_entity(GAP.format(20, "false"))), other_does=(speed(0),))
+    third = f'<ScenarioObject name="Third">{CAR}</ScenarioObject></Entities>'
+    group = '<ManeuverGroup><Actors><EntityRef entityRef="Third"/></Actors><Maneuver>'
+    text = text.replace("</ManeuverGroup>", f"</ManeuverGroup>{group}{waits}")
+    text = text.replace("</Entities>", third).replace('value="10"/>', 'value="0"/>')
+    at = init("Third", '<LanePosition roadId="1" laneId="-2" s="60"/>', speed(0))
+    reading = read(write(tmp_path, text.replace("</Actions></Init>", f"{at}</Actions></Init>")))
+    assert all(agent.motion for agent in reading.scene.agents)
+
+
 def test_a_place_that_goes_along_with_somebody_is_where_they_are(tmp_path: Path) -> None:
     # 60 m behind the other at first, the ego comes 6 m a second nearer to 10 m behind it.
     ahead = '<Position><RelativeObjectPosition entityRef="Other" dx="-10" dy="0"/></Position>'

@@ -108,6 +108,7 @@ class Stage:
 
     def find_start(self, event: StoryEvent, name: str, doubts: Doubts) -> tuple[Trigger, int]:
         """Return how an event begins, and the step; an ego that stands may have to set off."""
+        self._set_off(self.scene.ego.speed_mps)  # it may have for another alone
         with suppress(InvalidDocument):
             return find_trigger(event, name, self.expected, doubts)
         if self._recording is None and self._ego_mps == 0.0:
