@@ -450,7 +450,7 @@ def _modification(block: _Block, scene: Scene, names: vectors.ShortNames) -> Mod
     shown = vectors.with_short_ids(scene, names)
     change = Modification(
         added=tuple(_agent(agent) for agent in block.add),
-        # Whoever says the same twice says it.
+        # The same entry twice means what it means once.
         moved=tuple(dict.fromkeys(map(_agent, block.move))),
         removed=tuple(dict.fromkeys(block.remove)),
     )
