@@ -23,7 +23,7 @@ class Home(Machine):
     """A machine that starts its own Redis, as a newcomer's does."""
 
     def must(self, *arguments: str) -> str:
-        ended = self.manage(*arguments, within_s=500.0)
+        ended = self.manage(*arguments, within_s=900.0)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended.stdout
 

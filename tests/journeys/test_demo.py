@@ -13,7 +13,7 @@ import pytest
 from tests.processes import ROOT, copy_database, wait_until
 from tests.stack import SMALL_DEMO, Home
 
-pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(1000)]
 
 
 def standings(home: Home) -> list[dict[str, str]]:
