@@ -222,7 +222,7 @@ def read_reply(
     actions = _sections(sections or answer, _HEADS).get("Modification Dict", "")
     return ReadReply(
         modification=modification,
-        notes=answer_notes(sections or answer) or block.unchanged or "",
+        notes=block.unchanged or answer_notes(sections or answer),
         mended=mended,
         is_refusal=modification.is_empty and "{" not in actions,
     )
