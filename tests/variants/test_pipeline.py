@@ -86,6 +86,8 @@ def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
         "I haven't changed anything: the wish asks for a lane that doesn't exist.",
         "This wish is unachievable: there is no oncoming lane.",
         "Abgelehnt: es gibt keine linke Nachbarspur.",
+        "If I placed it at 25 m it would be past the bus, so the wish can't be met.",
+        "I have added nothing: Agent3 is at (14, 0), so the wish can't be met.",
         "Debo rechazar esta petición: la escena no tiene cruce.",
         "Il n'y a pas de tramway ; je ne change donc rien.",
         "场景中没有这辆车，因此不作任何修改。",
@@ -124,6 +126,9 @@ def test_a_refusal_in_prose_is_a_refusal_that_nobody_asks_for_again(said: str) -
         "It is not possible to pass on the left. The car is in the middle.",
         "I refuse to let the car stand on the line, so it's 0.3 m left.",
         "I did not change anything else. The car is 20 m ahead.",
+        "I can't place it at 20 m because Agent3 is there, so I placed it at 25 m.",
+        "Nothing can be placed at 20 m, so the van stands at 25 m.",
+        "Es ist nicht möglich, das Auto bei 20 m abzustellen; es steht bei 25 m.",
         "La voiture est placée à 20 m ; l'ego ne peut pas la dépasser.",
         "車両を前方20メートルに配置しました。追い越しは不可能です。",
     ],
@@ -176,6 +181,11 @@ def test_a_block_by_schema_is_one_more_call_after_the_sections() -> None:
     }
     assert [one.id for one in made.outcome.modification.added] == ["Agent2", "Agent3"]
     assert made.outcome.notes.startswith("One road, two lanes.")
+    left = Play("otm", [sections, '{"unchanged": "There is no bus."}'], block=BlockForm.SCHEMA)
+    assert (left.outcome.status, left.outcome.reason) == (
+        OutcomeStatus.REFUSED,
+        "There is no bus.",
+    )
     refused = Play("otm", ["I can't do that."], block=BlockForm.SCHEMA)
     assert (refused.outcome.status, refused.roles) == (OutcomeStatus.REFUSED, "m")
     ignored = Play("fc", [call(), GOOD, "Here it is."], block=BlockForm.SCHEMA)
