@@ -115,9 +115,9 @@ def run(
         CsvNotRated: The file can't be read or the options don't fit it.
     """
     if rounds is not None and not FEWEST_DRAWS <= rounds <= MOST_DRAWS:
-        raise CsvNotRated(f"rounds go from {FEWEST_DRAWS} to {MOST_DRAWS}, not {rounds}")
+        raise CsvNotRated(f"rounds go from {FEWEST_DRAWS} to {MOST_DRAWS}, not {rounds}.")
     if seed < 0:
-        raise CsvNotRated(f"a seed is 0 or more, not {seed}")
+        raise CsvNotRated(f"a seed is 0 or more, not {seed}.")
     try:
         table = read_table(Path(file))
         there = [name for name in OPTIONAL if name in table.columns]
@@ -133,9 +133,9 @@ def run(
             seed=seed,
         )
     except OSError as error:
-        raise CsvNotRated(f"{file}: {error.strerror}") from error
+        raise CsvNotRated(f"{file}: {error.strerror}.") from error
     except ValueError as error:
-        raise CsvNotRated(f"{file}: {error}") from error
+        raise CsvNotRated(f"{file}: {str(error).rstrip('.')}.") from error
     unseen = [name for name in there if name not in clusters]
     if unseen:  # places left hold for a whole table
         lines = (replace(line, rank_best=None, rank_worst=None) for line in board.lines)

@@ -4,6 +4,7 @@ The file is CSV with any usual separator, JSON (an array, or an object a line), 
 book, as it is or packed by gzip; what it is follows from its content, not from its name.
 """
 
+import codecs
 import csv
 import gzip
 import io
@@ -56,8 +57,8 @@ _NO_VALUES = frozenset({"nan", "<na>"}) | {
 """What pandas and Excel write where there is no value."""
 NO_VOTES = "there are no votes in it"
 LATIN_1_NOTE = (
-    "The file is not UTF-8; it was read as Latin-1 (Windows-1252). If names look wrong, save it "
-    "as UTF-8."
+    "What is not UTF-8 in the file was read as Latin-1 (Windows-1252). If names look wrong, save "
+    "it as UTF-8."
 )
 
 
@@ -216,11 +217,21 @@ def _decode(content: bytes) -> tuple[str, str]:
         return content.decode("utf-16" if content.startswith(_UTF_16) else "utf-8-sig"), ""
     except UnicodeDecodeError as error:
         try:
-            return content.decode("cp1252"), LATIN_1_NOTE
+            # Lines of several programs may stand in one file.
+            return content.decode("utf-8-sig", "cp1252"), LATIN_1_NOTE
         except UnicodeDecodeError:
             raise VotesFileUnreadable(
                 "its text is neither UTF-8, UTF-16 with its mark nor Latin-1 (Windows-1252)"
             ) from error
+
+
+def _decode_latin_1(fault: UnicodeError) -> tuple[str, int]:
+    """Return what a sequence that is not UTF-8 says in Latin-1, and where it ends."""
+    assert isinstance(fault, UnicodeDecodeError)
+    return fault.object[fault.start : fault.end].decode("cp1252"), fault.end
+
+
+codecs.register_error("cp1252", _decode_latin_1)
 
 
 def _read_csv(text: str) -> VotesTable:
@@ -408,7 +419,8 @@ def _as_text(value: Any) -> str | None:
         return None
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    text = str(value).removesuffix(" 00:00:00")  # Excel's days begin at midnight
+    return text.lower() if isinstance(value, bool) else text
 
 
 def _clean(text: str) -> str:

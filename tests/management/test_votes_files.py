@@ -5,6 +5,7 @@ import io
 import json
 import re
 import zipfile
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,13 @@ def test_what_other_columns_of_json_hold_and_are_called_counts_for_nothing(tmp_p
     assert document(str(path), rounds=100)["votes"] == 1
 
 
+def test_a_day_of_excel_or_parquet_is_named_as_in_csv(tmp_path: Path) -> None:
+    day = {"model_a": datetime(2026, 3, 1), "model_b": datetime(2026, 3, 1, 9), "winner": "tie"}
+    parquet.write_table(pyarrow.Table.from_pylist([day]), tmp_path / "votes")
+    lines = document(str(tmp_path / "votes"), rounds=100)["standings"]
+    assert {line["model"] for line in lines} == {"2026-03-01", "2026-03-01 09:00:00"}
+
+
 def test_votes_on_a_further_sheet_are_said_to_be_unread(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     for sheet in (book.active, book.create_sheet(), book.create_sheet("about")):
@@ -114,7 +122,7 @@ def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
 def test_a_wrong_line_is_named_with_what_is_allowed(
     votes: Any, lines: list[str], sentence: str
 ) -> None:
-    with pytest.raises(CsvNotRated, match=re.escape(sentence)):
+    with pytest.raises(CsvNotRated, match=rf"{re.escape(sentence)}.*\.\Z"):
         run(file=votes(*lines))
 
 
@@ -169,7 +177,7 @@ def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None
 
 @pytest.mark.parametrize("options", [{"rounds": 99}, {"rounds": 100_001}, {"seed": -1}])
 def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
-    with pytest.raises(CsvNotRated, match="not "):
+    with pytest.raises(CsvNotRated, match=r"not .*\d\.\Z"):
         run(file=votes(*PLAIN), **options)
 
 
@@ -233,7 +241,8 @@ def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(
         notes = document(votes(line, head=WITH_CLUSTERS))["notes"]
         assert sum("look alike and count as two names" in note for note in notes) == 1, line
     path = tmp_path / "latin1.csv"
-    path.write_bytes(f"{HEAD}\nRöver,b,tie\n".encode("latin-1"))
+    mixed = [f"{HEAD}\nRöver,b,tie\n".encode(coding) for coding in ("latin-1", "utf-8")]
+    path.write_bytes(mixed[0] + mixed[1].replace(HEAD.encode(), b""))
     latin = document(str(path), rounds=100)
     assert [line["model"] for line in latin["standings"]] == ["Röver", "b"]
     assert votes_file.LATIN_1_NOTE in latin["notes"]

@@ -89,7 +89,7 @@ def _read(path: Path) -> tuple[votes_file.VotesTable, str]:
         with path.open("rb") as file:
             return table, hashlib.file_digest(file, "sha256").hexdigest()
     except votes_file.VotesFileUnreadable as error:
-        raise VotesUnreadable(str(error)) from error
+        raise VotesUnreadable(f"{str(error).rstrip('.')}.") from error
 
 
 def _rows(table: votes_file.VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
