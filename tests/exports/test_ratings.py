@@ -139,9 +139,12 @@ def simulated_study(scenarios: int = 12) -> Study:
     )
 
 
-def test_simulated_experts_prefer_what_lies_nearer_the_reference() -> None:
+def test_simulated_experts_prefer_what_lies_nearer_the_reference(
+    django_assert_max_num_queries: Any,
+) -> None:
     study = simulated_study()
-    assert simulate_votes(study=study, seed=1) == 72
+    with django_assert_max_num_queries(500):
+        assert simulate_votes(study=study, seed=1) == 72
     assert Vote.objects.filter(is_simulated=True).count() == 72
     snapshot = rate(study=close_study(study=study))
     assert snapshot.includes_simulated

@@ -5,17 +5,18 @@ reference, misjudges distances a little, calls close ones equal, and now and the
 key, as people do. Every question of a study is answered so, each with noise of its own.
 """
 
+from collections.abc import Mapping
 from uuid import uuid5
 
 import numpy as np
 from django.db import transaction
+from django.db.models import QuerySet
 
-from arena.models import Study, Vote
+from arena.models import Matchup, Study, Vote
 from arena.voting.services.casting import Decision, cast_vote
 from augment.errors import Conflict
-from augment.models import Augmentation
 from augment.services import log_change
-from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.displacement import of_rows
 
 NOISE_M = 1.5
 TIE_M = 1.0
@@ -23,7 +24,6 @@ SLIP = 0.08
 """The share of votes that are any key; it also keeps who always loses within reach."""
 
 
-@transaction.atomic
 def simulate_votes(*, study: Study, seed: int) -> int:
     """Vote on every undecided matchup of the study's simulated experts.
 
@@ -40,18 +40,32 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     """
     if not study.allow_simulated:
         raise Conflict(f"The study {study.name!r} does not allow simulated votes.")
+    waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
+    sides = {side for pair in waiting.values_list("left", "right") for side in pair}
+    # Measured before the transaction: nobody else writes while it lasts.
+    errors_m = {
+        measured.row.pk: measured.displacement.error_m
+        for measured in of_rows(sides)
+        if measured.displacement is not None
+    }
+    with transaction.atomic():
+        return _cast_all(study, waiting.select_related("expert__person"), errors_m, seed)
+
+
+def _cast_all(
+    study: Study, waiting: QuerySet[Matchup], errors_m: Mapping[int, float], seed: int
+) -> int:
+    """Vote on matchups; a change whose error nobody knows has none."""
     rng = np.random.default_rng(seed)
     cast = 0
-    waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
-    shown = waiting.select_related("expert__person", "left__scenario", "right__scenario")
-    for matchup in shown.order_by("expert__username", "position"):
-        advantage = _error_m(matchup.right) - _error_m(matchup.left)
+    for matchup in waiting.order_by("expert__username", "position"):
+        left_m, right_m = (errors_m.get(key, 0.0) for key in (matchup.left_id, matchup.right_id))
         for question in study.questions:
             is_primary = question == study.questions[0]
             decision = Decision(
                 matchup=matchup.code,
                 key=uuid5(matchup.code, "simulated" if is_primary else f"simulated {question}"),
-                outcome=_judge(advantage, rng),
+                outcome=_judge(right_m - left_m, rng),
                 question=question,
             )
             cast_vote(expert=matchup.expert, decision=decision)
@@ -69,9 +83,3 @@ def _judge(advantage_m: float, rng: np.random.Generator) -> str:
     if abs(perceived_m) < TIE_M:
         return Vote.Outcome.EQUAL
     return Vote.Outcome.LEFT if perceived_m > 0 else Vote.Outcome.RIGHT
-
-
-def _error_m(augmentation: Augmentation) -> float:
-    """Return the size of a change's error in metres; 0 if unknown."""
-    measured = of_augmentation(augmentation).displacement
-    return 0.0 if measured is None else measured.error_m
