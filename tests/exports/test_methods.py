@@ -10,15 +10,18 @@ from arena.models import Study
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study, preregistration_sha256
-from tests.study_rows import a_study, matchups_of, shown_again, vote
+from arena.studies.services.taking_part import hand_over
+from augment.models import Scenario
+from tests.board_rows import a_batch, a_board, newcomer, published, voted
+from tests.study_rows import a_study, expert, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
 
-def exported(form: str, *more: str) -> str:
+def exported(form: str, *more: str, study: str = "Round 1") -> str:
     out = io.StringIO()
     options = ("--format", form, "--out", "-", *more)
-    call_command("export", "methods", "Round 1", *options, stdout=out)
+    call_command("export", "methods", study, *options, stdout=out)
     return out.getvalue()
 
 
@@ -40,7 +43,7 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     assert set(sheet["blank"]) >= {"1.1", "3.2.2", "3.2.3", "5.1"}
     assert all((answers[number] is None) == (number in sheet["blank"]) for number in answers)
     text = exported("latex")
-    assert "Counted: 8 votes; left out: 2 repeat." in text
+    assert "Counted: 8 votes; left out: 2 hidden repeats." in text
     assert r"Recruitment: \textbf{[BLANK]}" in text
     assert "finn" not in text + json.dumps(sheet)
 
@@ -58,3 +61,17 @@ def test_whether_both_miss_is_said_of_the_question_that_offers_it() -> None:
         answers = {line["number"]: line["answer"] for line in sheet["questions"]}
         assert answers["4.3.3"] == size
         assert ("both miss" in answers["4.3.4"]) == (question == "instruction")
+
+
+def test_the_plan_tells_of_newcomers_and_of_what_came_later() -> None:
+    board = a_board()
+    published(board, 1)
+    batch = a_batch(board, newcomer("dot").slug)
+    hand_over(study=batch, username="finn", to=[expert("gus").username])
+    Scenario.objects.exclude(slug="place-1").update(type="overtake_parked_vehicle")
+    filters = Filters(types=("overtake_parked_vehicle",))
+    rating = rate(study=voted(batch), rounds=100, filters=filters)
+    text = exported("latex", "--rating", str(rating.code), study=batch.name)
+    assert "compared 4 contestants on 5 scenarios" in text
+    assert "each of 2 accounts, each with dot; 18 more were planned later" in text
+    assert "left out: 6 not asked for." in text

@@ -16,12 +16,13 @@ from django.template.loader import get_template
 from arena.exports.formats import formats, json_bytes
 from arena.exports.latex import escape
 from arena.models import Question, Snapshot
+from arena.pairing.order import MAIN
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import count_text, votes_text
 from arena.rating.rules import Unit
 from arena.rating.snapshot_document import Trust
 from arena.results.exports.tables import method_text
-from arena.results.queries.votes import Filters
+from arena.results.queries.votes import REASONS, Filters
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict
 
@@ -58,7 +59,7 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "board": snapshot.results.board,
         "simulated": snapshot.includes_simulated,
         "contestants": len(frozen["contestants"]),
-        "scenarios": len(frozen["scenarios"]),
+        "scenarios": snapshot.results.board.scenarios or len(frozen["scenarios"]),
         "languages": [
             LANG_INFO.get(code, {}).get("name", code)
             for code in sorted(set(study.scenarios.values_list("language", flat=True)))
@@ -72,7 +73,7 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "question": str(Question(key).label),
         "method": method_text(snapshot),
         "votes": votes_text(snapshot.votes_cast, snapshot.settled_ties),
-        "left_out": ", ".join(f"{number} {reason}" for reason, number in left_out) or "none",
+        "left_out": ", ".join(f"{number} {REASONS[why]}" for why, number in left_out) or "none",
         "agreement": _tell_agreement(snapshot.results.trust),
         "tests": _tell_tests(snapshot),
         "preregistration": preregistration_sha256(study),
@@ -130,6 +131,10 @@ def _tell_plan(snapshot: Snapshot, frozen: dict[str, Any]) -> str:
         f"sides before the first vote, {count_text(snapshot.study.votes_per_expert, 'pair|')} for "
         f"each of {count_text(frozen['experts'], 'account|')}"
     )
+    if challengers := frozen["rules"].get("challengers"):
+        plan += f", each with {' or '.join(challengers)}"
+    if later := snapshot.study.matchups.filter(batch__gt=0, kind=MAIN).count():
+        plan += f"; {later} more were planned later, for who came by a link or took over"
     settled = len(frozen["rules"].get("identical", ()))
     if not settled:
         return plan
