@@ -23,26 +23,26 @@ demo: $(VENV)/.runtime ## Run the main job on the catalogue, then serve it (SERV
 serve: $(VENV)/.runtime ## Serve what is there
 	$(BIN)/python manage.py serve --port $(PORT)
 
-test: chromium receivers ## Style, floors, types and every test that is not slow, on SQLite, Redis, PostgreSQL and in a browser
+test: chromium receivers ## Every test that is not slow, on SQLite, Redis, PostgreSQL and in a browser
 	@$(MAKE) --no-print-directory -j 2 sqlite-tests postgres-tests
 
 # Side by side: what waits for a browser leaves a core to the others.
 sqlite-tests:
 	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not slow"
 
-postgres-tests: lint
+postgres-tests:
 	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow"
 
-test-all: chromium receivers ## The slow tests: whole journeys, kills, all roles of the API
+test-all: chromium receivers lint ## Style, layers, types and the slow tests: whole journeys, kills, all roles of the API
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
 
-check: lint ## The quick round: style, floors, types and the tests of the pure packages
+check: lint ## The quick round: style, layers, types and the tests of the pure packages
 	$(BIN)/python -m pytest -n 2 -q -m "not slow and not realdata" $(PURE:%=tests/%)
 
 fuzz: $(VENV)/.test ## New random examples for every property, ten times as many as in `make test`
 	$(BIN)/python -m pytest -n 2 -m "hypothesis and not browser" --hypothesis-profile fuzz --randomly-seed=default
 
-lint: $(VENV)/.test ## Format, style, floors, types and kubernetes.yaml
+lint: $(VENV)/.test ## Format, style, layers, types and kubernetes.yaml
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/djlint templates --check --quiet

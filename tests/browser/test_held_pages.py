@@ -90,6 +90,7 @@ def test_an_answer_never_undoes_what_was_done_after_its_question(desk: Desk) -> 
     assert desk.y_m == 1.0
 
 
+@pytest.mark.slow
 def test_a_chosen_motion_is_asked_of_the_server_and_kept_by_later_edits(desk: Desk) -> None:
     desk.place_ahead()
     page = desk.page

@@ -164,6 +164,7 @@ def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     assert page.inner_text(".film-bar output") == "0.1 s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 1280])
 def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) -> None:
     page = moving.enter(viewport={"width": width, "height": 800}, bypass_csp=True)

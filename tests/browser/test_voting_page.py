@@ -72,6 +72,7 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
     assert faults(page) == [], "closed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("films", [0, 2])
 def test_over_the_catalogue_everything_fits_and_nothing_moves(
     bare_booth: Booth, films: int

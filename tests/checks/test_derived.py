@@ -123,6 +123,7 @@ def test_what_is_drawn_on_recorded_moments_is_placed_again_by_its_sentence(reald
     assert not problems
 
 
+@pytest.mark.slow
 def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
     unanswered = set()
     for slug in (*shelf.SLUGS[::3], *shelf.HARD_SLUGS[::3], "brewery-crossing-pile-up"):

@@ -129,6 +129,7 @@ def test_a_reference_has_nothing_wrong(slug: str) -> None:
 DRIVES_MPS = 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.realdata
 def test_most_recorded_vehicles_have_nothing_wrong_and_none_is_impossible(realdata: Path) -> None:
     totals, faulty, unplaced = Counter[str](), Counter[str](), Counter[str]()

@@ -90,6 +90,7 @@ def test_by_object_there_is_a_row_for_each_object_with_both_places() -> None:
     assert (last["state"], last["distance_m"]) == ("unreadable", "")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn_anew")
 def test_the_same_job_gives_the_same_bytes() -> None:
     job = a_job()
@@ -135,6 +136,7 @@ def test_columns_over_time_appear_where_something_moves() -> None:
 SHEET = ("samples", "Round 1", "--scenarios", "works", "parked", "--contestants", "sim", "ann")
 
 
+@pytest.mark.slow
 def test_the_sheet_of_samples_has_the_same_bytes_twice(tmp_path: Path) -> None:
     a_job()
     for name, begins in (("sheet.pdf", b"%PDF"), ("sheet.png", b"\x89PNG")):

@@ -66,6 +66,7 @@ def snapshot() -> Snapshot:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn_anew")
 def test_the_displacement_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) -> None:
     """The others are drawn twice for the zip of everything (test_bundle.py)."""
@@ -105,6 +106,7 @@ def write_quickly(figure: Any, file_format: str) -> bytes:
     return write_figure(figure, file_format) if is_quick else BEGINS[file_format]
 
 
+@pytest.mark.slow
 def test_a_worker_draws_the_charts_and_pages_only_read_them(
     snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -340,6 +340,7 @@ HOSTILE: list[tuple[str, dict[str, Any], str]] = [
 """What the author of a folder writes into a table, and what the refusal says of its first row."""
 
 
+@pytest.mark.slow
 def test_a_hostile_folder_is_refused_with_its_row_and_imports_nothing(
     folder: Path, exported: Exported, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,6 +22,7 @@ def drawn(shown: Scene, *right: TrafficAgent) -> dict[str, Modification]:
     return {mistake: modification for modification, mistake in bent}
 
 
+@pytest.mark.slow
 def test_only_mistakes_that_make_a_difference_are_made() -> None:
     assert set(drawn(scene(), PARKED)) == {"none", "neighbour-lane", "wrong-side", "distance"}
     crash = drawn(scene(), PARKED, replace(PARKED, id="Agent3", x_m=25.0, heading_rad=0.5))

@@ -4,6 +4,7 @@ import ast
 import re
 
 import polib
+import pytest
 
 from arena.management.commands.prepare import GERMAN
 from tests.house.messages import VOTER_MODULES, marked_messages
@@ -31,6 +32,7 @@ CHOOSING = {"arena.site.language"}
 """It chooses the language of an answer and marks no text."""
 
 
+@pytest.mark.slow
 def test_only_modules_of_the_catalogue_translate() -> None:
     known = CHOOSING | {name.removesuffix(".py").replace("/", ".") for name in VOTER_MODULES}
     found = [

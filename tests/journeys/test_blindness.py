@@ -122,6 +122,7 @@ def test_trying_every_address_tells_nothing(eva: Client, study: Study) -> None:
     assert leaks(study, crawl(eva, addresses), guessed=True) == []
 
 
+@pytest.mark.slow
 def test_voting_to_the_end_tells_nothing(eva: Client, study: Study) -> None:
     seen = vote_through(eva, study)
     assert sum(address.startswith("/api/v1/votes#") for address in seen) == 9

@@ -33,11 +33,13 @@ def test_every_kind_takes_part(tally: Tally) -> None:
     assert tally.kinds == set(MAKERS)
 
 
+@pytest.mark.slow
 def test_right_placements_are_left_alone(tally: Tally) -> None:
     assert tally.right == COUNT
     assert tally.clean >= 0.98 * COUNT
 
 
+@pytest.mark.slow
 def test_a_shift_is_called_a_fault_beyond_the_tolerance_and_not_before() -> None:
     assert shifted_share(1.0) == 0.0
     assert shifted_share(4.0) >= 0.98

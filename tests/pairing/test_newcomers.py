@@ -49,6 +49,7 @@ def test_all_units_are_given_where_more_are_asked_for() -> None:
     assert len(units) == int(of.showable.sum()) == 9
 
 
+@pytest.mark.slow
 @given(st.integers(1, 40), st.integers(0, 2**32), st.integers(1, 12))
 def test_voters_after_each_other_keep_all_units_equal(quota: int, seed: int, voters: int) -> None:
     of = grid()

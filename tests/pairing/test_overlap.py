@@ -72,6 +72,7 @@ def test_the_same_seed_and_rules_give_the_same_plan() -> None:
     assert plan(twelve_by_forty(0.2)) != plan(twelve_by_forty(0.2, seed=2))
 
 
+@pytest.mark.slow
 def test_a_plan_that_has_more_keeps_it() -> None:
     """5,760 votes on 1,800 units: nearly every unit has three judges."""
     assert plan(paper_rules(1, overlap_share=0.1)) == plan(paper_rules(1))

@@ -24,6 +24,7 @@ def differing() -> Found:
     return study(world, studies=60)
 
 
+@pytest.mark.slow
 def test_the_default_covers_where_experts_are_few_and_differ(differing: Found) -> None:
     assert 0.92 < differing.coverage() < 0.98
 
@@ -32,6 +33,7 @@ def test_single_votes_claim_too_much_there(differing: Found) -> None:
     assert differing.coverage(SINGLE) < 0.85
 
 
+@pytest.mark.slow
 def test_independent_votes_are_not_taken_for_dependent_ones() -> None:
     """Resampled both ways such intervals are half as wide again, and hold 99.7 %."""
     world = World(ratings=paper_ratings(), experts=12, votes_per_expert=100)
@@ -105,6 +107,7 @@ def test_one_expert_or_scenario_speaks_for_no_whole_table(unit: Unit, alone: str
     assert {line.rank_best is not None for line in board.lines} == {is_known}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "world",
     [

@@ -45,6 +45,7 @@ def alike(one: Leaderboard, other: Leaderboard) -> bool:
     return columns(one) == columns(other) and one.explanation == other.explanation
 
 
+@pytest.mark.slow
 @given(votes_of_four, st.randoms(use_true_random=False))
 @examples(60)
 def test_neither_the_sides_nor_the_order_of_the_votes_change_anything(
@@ -57,6 +58,7 @@ def test_neither_the_sides_nor_the_order_of_the_votes_change_anything(
     assert alike(one, other)
 
 
+@pytest.mark.slow
 @given(votes_of_four, st.permutations(NAMES))
 @examples(60)
 def test_renaming_the_contestants_renames_the_table_and_every_vote_twice_leaves_it(

@@ -141,6 +141,7 @@ def first_of(votes: Comparisons, rows: Sequence[int]) -> str | None:
     return votes.names[int(strengths.argmax())]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_no_much_smaller_set_of_votes_changes_the_first_place_and_that_one_does(seed: int) -> None:
     votes = simulated([1030.0, 1000, 970], 16, seed, ties=0.2)

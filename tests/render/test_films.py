@@ -75,6 +75,7 @@ def test_the_window_holds_the_way_near_the_ego_and_has_films() -> None:
     assert camera.key == f"{standing.key}-film"
 
 
+@pytest.mark.slow
 def test_a_picture_shows_a_trail_and_one_without_has_the_palette_that_it_had() -> None:
     moving = Modification(added=(cutting_in(0.5),))
     camera = camera_for(STREET, moving)

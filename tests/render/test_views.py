@@ -44,6 +44,7 @@ def test_the_arrow_sits_on_the_side_where_the_agent_is(x_m: float, y_m: float, s
     assert min(gaps, key=lambda name: gaps[name]) == side
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 30, 120])
 def test_arrows_stay_inside_and_apart(count: int) -> None:
     crowd = [

@@ -71,6 +71,7 @@ def test_a_simulated_study_that_was_cut_short_is_gone_on_with(
     assert hold_study() == rating.study
 
 
+@pytest.mark.slow
 def test_displacement_and_experts_are_as_counted_from_rows_and_in_files(rating: Snapshot) -> None:
     lines, votes = lines_of(rating), list(decided(rating))
     slugs = [(won.contestant.slug, lost.contestant.slug) for won, lost in votes]

@@ -59,6 +59,7 @@ def test_agreement_by_krippendorffs_package_and_by_loops(shown: Shown) -> None:
     assert found.percent.value == pytest.approx(sum(agreed.values()) / sum(seen.values()))
 
 
+@pytest.mark.slow
 def test_the_panel_counts_what_each_expert_did(shown: Shown) -> None:
     first = {vote.matchup: vote for vote in shown.votes}
     for line in shown.results.trust.raters:

@@ -38,6 +38,7 @@ def test_what_steers_a_terminal_is_spelt_out(text: str, printed: str) -> None:
     assert escape_controls(text) == printed
 
 
+@pytest.mark.slow
 @given(st.text())
 def test_no_text_steers_a_terminal(text: str) -> None:
     steering = {unicodedata.category(one) for one in escape_controls(text) if one not in "\n\t"}

@@ -270,6 +270,7 @@ def advance_m(drive: Drive) -> float:
     return float(stations[1] - stations[0])
 
 
+@pytest.mark.slow
 def test_offsets_to_4_m_pass_a_parked_car_at_which_the_original_ones_wait() -> None:
     scene, parked = without_traffic(shown_scene(SLUG)), entry(SLUG).reference
     road, setting = Road(scene), DriveSetting(scene=scene, modification=parked)

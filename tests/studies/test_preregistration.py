@@ -82,6 +82,7 @@ def test_a_hypothesis_that_can_not_be_answered_opens_nothing(line: str, said: st
     assert not Study.objects.exists()
 
 
+@pytest.mark.slow
 def test_the_results_answer_the_pairs_and_every_export_names_the_hash() -> None:
     study = opened(votes=18, hypotheses=LINES)
     voted(study, slips=4)

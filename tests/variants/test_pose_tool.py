@@ -237,6 +237,7 @@ def two_lanes() -> Scene:
 SETS_OUT = {"lane": "Lane2", "start": "Agent1", "distance_m": 30, "speed_mps": 4}
 
 
+@pytest.mark.slow
 def test_the_lanes_to_follow_are_those_beside_and_those_that_come_next() -> None:
     tool = PoseTool(two_lanes())
     assert tool.answer(SETS_OUT)["lanes_beside"] == ["Lane1"]

@@ -40,6 +40,7 @@ CHOICES: dict[str, dict[str, object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("allow_simulated", [True, False])
 def test_the_database_gives_the_reasons_of_the_rating(study: Study, allow_simulated: bool) -> None:
     study.allow_simulated = allow_simulated

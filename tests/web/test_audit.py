@@ -94,6 +94,7 @@ def _rated_while_open() -> tuple[Study, dict[str, str]]:
     return study, _pages(study, snapshot)
 
 
+@pytest.mark.slow
 def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
     study, pages = _rated_while_open()
     accounts = people()
