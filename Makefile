@@ -80,6 +80,7 @@ lock: $(VENV)/.test ## Write the lock files anew from the *.in files
 	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements.in -o requirements.txt
 	$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url -q requirements-test.in -o requirements-test.txt
 	$(BIN)/uv pip compile --python-version 3.11 --generate-hashes --no-emit-index-url -q tests/formats/receivers/requirements.in -o tests/formats/receivers/requirements.txt
+	$(BIN)/uv pip compile --python-version 3.11 --generate-hashes --no-emit-index-url -q bench/rivals/requirements.in -o bench/rivals/requirements.txt
 
 clean: ## Remove the environment and everything that a run leaves behind
 	rm -rf $(VENV) .bench var media

@@ -13,7 +13,6 @@ the table into docs/benchmarks.md.
 import argparse
 import json
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -26,6 +25,7 @@ import numpy as np
 from arena.rating.comparisons import Comparisons, IntArray
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.models import ELO_PER_LOGIT
+from bench.environments import make_environment
 from bench.report import ROOT, load, table, write_section
 
 HEADING = "Bootstrap and closed form, with many contestants"
@@ -78,40 +78,111 @@ RESAMPLED = (
     Crowd(like="", votes=100_000, contestants=50, experts=1000, scenarios=50),
     Crowd(like="", votes=2_000_000, contestants=150, experts=1000, scenarios=50),
 )
-RATE = """
-import sys, time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """A package that rates the same votes, by its fastest way to percentile intervals.
+
+    Attributes:
+        program: Rates `stored` votes of `size` contestants in `rounds` resamples.
+        rounds: As many as it is given time for; its time is told for 1,000.
+        is_ours: Installed here, not in the environment of `bench/rivals`.
+    """
+
+    program: str
+    rounds: int = 1000
+    is_ours: bool = True
+
+
+ROUNDS = 1000
+PROGRAM = """
+import resource, sys, time
 import numpy as np
+stored, rounds = dict(np.load(sys.argv[1])), int(sys.argv[2])
+size = int(stored["first"].max()) + 1
+def draw_counts(seen):
+    # (size,) how often each kind of vote is drawn, round by round
+    yield from np.random.default_rng(0).multinomial(seen.sum(), seen / seen.sum(), size=rounds)
+def count_cells():
+    # how often each first, second and score (0, a half, 1) occurs
+    place = (stored["first"] * size + stored["second"]) * 3 + (2 * stored["score"]).astype(int)
+    return np.bincount(place, minlength=3 * size**2)
+{program}
+print(took, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+"""
+"""Imports and a first round are not timed; memory is the most of the whole process."""
+RIVALS = {
+    "ours": Rival(
+        program="""
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Unit, rate
-stored = dict(np.load(sys.argv[1]))
-names = tuple(f"c{one}" for one in range(int(stored["first"].max()) + 1))
-votes = Comparisons(names=names, **stored)
+votes = Comparisons(names=tuple(f"c{one}" for one in range(size)), **stored)
 rate(votes, unit=Unit.VOTE, rounds=100)
 before = time.process_time()
-rate(votes, unit=Unit.VOTE, rounds=1000)
-print(time.process_time() - before)
+rate(votes, unit=Unit.VOTE, rounds=rounds)
+took = time.process_time() - before
 """
-"""Modules are loaded before."""
-CHOIX = """
-import sys, time
+    ),
+    # Each resample by its fastest method for all pairs, from the one before.
+    "choix": Rival(
+        program="""
 import choix
-import numpy as np
-stored = np.load(sys.argv[1])
-size = int(stored["first"].max()) + 1
-before = time.process_time()
-place = (stored["first"] * size + stored["second"]) * 3 + (2 * stored["score"]).astype(int)
-seen = np.bincount(place, minlength=3 * size**2)
-begin, ratings = None, []
-for drawn in np.random.default_rng(0).multinomial(seen.sum(), seen / seen.sum(), size=1000):
+before, begin, ratings = time.process_time(), None, []
+for drawn in draw_counts(count_cells()):
     lost, tied, won = drawn.reshape(size, size, 3).transpose(2, 0, 1)
-    wins = won + 0.5 * tied
-    losses = lost + 0.5 * tied
+    wins, losses = won + 0.5 * tied, lost + 0.5 * tied
     begin = choix.ilsr_pairwise_dense(wins + losses.T, alpha=1e-12, initial_params=begin)
     ratings.append(begin)
 np.percentile(ratings, [2.5, 97.5], axis=0)
-print(time.process_time() - before)
+took = time.process_time() - before
 """
-"""Each resample by its fastest method for all pairs, from the one before."""
+    ),
+    # Its own bootstrap draws single votes as Python objects; equal ones are weighted here.
+    "evalica": Rival(
+        program="""
+import evalica
+before, ratings = time.process_time(), []
+seen = count_cells()
+cells = np.flatnonzero(seen)
+outcomes = (evalica.Winner.Y, evalica.Winner.Draw, evalica.Winner.X)
+winners = [outcomes[cell % 3] for cell in cells]
+first, second = (cells // 3 // size).tolist(), (cells // 3 % size).tolist()
+index = evalica.indexing(range(size), range(size))[2]
+for drawn in draw_counts(seen[cells]):
+    weights = drawn.astype(float).tolist()
+    rated = evalica.bradley_terry(first, second, winners, weights=weights, index=index)
+    ratings.append(np.log(rated.scores.reindex(index)))
+np.percentile(ratings, [2.5, 97.5], axis=0)
+took = time.process_time() - before
+""",
+        rounds=100,
+        is_ours=False,
+    ),
+    # Its own bootstrap forks a pool, which may wait for JAX's threads for ever: one by one here.
+    "arena-rank": Rival(
+        program="""
+import jax, pandas as pd
+from arena_rank.models.bradley_terry import BradleyTerry, fit_single_bootstrap_sample
+from arena_rank.utils.data_utils import PairDataset
+winner = np.array(["model_b", "tie", "model_a"])[(2 * stored["score"]).astype(int)]
+frame = pd.DataFrame(
+    {"model_a": stored["first"], "model_b": stored["second"], "winner": winner}
+)
+data = PairDataset.from_pandas(frame)
+model = BradleyTerry(size)
+model.fit(data)
+before, ratings = time.process_time(), []
+for drawn in draw_counts(np.asarray(data.counts).astype(int)):
+    fitted = fit_single_bootstrap_sample(jax.numpy.asarray(drawn * 1.0), model, data)
+    ratings.append(fitted["ratings"])
+np.percentile(ratings, [2.5, 97.5], axis=0)
+took = time.process_time() - before
+""",
+        rounds=5,
+        is_ours=False,
+    ),
+}
 
 
 def drawn(crowd: Crowd, seed: int = 1) -> Comparisons:
@@ -160,31 +231,43 @@ def measure(crowd: Crowd, intervals: Intervals) -> dict[str, float]:
 def measure_resamples() -> str:
     """The section on 1,000 vote resamples: rivals take turns, each in a process of its own."""
     before, rows = load(), []
+    others = make_environment(Path(__file__).parent / "rivals")
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        rivals = {"ours": RATE, "choix": CHOIX}
+        path = Path(name) / "votes.npz"
         for crowd in RESAMPLED:
             votes = drawn(crowd)
             columns = ("first", "second", "score", "expert", "scenario")
-            np.savez(folder / "votes.npz", **{one: getattr(votes, one) for one in columns})
-            seconds: dict[str, list[float]] = {rival: [] for rival in rivals}
-            for rival in list(rivals) * REPEATS:
-                command = [sys.executable, "-c", rivals[rival], str(folder / "votes.npz")]
-                ended = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE)
-                seconds[rival].append(float(ended.stdout))
-            medians = {rival: statistics.median(took) for rival, took in seconds.items()}
-            cells = [
-                f"{1e3 * took:,.1f} ms ({took / medians['ours']:.2f})" for took in medians.values()
-            ]
-            rows.append([f"{crowd.votes:,}", str(crowd.contestants), *cells])
+            np.savez(path, **{column: getattr(votes, column) for column in columns})
+            turns: dict[str, list[tuple[float, float]]] = {key: [] for key in RIVALS}
+            for key in list(RIVALS) * REPEATS:
+                turns[key].append(run_rival(RIVALS[key], path, others))
+            medians = {key: np.median(turn, axis=0) for key, turn in turns.items()}
+            ours = medians["ours"][0]
+            rows.append(
+                [f"{crowd.votes:,}", str(crowd.contestants)]
+                + [f"{s:,.3g} s ({s / ours:,.3g}), {mb:,.0f} MB" for s, mb in medians.values()]
+            )
             print(rows[-1], flush=True)
+    fewer = ", ".join(f"{key} {one.rounds}" for key, one in RIVALS.items() if not one.is_ours)
     said = (
         "`python -m bench.rating_scale --resamples [--write]`: the paper's mode, 1,000 resamples "
         "of single votes with percentile intervals. Processor time without start and imports, "
-        f"median of {REPEATS} turns (and its ratio to ours), one thread; choix warm-started "
-        f"on dense matrices; {before}."
+        f"median of {REPEATS} turns (and its ratio to ours), one thread; memory of the whole "
+        f"process. Fewer resamples, scaled to 1,000: {fewer}. choix is warm-started on dense "
+        f"matrices, evalica gets equal votes as weights, arena-rank compiles each fit; {before}."
     )
-    return "\n\n".join([said, table(["votes", "contestants", "ours", "choix"], rows)])
+    return "\n\n".join([said, table(["votes", "contestants", *RIVALS], rows)])
+
+
+def run_rival(rival: Rival, votes: Path, others: Path) -> tuple[float, float]:
+    """Seconds of processor time for 1,000 resamples, and megabytes."""
+    python = sys.executable if rival.is_ours else str(others)
+    command = [python, "-c", PROGRAM.replace("{program}", rival.program), str(votes)]
+    ended = subprocess.run(
+        [*command, str(rival.rounds)], cwd=ROOT, check=True, stdout=subprocess.PIPE
+    )
+    seconds, megabytes = map(float, ended.stdout.split())
+    return seconds * ROUNDS / rival.rounds, megabytes
 
 
 def save_csv(votes: Comparisons, path: Path) -> None:

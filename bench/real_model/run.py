@@ -12,12 +12,9 @@ nonsense. `--write` puts the table into docs/benchmarks.md.
 """
 
 import csv
-import hashlib
 import io
-import os
 import subprocess
 import sys
-import venv
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,7 +22,8 @@ from itertools import product
 from pathlib import Path
 from statistics import median
 
-from bench.report import ROOT, load, table, write_section
+from bench.environments import make_environment
+from bench.report import load, table, write_section
 from tests.processes import Machine, machine, wait_until
 from tests.stack import answers, free_port
 
@@ -70,7 +68,7 @@ def main(arguments: list[str]) -> None:
 @contextmanager
 def served() -> Iterator[str]:
     """Serve the model on a free port and yield its base URL."""
-    python = make_environment()
+    python = make_environment(Path(__file__).parent, variables=PORTABLE)
     weights = subprocess.run([python, "-c", WEIGHTS], capture_output=True, text=True, check=True)
     port = free_port()
     command = [str(python), "-m", "llama_cpp.server", "--model", weights.stdout.strip()]
@@ -87,22 +85,6 @@ def served() -> Iterator[str]:
     finally:
         server.terminate()
         server.wait(timeout=60)
-
-
-def make_environment() -> Path:
-    """Return the interpreter of the server's own environment, made anew where its lock changed."""
-    lock, folder = Path(__file__).parent / "requirements.txt", ROOT / ".bench" / "real_model"
-    stamp, python = folder / "installed", folder / "bin" / "python"
-    digest = hashlib.sha256(lock.read_bytes()).hexdigest()
-    if not stamp.exists() or stamp.read_text() != digest:
-        print(f"Installing into {folder} ...", flush=True)
-        venv.create(folder, with_pip=True, clear=True)
-        # pip's cache may hold what was compiled with other settings.
-        pip = [str(python), "-m", "pip", "install", "--quiet", "--no-cache-dir"]
-        command = [*pip, "--require-hashes", "--requirement", str(lock)]
-        subprocess.run(command, check=True, env={**os.environ, **PORTABLE})
-        stamp.write_text(digest)
-    return python
 
 
 def prepare(installation: Machine, base_url: str) -> str:
