@@ -79,6 +79,7 @@ def desk(browser: Browser) -> Iterator[Desk]:
         yield Desk(held=held)
 
 
+@pytest.mark.slow
 def test_an_answer_never_undoes_what_was_done_after_its_question(desk: Desk) -> None:
     desk.place_ahead()
     desk.snap()
@@ -118,6 +119,7 @@ def test_a_chosen_motion_is_asked_of_the_server_and_kept_by_later_edits(desk: De
     assert "motion" not in desk.asked(5)["modification"]["add"][0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -165,6 +167,7 @@ def test_a_click_sends_the_nearest_place_and_none_far_from_every_lane(browser: B
         assert len(held.posted) == 1
 
 
+@pytest.mark.slow
 def test_another_moment_brings_its_own_place(browser: Browser) -> None:
     upload = upload_of("@1,1,50", "@1,-1,10")
     path, researcher = reverse("upload", args=[upload.code]), signed_in(people()["researcher"])
@@ -203,6 +206,7 @@ def upload_of(*items: str) -> SceneUpload:
 ROWS = 9
 
 
+@pytest.mark.slow
 def test_rows_follow_as_one_scrolls(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("arena.jobs.queries.CELLS", 4)
     job, reader = large_job(scenarios=ROWS, contestants=2), signed_in(people()["researcher"])

@@ -122,6 +122,7 @@ def test_films_begin_by_themselves_at_once_and_go_with_their_pair(moving: Booth)
     expect(page.locator(FILMS).first).to_be_visible()
 
 
+@pytest.mark.slow
 def test_the_range_says_who_sets_out_when_and_the_last_moment_stays(moving: Booth) -> None:
     starts = {"ann": ["0.5"], "bob": [], "cid": ["2.0"]}  # as `a_moving_study` has it
     page = moving.enter()
@@ -143,6 +144,7 @@ def test_the_range_says_who_sets_out_when_and_the_last_moment_stays(moving: Boot
     expect(page.locator(FILMS)).to_have_count(2)
 
 
+@pytest.mark.slow
 def test_less_motion_gets_stills_until_somebody_plays(moving: Booth) -> None:
     page = moving.enter(reduced_motion="reduce")
     expect(page.locator(".film-bar")).to_be_visible()
@@ -176,6 +178,7 @@ def test_the_bar_can_be_used_by_everybody_and_fits(moving: Booth, width: int) ->
     assert page.evaluate(CUT) == []
 
 
+@pytest.mark.slow
 def test_on_other_pages_the_first_press_loads_and_does_what_its_button_says(moving: Booth) -> None:
     people()
     result = Augmentation.objects.filter(contestant__slug="ann")[0]

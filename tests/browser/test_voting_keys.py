@@ -28,6 +28,7 @@ def test_every_vote_key_means_what_the_help_says(booth: Booth) -> None:
     assert booth.outcomes() == [*["left"] * 3, *["equal"] * 3, *["right"] * 3]
 
 
+@pytest.mark.slow
 def test_no_modified_key_votes_and_none_while_typing(booth: Booth) -> None:
     page = booth.enter()
     for key in ("Control+1", "Alt+2", "Meta+3", "Shift+A", "Shift+ArrowLeft", "Shift+Digit2"):
@@ -117,6 +118,7 @@ def test_looking_closely_by_keys_moves_both_pictures_and_is_kept_with_the_vote(
     expect(page.locator("#pace")).to_contain_text("1 done today")
 
 
+@pytest.mark.slow
 def test_single_keys_can_be_switched_off_for_good(booth: Booth) -> None:
     page = booth.enter()
     page.keyboard.press("?")

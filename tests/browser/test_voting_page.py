@@ -168,6 +168,7 @@ def test_practice_is_answered_by_the_keys_that_answer_pairs(wanted: Booth) -> No
     expect(page.locator("#question")).to_contain_text("Practice 2 of 5.")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("theme", "size"), LOOKS)
 def test_practice_is_whole_on_every_window_and_axe_finds_nothing(
     wanted: Booth, theme: str, size: dict[str, int]
@@ -254,6 +255,7 @@ def is_whole(places: dict[str, Any], width: int) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_the_longest_instruction_of_the_catalogue_is_never_cut(booth: Booth) -> None:
     long = longest_of_the_catalogue()
     assert len(GERMAN) > len(long) > 300

@@ -11,7 +11,7 @@ from tests import study_rows
 from tests.browser.booth import Booth, all_sent, let_bounce, press, ready
 from tests.held_lock import kept_busy
 
-pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True), pytest.mark.slow]
 VOTES = "**/api/v1/votes"
 BUSY = """
 const { request } = LockManager.prototype;

@@ -100,6 +100,7 @@ def test_the_button_of_an_invitation_leads_to_the_first_pair(booth: Booth) -> No
 TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
+@pytest.mark.slow
 def test_the_folder_opens_from_a_disk_with_the_network_off(
     browser: Browser, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_lanes_that_follow_each_other_are_joined_and_meet(seed: int, tmp_path: P
     assert bool(scene.connectors) == (seed == 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
 def test_an_ego_can_be_put_at_every_place_that_a_map_names(seed: int, tmp_path: Path) -> None:
     file = write(make_map(seed), tmp_path / "made.xodr")

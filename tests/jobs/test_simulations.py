@@ -151,6 +151,7 @@ def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> Non
     assert len(simulations.plan_job(job=job, options=BROKEN)) == 3
 
 
+@pytest.mark.slow
 def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
     job = rows.launch(contestants=("reference", "shy"))
     settle_all(job)
@@ -195,6 +196,7 @@ def test_a_planner_that_is_not_allowed_is_never_imported(
     assert "evil_planner" not in sys.modules
 
 
+@pytest.mark.slow
 def test_the_command_line_names_a_planner_for_its_own_process_alone(settings: Settings) -> None:
     settings.PLANNERS = ()
     finished_job()

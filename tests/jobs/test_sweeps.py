@@ -122,6 +122,7 @@ def ended(sweep: Sweep, **scores: float) -> Sweep:
     return sweep
 
 
+@pytest.mark.slow
 def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> None:
     sweep = ended(planned(1.0, 3.0, 3), at_1=0.5, at_2=0.8, at_3=0.1)
     kept = sweep.hardest

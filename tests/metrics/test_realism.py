@@ -121,6 +121,7 @@ def test_random_placement_keeps_what_is_placed_and_follows_its_seed() -> None:
     assert first.added[1].speed_mps == 0.0  # nothing lends a cone wheels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slugs", [SLUGS, HARD_SLUGS], ids=["paper", "hard"])
 def test_recorded_traffic_is_above_references_and_these_above_chance(slugs: list[str]) -> None:
     scenes = [*SCENES, *HARD_SCENES]

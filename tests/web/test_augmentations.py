@@ -64,6 +64,7 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
     assert "All five scenario types." in shown
 
 
+@pytest.mark.slow
 def test_what_is_not_measured_yet_is_left_to_a_worker_and_then_kept(
     django_assert_max_num_queries: DjangoAssertNumQueries,
     monkeypatch: pytest.MonkeyPatch,

@@ -20,6 +20,7 @@ from tests.web.cast import people, signed_in
 pytestmark = pytest.mark.django_db
 
 
+@pytest.mark.slow
 def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path: Path) -> None:
     first = voted(a_study(votes_per_expert=18))
     dot = newcomer("dot", Contestant.Kind.SUBMISSION)

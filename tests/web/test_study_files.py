@@ -64,6 +64,7 @@ def shown(client: Client, study: Study) -> str:
     return client.get(reverse("study", args=[study.code])).content.decode()
 
 
+@pytest.mark.slow
 def test_a_worker_writes_the_folder_of_the_command_as_one_zip(
     closed: Study, tmp_path: Path, admin: Client
 ) -> None:
