@@ -135,7 +135,11 @@ def test_the_hardest_value_that_somebody_solves_becomes_a_scenario_once() -> Non
 
 
 def test_nothing_is_kept_where_nobody_solves_what_the_planner_fails() -> None:
-    sweep = ended(planned(1.0, 3.0, 3), at_3=0.9)
+    sweep = planned(1.0, 3.0, 3)
+    Simulation.objects.filter(planner=STRAIGHT.planner).update(state=State.FAILED)
+    assert sweep_result(sweep).verdict == "The planner has driven no value to its end."
+    Simulation.objects.filter(planner=STRAIGHT.planner).update(state=State.QUEUED)
+    sweep = ended(sweep, at_3=0.9)
     assert sweep.concluded_at is not None
     assert sweep.hardest is None
 

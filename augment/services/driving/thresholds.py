@@ -79,7 +79,7 @@ class SweepResult:
             places = "; ".join(f"it passes {good:g} and fails {bad:g}" for good, bad in self.edges)
             return f"Where the planner fails: {places}."
         if not passed:
-            return "No value has been driven yet."
+            return "The planner has driven no value to its end."
         return f"The planner {'passes' if True in passed else 'fails'} every value driven."
 
 
