@@ -5,11 +5,14 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
 from decimal import Decimal
+from itertools import cycle
 
 import pytest
 from django.db import connection
 from django.db.models import Q
+from django.utils import timezone
 
 from arena.voting.services import turns
 from augment.models import Augmentation, GenerationJob, ModelCall
@@ -129,7 +132,11 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     assert job.spent_tokens == job.spent_nano_usd // 1000 == CALLS * USED
 
 
-def test_what_eight_workers_ask_at_once_is_paid_once() -> None:
+def test_what_eight_workers_ask_at_once_is_paid_once_whatever_their_clocks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right, hours = timezone.now, cycle((0, 2, -2))
+    monkeypatch.setattr(timezone, "now", lambda: right() + timedelta(hours=next(hours)))
     asked = JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"])
     rounds = [llama_job(), *(jobs.launch(asked) for _ in range(WORKERS - 1))]
     model = Model(looking_on=lambda: time.sleep(0.3))

@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 from django.conf import settings
 from django.db import connection, transaction
 from django.db.models import F, Q, QuerySet
-from django.utils import timezone
 
 from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, GenerationJob, ModelCall, TranscriptNote
+from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.contestants import Respondent
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
@@ -155,7 +155,6 @@ class CallTranscript:
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
         if earlier is None:
             return None
-        now = timezone.now()
         with transaction.atomic():
             self.insist()
             ModelCall.objects.create(
@@ -164,8 +163,8 @@ class CallTranscript:
                 number=self._numbers + 1,
                 spent_tokens=0,
                 cost_nano_usd=0,
-                started_at=now,
-                settled_at=now,
+                started_at=DATABASE_TIME,
+                settled_at=DATABASE_TIME,
                 served_from_id=earlier.served_from_id or earlier.pk,
             )
         self._numbers += 1
@@ -211,7 +210,7 @@ class CallTranscript:
         """
         workers.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._in_flight[number].row.pk, settled_at=None)
-        if not call.update(sent_at=timezone.now()):
+        if not call.update(sent_at=DATABASE_TIME):
             raise errors.LeaseLost
 
     def record_reply(
@@ -241,7 +240,7 @@ class CallTranscript:
 
     def _settle(self, call: ModelCall, used: budget.Usage, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out."""
-        settle = partial(budget.settle, call=call, used=used, now=timezone.now(), answer=answer)
+        settle = partial(budget.settle, call=call, used=used, now=DATABASE_TIME, answer=answer)
         wait_out(settle)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
@@ -275,7 +274,7 @@ class CallTranscript:
         call = ModelCall.objects.create(
             **columns,
             number=self._numbers + 1,
-            started_at=timezone.now(),
+            started_at=DATABASE_TIME,
             reserved_tokens=worst.tokens,
             reserved_nano_usd=worst.nano_usd(price),
         )
@@ -333,7 +332,7 @@ class RowTranscript(CallTranscript):
 def _in_flight() -> Q:
     """Return the condition of calls that may still be answered; those of dead workers grow old."""
     longest_s = settings.LLM_QUEUE_S + settings.LLM_TIMEOUT_S
-    return Q(settled_at=None, started_at__gt=timezone.now() - timedelta(seconds=longest_s))
+    return Q(settled_at=None, started_at__gt=DATABASE_TIME - timedelta(seconds=longest_s))
 
 
 def _hold_question(request_hash: str) -> None:
