@@ -17,7 +17,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS, Held
-from augment.services.work import change_all
+from augment.services.work import Settlement, change_all
 from tests.brokers import MEMORY, broker_at
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
@@ -179,6 +179,14 @@ def test_a_wrong_clock_takes_no_place_that_is_taken(skew: Skew, seconds: float) 
     skew(-seconds)
     assert client.admit(endpoint_pk=endpoint.pk, clock=clock) == 0.0
     assert CallLease.objects.get().started_at <= database_now()
+
+
+def test_an_outcome_is_kept_where_the_clock_was_set_back_meanwhile() -> None:
+    row, held = taken()
+    row.attempts.update(started_at=DATABASE_TIME + timedelta(hours=2))
+    assert held.settle(Settlement(state=State.FAILED, reason="It broke."))
+    attempt = row.attempts.get()
+    assert attempt.finished_at == attempt.started_at
 
 
 ROWS, JOB = "augment_augmentation", "augment_generationjob"

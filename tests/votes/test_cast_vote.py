@@ -1,8 +1,10 @@
 import uuid
+from datetime import timedelta
 from typing import Any
 
 import pytest
 from django.db import IntegrityError, transaction
+from django.utils import timezone
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
@@ -75,12 +77,17 @@ def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(
     assert list(Vote.objects.all()) == [first]
 
 
-@pytest.mark.parametrize(("allowed", "is_stored"), [(2, True), (1, False)])
+@pytest.mark.parametrize(
+    ("allowed", "set_back_h", "is_stored"), [(2, 0, True), (1, 0, False), (1, 2, True)]
+)
 def test_changes_count_towards_the_pace_that_a_person_can_keep(
-    allowed: int, is_stored: bool, settings: Any
+    allowed: int, set_back_h: int, is_stored: bool, settings: Any
 ) -> None:
     matchup = matchups_of(a_study(), "eva")[0]
-    first = vote(matchup, "left")
+    with pytest.MonkeyPatch.context() as clock:
+        ahead = timezone.now() + timedelta(hours=set_back_h)
+        clock.setattr(timezone, "now", lambda: ahead)
+        first = vote(matchup, "left")
     settings.VOTES_PER_S = allowed / PACE_WINDOW.total_seconds()
     change = Decision(
         matchup=matchup.code, key=uuid.uuid4(), outcome="right", supersedes=first.key

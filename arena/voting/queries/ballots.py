@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from itertools import takewhile
 from typing import Any
 from uuid import UUID
@@ -30,6 +30,7 @@ from arena.errors import NotYours, StudyNotOpen
 from arena.models import EnrolledVoter, Matchup, Study, Vote
 from arena.people.queries import by_pseudonym
 from arena.voting.queries.showings import note_objects
+from augment.services.clock import database_now
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +136,7 @@ def find_undrawn(study: Study) -> QuerySet[Matchup]:
 
 def is_being_drawn(study: Study) -> bool:
     """Return whether a worker began to draw within the last half minute."""
-    since = timezone.now().timestamp() - 30.0
+    since = database_now().timestamp() - 30.0
     return find_undrawn(study).filter(view__since__gt=since).exists()
 
 
@@ -195,13 +196,15 @@ def voting_state(
         study: Which; its questions never change. Columns of what is returned that are not needed
             are loaded when asked for.
         expert: Whose matchups and votes are counted.
-        since: Votes after this moment are counted apart, of whatever study.
+        since: Votes of the minute after this moment are counted apart, of whatever study; a clock
+            that was set back leaves later ones.
     """
     values = {
         "study": study.pk,
         "last": study.questions[-1],
         "expert": expert.pk,
         "since": connection.ops.adapt_datetimefield_value(since),
+        "until": connection.ops.adapt_datetimefield_value(since + timedelta(minutes=1)),
     }
     row: Any = Study.objects.raw(_STATE, values)[0]  # with the counts as attributes
     progress = VotingProgress(
@@ -218,7 +221,8 @@ SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
        (SELECT COUNT(*) FROM arena_vote vote
-        WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now
+        WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s
+        AND vote.at < %(until)s) AS just_now
 FROM arena_study study, (
     SELECT COUNT(CASE WHEN {_SKIPS} THEN 1 END) AS skipped, COUNT(DISTINCT
            CASE WHEN vote.question = %(last)s OR {_SKIPS} THEN vote.matchup_id END) AS decided

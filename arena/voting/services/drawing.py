@@ -6,12 +6,12 @@ import time
 from typing import Any
 
 from django.db.models import QuerySet
-from django.utils import timezone
 
 from arena.models import Matchup, Study
 from arena.voting.queries.ballots import find_undrawn
 from arena.voting.queries.showings import LEGEND
 from augment.errors import AugmentError
+from augment.services.clock import database_now
 from augment.services.scenarios import draw_pair, load_camera, picture_view
 
 logger = logging.getLogger(__name__)
@@ -60,10 +60,10 @@ def show_own_pictures(study: Study, *, pairs: int | None = None) -> None:
 
 def _claim(study: Study) -> Matchup | None:
     """Return a pair that nobody draws; who loses a claim by its age draws the same once more."""
-    now = timezone.now().timestamp()
+    now = database_now().timestamp()
     rows = find_undrawn(study).order_by("position", "pk").only("code", "view")
     for row in rows.iterator(chunk_size=50):
-        is_free = now - (row.view or {}).get("since", 0.0) > _CLAIM_S
+        is_free = not 0.0 <= now - (row.view or {}).get("since", 0.0) <= _CLAIM_S
         own = Matchup.objects.filter(pk=row.pk, view=row.view)
         if is_free and own.update(view={"since": now}):
             return row

@@ -13,7 +13,7 @@ from typing import Any
 
 from django.db import Error
 from django.db.models import Max, Q, QuerySet, Subquery
-from django.db.models.functions import Coalesce
+from django.db.models.functions import Coalesce, Greatest
 
 from augment import errors
 from augment.baselines.registry import PLACERS, RULE_PLACER
@@ -136,8 +136,10 @@ class Augmentations(WorkKind[Augmentation]):
         """Close the attempt and settle its calls; one that was lost has no time of its end."""
         if end not in SUBMITTED.values():  # what ends with an answer has seen all of its calls end
             budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
+        # The clock may have been set back since the start.
+        finished = None if end == TryEnd.LOST else Greatest("started_at", now)
         Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
-            finished_at=None if end == TryEnd.LOST else now, outcome=end, reason=reason
+            finished_at=finished, outcome=end, reason=reason
         )
 
     def after_commit(self, row: Augmentation, outcome: Settlement | None) -> None:
