@@ -48,8 +48,8 @@ class JudgeQuestion(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Form:
-    """In which form the modifier gets its task.
+class PromptOptions:
+    """Options of a modifier's prompt.
 
     Attributes:
         lanes: How lanes are written down.
@@ -111,11 +111,15 @@ def make_user_message(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
     return Message(speaker=Speaker.USER, text=words, images=images)
 
 
-def modifier_messages(scene: Scene, instruction: str, form: Form | None = None) -> Messages:
+def modifier_messages(
+    scene: Scene, instruction: str, options: PromptOptions | None = None
+) -> Messages:
     """Ask the modifier for a change."""
-    form = form or Form()
-    shown = scene_text(scene, radius_m=form.radius_m, lanes=form.lanes)
-    return _opening(_modifier(form), fill_text("task.md", scene=shown, quoted=quote(instruction)))
+    options = options or PromptOptions()
+    shown = scene_text(scene, radius_m=options.radius_m, lanes=options.lanes)
+    return _opening(
+        _modifier(options), fill_text("task.md", scene=shown, quoted=quote(instruction))
+    )
 
 
 def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
@@ -163,11 +167,11 @@ def result_text(results: Sequence[str], *, is_over: bool) -> str:
 
 
 @cache
-def list_native_tools(form: Form) -> tuple[Tool, ...]:
+def list_native_tools(options: PromptOptions) -> tuple[Tool, ...]:
     """Return the function as endpoints with native calls are told of it, none to others."""
-    if not form.is_native:
+    if not options.is_native:
         return ()
-    return (Tool(**json.loads(read_text(f"{form.tools}.json"))["function"]),)
+    return (Tool(**json.loads(read_text(f"{options.tools}.json"))["function"]),)
 
 
 def review_messages(
@@ -271,27 +275,27 @@ def _opening(system: str, task: str, images: tuple[bytes, ...] = ()) -> Messages
 
 
 @cache
-def _modifier(form: Form) -> str:
+def _modifier(options: PromptOptions) -> str:
     tools, manner, work = "", "walked", "walked"
-    if form.tools is not Tools.NONE:
-        way = "native" if form.is_native else "in_prompt"
-        manner, work = "called", f"{form.tools}_{way}"
+    if options.tools is not Tools.NONE:
+        way = "native" if options.is_native else "in_prompt"
+        manner, work = "called", f"{options.tools}_{way}"
         tools = fill_text(
             f"calls_{way}.md",
-            function=read_text(f"{form.tools}.md"),
-            example=read_text(f"{form.tools}_call.md"),
-            calls=str(form.calls),
-            identical=str(form.identical),
+            function=read_text(f"{options.tools}.md"),
+            example=read_text(f"{options.tools}_call.md"),
+            calls=str(options.calls),
+            identical=str(options.identical),
         )
     return fill_text(
         "modifier.md",
-        input_format=_input_format(form.radius_m, form.lanes),
+        input_format=_input_format(options.radius_m, options.lanes),
         distances=read_text(f"distances_{manner}.md"),
         rules=read_text("rules.md"),
         refusal=read_text("refusal.md"),
         tools=tools,
         calculations=read_text(f"calculations_{manner}.md"),
-        example=read_text(f"example_{form.lanes}.md"),
+        example=read_text(f"example_{options.lanes}.md"),
         work=read_text(f"work_{work}.md"),
     )
 

@@ -84,7 +84,7 @@ class Lease(Generic[Row]):
     """The right to write one row, as long as it carries the token.
 
     Attributes:
-        attempt: What `begun` has noted.
+        attempt: What `on_start` of its kind returned.
     """
 
     kind: WorkKind[Row]

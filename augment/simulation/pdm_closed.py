@@ -110,9 +110,9 @@ class PdmClosed:
         starts = np.broadcast_to(paths.stations(np.array([ego_m])), speeds.shape)
         first, rest = range(HORIZON_STEPS), range(HORIZON_STEPS, WHOLE_STEPS)
         # Over the first 4 s the furthest reach counts for all; then each policy's own.
-        begun, speeds = self._roll_out(starts, speeds, targets, furthest_m, corridor, first)
+        reached_m, speeds = self._roll_out(starts, speeds, targets, furthest_m, corridor, first)
         # (P, V, T, 3) as (B, T, 3), proposal p * V + v; what is judged is how the car follows it.
-        states = track(paths.poses(begun).reshape(-1, HORIZON_STEPS + 1, 3), ego, body)
+        states = track(paths.poses(reached_m).reshape(-1, HORIZON_STEPS + 1, 3), ego, body)
         judged = score_proposals(states, forecast, self._road, body)
         # Scores that differ by rounding alone are equal, and the lowest number wins.
         best = int(judged.scores.round(9).argmax())
@@ -120,11 +120,11 @@ class PdmClosed:
         if must_brake(float(judged.fault_s[best]), float(ego[SPEED])):
             return planning.Plan(poses=brake(ego, body), proposals=shown, braking=True)
         # All go on from 4 s to 8 s; the winner's way is what is driven.
-        ends = begun[..., -1]
-        goes_on, _ = self._roll_out(ends, speeds, targets, reaches_m, corridor, rest)
+        ends = reached_m[..., -1]
+        further_m, _ = self._roll_out(ends, speeds, targets, reaches_m, corridor, rest)
         path, policy = divmod(best, len(targets))
         # The last station of the first part is the first one of the second.
-        stations = np.concatenate([begun[path, policy], goes_on[path, policy, 1:]])
+        stations = np.concatenate([reached_m[path, policy], further_m[path, policy, 1:]])
         return planning.Plan(poses=paths.paths[path].poses(stations), proposals=shown)
 
     def _see(self, situation: planning.Situation) -> Objects:

@@ -23,7 +23,7 @@ from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
 from augment.prompts.blocks import names_changes, refuses
 from augment.prompts.calls import Tools, WrittenCall, call_form, calls_in, read_arguments
-from augment.prompts.fill import Form, Messages
+from augment.prompts.fill import Messages, PromptOptions
 from augment.prompts.reply import ReadReply, block_schema, read_intent, read_reply
 from augment.prompts.vectors import changes_text
 from augment.scene.entities import Modification, Scene
@@ -84,14 +84,14 @@ class EditTask:
         scene: The scene before the change.
         instruction: The user's wish in natural language; of a follow-up all wishes so far.
         intent: What a geometric review holds modifications against, where that is stored.
-        begun: The modifier's conversation up to the wish that it is to meet now; by default it is
+        conversation: What was said up to the wish that it is to meet now; by default it is
             given its task.
     """
 
     scene: Scene
     instruction: str
     intent: Intent | None = None
-    begun: Messages = ()
+    conversation: Messages = ()
 
 
 def run(recipe: Recipe, task: EditTask, respondents: Respondents) -> Outcome:
@@ -133,9 +133,9 @@ def ask_for_intent(
     )
 
 
-def modifier_form(recipe: Recipe, *, native_tools: bool = False) -> Form:
-    """Return the form in which a recipe's modifier gets its task."""
-    return Form(
+def modifier_options(recipe: Recipe, *, native_tools: bool = False) -> PromptOptions:
+    """Return the options of a recipe's prompt for the modifier."""
+    return PromptOptions(
         lanes=recipe.lane_format,
         tools=recipe.tools,
         is_native=native_tools and recipe.tools is not Tools.NONE,
@@ -180,7 +180,7 @@ class _Work:
         except ModelRefused as refused:
             return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
         # After a follow-up an empty block may also take back what was placed before.
-        changes_nothing = best.read.modification.is_empty and not self.task.begun
+        changes_nothing = best.read.modification.is_empty and not self.task.conversation
         if best.read.is_refusal or changes_nothing:
             return Outcome(status=OutcomeStatus.REFUSED, reason=best.read.notes or LEFT_ALONE)
         return Outcome(
@@ -200,15 +200,15 @@ class _Work:
         """
         note = self.respondents.transcript.note
         native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
-        form = modifier_form(self.recipe, native_tools=native)
-        messages = self.task.begun or fill.modifier_messages(
-            self.task.scene, self.task.instruction, form
+        options = modifier_options(self.recipe, native_tools=native)
+        messages = self.task.conversation or fill.modifier_messages(
+            self.task.scene, self.task.instruction, options
         )
         rounds: list[_Round] = []
         while True:
             number, fault = len(rounds) + 1, ""
             try:
-                read, messages = self._draft(messages, form)
+                read, messages = self._draft(messages, options)
             except (ReplyUnreadable, ModelRefused) as unusable:
                 if not rounds:
                     raise
@@ -228,11 +228,11 @@ class _Work:
             )
         return self._choose_round(rounds, fault)
 
-    def _draft(self, messages: Messages, form: Form) -> tuple[ReadReply, Messages]:
+    def _draft(self, messages: Messages, options: PromptOptions) -> tuple[ReadReply, Messages]:
         """Return one answer, read, and the conversation up to and including it."""
         reply = None
-        if form.tools is not Tools.NONE:
-            messages, reply = self._ask_with_tool(messages, form)
+        if options.tools is not Tools.NONE:
+            messages, reply = self._ask_with_tool(messages, options)
         scene, radius_m = self.task.scene, self.recipe.limits.radius_m
         schema, sections = None, ""
         if self.recipe.limits.block is BlockForm.SCHEMA:
@@ -245,33 +245,33 @@ class _Work:
             messages,
             partial(read_reply, scene=scene, radius_m=radius_m, sections=sections),
             again=fill.re_ask_messages,
-            tools=fill.list_native_tools(form),
+            tools=fill.list_native_tools(options),
             reply=reply,
             schema=schema,
         )
         return read, (*asked_messages, fill.model_message(answer.text))
 
-    def _ask_with_tool(self, messages: Messages, form: Form) -> tuple[Messages, Reply]:
+    def _ask_with_tool(self, messages: Messages, options: PromptOptions) -> tuple[Messages, Reply]:
         """Return the conversation with all calls and their results, and the reply without calls.
 
         A model that goes on calling when its calls are used up gets no more results: what it
         said is its answer then.
         """
-        desk = _ToolDesk(
-            name=form.tools,
-            tool=_TOOLS[form.tools](self.task.scene, form.radius_m),
+        calls = _ToolCalls(
+            name=options.tools,
+            tool=_TOOLS[options.tools](self.task.scene, options.radius_m),
             limits=self.recipe.limits,
             transcript=self.respondents.transcript,
         )
         while True:
-            is_over = desk.is_over
+            is_over = calls.is_over
             reply = self.respondents.ask(
                 ModelRole.MODIFIER,
                 messages,
-                tools=fill.list_native_tools(form),
+                tools=fill.list_native_tools(options),
                 tool_choice=ToolChoice.NONE if is_over else ToolChoice.AUTO,
             )
-            turns = () if is_over else desk.turns(reply, native=form.is_native)
+            turns = () if is_over else calls.turns(reply, native=options.is_native)
             if not turns:
                 return messages, reply
             messages += turns
@@ -329,7 +329,7 @@ class _Work:
 
 
 @dataclass(slots=True, kw_only=True)
-class _ToolDesk:
+class _ToolCalls:
     """Answers the calls of one round and keeps count.
 
     Calls come in two forms: a line of JSON in the answer (for every model, as the paper

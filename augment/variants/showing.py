@@ -14,7 +14,7 @@ from augment.llm.messages import Message
 from augment.prompts import fill
 from augment.prompts.calls import Tools
 from augment.scene.entities import Modification, Scene
-from augment.variants.pipeline import modifier_form
+from augment.variants.pipeline import modifier_options
 from augment.variants.recipes import Recipe
 from augment.variants.respondents import ModelRole
 from augment.variants.reviews import BlockForm, pictures
@@ -84,10 +84,12 @@ def build_prompt(
         native_tools: Whether the modifier calls natively.
     """
     if role is ModelRole.MODIFIER:
-        form = modifier_form(recipe, native_tools=native_tools)
+        options = modifier_options(recipe, native_tools=native_tools)
         return ShownPrompt(
-            messages=fill.modifier_messages(scene, instruction, form),
-            tools=tuple(json.dumps(tool.to_document()) for tool in fill.list_native_tools(form)),
+            messages=fill.modifier_messages(scene, instruction, options),
+            tools=tuple(
+                json.dumps(tool.to_document()) for tool in fill.list_native_tools(options)
+            ),
         )
     if role is ModelRole.VIEWER:
         images = pictures(scene, modification, width_px=recipe.limits.picture_px)

@@ -17,7 +17,7 @@ from augment.prompts.fill import (
 from augment.prompts.vectors import LaneFormat
 from augment.scene.entities import Modification
 from augment.scene.planned_motion import LanePath, NearEgo, PlannedMotion
-from augment.variants.pipeline import modifier_form
+from augment.variants.pipeline import modifier_options
 from augment.variants.recipes import RECIPES, VQA
 from augment.variants.respondents import ModelRole
 from augment.variants.showing import ShownPrompt, build_prompt
@@ -82,8 +82,8 @@ def between() -> str:
 
 def test_every_recipe_shows_one_of_these_prompts() -> None:
     for one in RECIPES.values():
-        form = modifier_form(one)
-        assert (form.lanes is LaneFormat.BEZIER) is (form.tools is not Tools.NONE)
+        options = modifier_options(one)
+        assert (options.lanes is LaneFormat.BEZIER) is (options.tools is not Tools.NONE)
         if one.review is VQA.review:
             (_, task) = viewer_messages(["a?", "b?", "c?"], [b"one", b"two"])
             assert task.images == (b"one", b"two")

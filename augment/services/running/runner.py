@@ -241,9 +241,11 @@ def _ask(
 def _ask_model(
     row: Augmentation, loaded: LoadedScenario, held: Held, connect: Connect | None
 ) -> Outcome:
-    begun: Messages = ()
+    conversation: Messages = ()
     if row.scenario.follows_id is not None:
-        begun = follow_up_messages(read_conversation_until(row.follows), row.scenario.instruction)
+        conversation = follow_up_messages(
+            read_conversation_until(row.follows), row.scenario.instruction
+        )
     respondents = read_respondents(row.contestant)
     treatment = read_treatment(row.contestant, respondents)
     options = treatment.options
@@ -270,7 +272,7 @@ def _ask_model(
                 scene=loaded.scene,
                 instruction=row.scenario.wording,
                 intent=loaded.intent,
-                begun=begun,
+                conversation=conversation,
             ),
             Respondents(
                 clients=playing,
