@@ -157,8 +157,9 @@ def refuses(answer: str) -> bool:
     text = without_thoughts(answer).strip()
     rest = _NOTHING.sub("", text)
     is_short = len(text) <= _LONGEST_REFUSAL
-    says_so = (says("declines", text) or says("unmet", text)) and not says("placed", text)
-    return "{" not in rest.replace("{}", "") and (rest != text or (is_short and says_so))
+    is_refusal = is_short and (says("declines", text) or says("unmet", text))
+    says_so = is_refusal and not says("placed", text)
+    return "{" not in rest.replace("{}", "") and (rest != text or says_so)
 
 
 def only_thinks(answer: str) -> bool:
