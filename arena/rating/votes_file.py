@@ -226,7 +226,7 @@ def _decode(content: bytes) -> tuple[str, str]:
 
 
 def _decode_latin_1(fault: UnicodeError) -> tuple[str, int]:
-    """Return what a sequence that is not UTF-8 says in Latin-1, and where it ends."""
+    """Decode a sequence that is not UTF-8; return its text and where it ends."""
     assert isinstance(fault, UnicodeDecodeError)
     return fault.object[fault.start : fault.end].decode("cp1252"), fault.end
 
