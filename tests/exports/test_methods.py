@@ -41,6 +41,7 @@ def test_a_sheet_says_what_is_known_and_marks_the_rest() -> None:
     assert answers["4.3.7"] == "Which image carries out the instruction better?"
     assert "Of 2 hidden repeats a share of 0.00" in answers["4.3.11"]
     assert set(sheet["blank"]) >= {"1.1", "3.2.2", "3.2.3", "5.1"}
+    assert list(sheet["versions"]) == sorted(sheet["versions"])
     assert all((answers[number] is None) == (number in sheet["blank"]) for number in answers)
     text = exported("latex")
     assert "Counted: 8 votes; left out: 2 hidden repeats." in text

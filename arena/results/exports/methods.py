@@ -97,7 +97,7 @@ def methods_json(methods: dict[str, Any]) -> bytes:
         "simulated": methods["simulated"],
     }
     blank = [line["number"] for line in questions if line["answer"] is None]
-    versions = methods["snapshot"].versions
+    versions = dict(sorted(methods["snapshot"].versions.items()))  # PostgreSQL has its own order
     return json_bytes(head | {"questions": questions, "blank": blank, "versions": versions})
 
 
