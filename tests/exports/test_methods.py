@@ -11,9 +11,10 @@ from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study, preregistration_sha256
 from arena.studies.services.taking_part import hand_over
-from augment.models import Scenario
+from augment.models import Contestant, Scenario
 from tests.board_rows import a_batch, a_board, newcomer, published, voted
-from tests.study_rows import a_study, expert, matchups_of, shown_again, vote
+from tests.opening import open_study
+from tests.study_rows import a_study, cast_of, expert, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -76,3 +77,10 @@ def test_the_plan_tells_of_newcomers_and_of_what_came_later() -> None:
     assert "compared 4 contestants on 5 scenarios" in text
     assert "each of 2 accounts, each with dot; 18 more were planned later" in text
     assert "left out: 6 not asked for." in text
+
+
+def test_contestants_that_are_simulated_make_no_simulated_evaluators() -> None:
+    cast = cast_of(kind=Contestant.Kind.SIMULATED)
+    study = open_study(name="Round 1", votes_per_expert=4, seed=1, allow_simulated=True, **cast)
+    rate(study=voted(study), rounds=100)
+    assert "2 evaluators compared 3 contestants (3 simulated) on" in exported("latex")

@@ -22,7 +22,7 @@ from arena.rating.lines import count_text, votes_text
 from arena.rating.rules import Unit
 from arena.rating.snapshot_document import Trust
 from arena.results.exports.tables import method_text
-from arena.results.queries.votes import REASONS, Filters
+from arena.results.queries.votes import REASONS, Filters, select_counted_votes
 from arena.studies.services.opening import preregistration_sha256
 from augment.errors import Conflict
 
@@ -58,7 +58,9 @@ def read_methods(snapshot: Snapshot) -> dict[str, Any]:
         "snapshot": snapshot,
         "board": snapshot.results.board,
         "simulated": snapshot.includes_simulated,
+        "made_up": select_counted_votes(snapshot).filter(is_simulated=True).exists(),
         "contestants": len(frozen["contestants"]),
+        "made_up_contestants": sum(row.is_simulated for row in study.contestants.all()),
         "scenarios": snapshot.results.board.scenarios or len(frozen["scenarios"]),
         "languages": [
             LANG_INFO.get(code, {}).get("name", code)
