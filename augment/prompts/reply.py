@@ -45,6 +45,7 @@ _MOST_PROBLEMS = 8
 _HEADS = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
 
 _LISTS = frozenset({"add", "move", "remove"})
+_ASKED = frozenset({"requests", "moves", "removals", "purpose"})
 _BY_SCHEMA = _LISTS | {"block", "unchanged"}
 _TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 
@@ -381,9 +382,8 @@ def read_intent(answer: str) -> Intent:
     Raises:
         ReplyUnreadable: There is no block, or it breaks the schema or contradicts itself.
     """
-    document, _ = last_object(answer, frozenset({"requests"}))
-    asks = any(document.get(name) for name in ("requests", "moves", "removals"))
-    if not asks and document.get("beyond"):
+    document, _ = last_object(answer, _ASKED | {"beyond"})
+    if document.get("beyond") and not any(document.get(name) for name in _ASKED):
         document = {**document, "unmet": NOTHING_TO_PLACE}
     try:
         return intent_from_parts(document)

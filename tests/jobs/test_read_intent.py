@@ -56,8 +56,23 @@ def test_what_was_read_waits_and_counts_once_it_is_accepted() -> None:
         accept_reading(scenario="street")
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"removals": [{"kind": "bus"}]},
+        {"moves": [{"who": {"kind": "bus"}, "speed_mps": 2, "spot": {"relation": "ahead"}}]},
+        {"purpose": {"passage": {"low_m": 3}}, "beyond": ["make it rain"]},
+    ],
+)
+def test_a_wish_that_adds_nothing_is_read_without_requests(said: dict[str, object]) -> None:
+    made = reading(json.dumps(said))
+    assert made.state == State.READ
+    assert made.document is not None
+    assert "unmet" not in made.document
+
+
 def test_a_wish_for_nothing_that_can_be_placed_is_read_so() -> None:
-    made = reading('{"requests": [], "beyond": ["make it look nicer"]}')
+    made = reading('{"beyond": ["make it look nicer"]}')
     assert (made.state, made.document and made.document["unmet"]) == (
         State.READ,
         "it asks for nothing that can be placed",
