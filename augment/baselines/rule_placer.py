@@ -91,7 +91,8 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
             if agent_before.id != agent.id
         )
         fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
-        moved, sentence = fitting.fit(_as_request(move, agent), agent if move.stays else None)
+        stays = move.stays and move.motion is not None
+        moved, sentence = fitting.fit(_as_request(move, agent), agent if stays else None)
         same = {name: getattr(agent, name) for name in ("id", "type", "length_m", "width_m")}
         changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
         sentences.append(f"{agent.id} is moved. {sentence}")

@@ -31,16 +31,17 @@ DOOR = Bounds(0.5, 1.2, 0.3)
 
 
 def check_course(case: Case) -> Iterator[Finding]:
-    """Check the requested motion: its start, its course and its numbers."""
+    """Check who is to stay, and the requested motion: its start, its course and its numbers."""
     before = {agent.id: agent for agent in case.route.scene.agents}
     for party in case.parties:
         wish: MotionWish | None = getattr(party.request, "motion", None)
-        for agent in map(walk_as_motion, party.agents if wish is not None else ()):
-            assert wish is not None
+        for agent in map(walk_as_motion, party.agents):
             if agent.id in before and party.request.spot == Spot():
                 off_m, wanted = apart_m(agent, before[agent.id]), case.tolerances.distance_m
                 words = f"{{agents[0]}} is {off_m:.2f} m from where it was and is to stay."
                 yield find(FindingKind.ASKED_DISTANCE, off_m <= wanted, [agent], words, off=off_m)
+            if wish is None:
+                continue
             # Who drives goes on as its scene has it.
             motion = agent.motion or (planned.PlannedMotion() if agent.speed_mps > 0.0 else None)
             if motion is None:

@@ -6,6 +6,7 @@ from itertools import combinations
 
 from augment.checks.bodies import end_of_walk, name_type
 from augment.checks.finding import Finding, FindingKind, find
+from augment.checks.lanes_across import Band, LanePlace, find_place
 from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Bounds, Case, apart_m, hold
 from augment.geometry.frames import difference
 from augment.scene.entities import STOPPED_BELOW_MPS, TrafficAgent
@@ -84,7 +85,7 @@ def check_heading(case: Case) -> Iterator[Finding]:
     """
     for party in case.parties:
         request = party.request
-        if not isinstance(request, VehicleRequest) or request.spot.lane is None:
+        if not isinstance(request, VehicleRequest):
             continue
         if request.body in _NO_FRONT and request.facing is None:
             continue
@@ -92,7 +93,11 @@ def check_heading(case: Case) -> Iterator[Finding]:
         wanted_deg = _FACING_DEG[facing] + request.turn_deg
         wanted = Bounds(wanted_deg, wanted_deg, case.tolerances.heading_deg)
         for agent in party.agents:
-            band = case.lanes.band(request.spot.lane, case.ahead_m(agent))
+            band: Band | LanePlace | None = None
+            if request.spot.lane is not None:
+                band = case.lanes.band(request.spot.lane, case.ahead_m(agent))
+            elif request.facing and agent in case.modification.moved:
+                band = find_place(case.lanes, (agent.x_m, agent.y_m))
             if band is None:
                 continue
             turn_rad = agent.heading_rad - band.tangent_rad
@@ -161,7 +166,9 @@ def _crossing(case: Case, agent: TrafficAgent, request: WalkRequest) -> Finding:
         kind, reason = FindingKind.ASKED_HEADING, "it looks or walks away from there"
     else:
         kind, reason = FindingKind.ASKED_CROSSING, "its walk ends elsewhere"
-    fits = kind is FindingKind.ASKED_CROSSING and to_m < 0.0 and from_m > -_ON_ROAD_M
+    # Where it ends is checked by itself where that is said.
+    ends = to_m < 0.0 or request.end is not None
+    fits = kind is FindingKind.ASKED_CROSSING and ends and from_m > -_ON_ROAD_M
     if fits and end and request.end is None and (agent.walk_to_m or agent.motion):
         # Over the lanes side by side, metre by metre, up to a step past where the walk ends.
         ahead_m, past_m = case.route.locate(*end).ahead_m, _ON_ROAD_M - to_m

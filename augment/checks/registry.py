@@ -114,7 +114,8 @@ def _drop_answered(
     placed = set(answering)
     for party in case.parties:
         placed.update(agent.id for agent, _ in party.mistyped)
-        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None:
+        request = party.request
+        if not isinstance(request, VehicleRequest) or request.spot.lane or request.facing:
             answering.update(agent.id for agent in party.everyone)
     for finding in findings:
         if finding.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE):

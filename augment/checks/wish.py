@@ -212,8 +212,8 @@ class _Fitting:
         self, request: wish.VehicleRequest, agents: Sequence[TrafficAgent]
     ) -> list[Point]:
         points = [(agent.x_m, agent.y_m) for agent in agents]
-        if request.spot == wish.Spot() and request.motion is not None:
-            return [self._place_mover(request, agent) for agent in agents]
+        if request.spot == wish.Spot() and request.spacing is None:
+            return [self._place_open(request, agent) for agent in agents]
         # The spot is that of the first along the lane.
         first = min(range(len(agents)), key=lambda index: self._ahead_m(agents[index]))
         place = Place.of(request.spot, self._lanes, agents[first].width_m)
@@ -253,18 +253,15 @@ class _Fitting:
         best = min(tries, key=lambda tried: float(np.hypot(*(tried - points).T).sum()))
         return [(x_m, y_m) for x_m, y_m in best.tolist()]
 
-    def _place_mover(self, request: wish.VehicleRequest, agent: TrafficAgent) -> Point:
-        """Return where one belongs of whom only a motion is asked: where he was, or an arm."""
-        before = {agent.id: agent for agent in self._lanes.route.scene.agents}.get(agent.id)
-        if before is not None:
-            return before.x_m, before.y_m
-        here = (agent.x_m, agent.y_m)
-        assert request.motion is not None
-        if request.motion.preset is not MotionPreset.RED_LIGHT:
+    def _place_open(self, request: wish.VehicleRequest, agent: TrafficAgent) -> Point:
+        """Return where one belongs of whom no place is said: where he is or was, or an arm."""
+        before, motion = {one.id: one for one in self._lanes.route.scene.agents}, request.motion
+        here = before.get(agent.id, agent).pose.beside(0.0)
+        if agent.id in before or motion is None or motion.preset is not MotionPreset.RED_LIGHT:
             return here
         graph, reach_m = self._lanes.route.graph, _WAITS_M if request.speed_mps == 0.0 else _ARM_M
         pieces = []
-        for arm in list_arms(self._lanes, request.motion.side):
+        for arm in list_arms(self._lanes, motion.side):
             lane = graph.lane(arm.lane_id)
             places = (
                 graph.along(arm.lane_id, lane.centerline.length_m, -before_m)

@@ -420,8 +420,8 @@ class Move:
     """A road user of the scene that is to stand or drive elsewhere, or to move otherwise.
 
     Attributes:
-        spot: Where it belongs; the sides and distances are as for what is added. Where only its
-            motion is another one it is open, and it stays.
+        spot: Where it belongs; the sides and distances are as for what is added. Where it is open
+            the road user stays.
         speed_mps: None where it keeps its speed.
     """
 
@@ -445,20 +445,14 @@ class Move:
 
     @property
     def stays(self) -> bool:
-        """True if it stays at its place and only its motion changes."""
-        return self.motion is not None and self.spot == Spot()
+        """True if it stays at its place and only its heading, speed or motion changes."""
+        return self.spot == Spot()
 
     @property
     def vehicle_request(self) -> VehicleRequest:
         """The same as a request for one vehicle."""
-        return VehicleRequest(
-            spot=self.spot,
-            facing=self.facing,
-            turn_deg=self.turn_deg,
-            speed_mps=self.speed_mps,
-            count=1,
-            motion=self.motion,
-        )
+        same = ("spot", "facing", "turn_deg", "speed_mps", "motion")
+        return VehicleRequest(count=1, **{name: getattr(self, name) for name in same})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

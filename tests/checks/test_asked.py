@@ -79,6 +79,7 @@ def faults(
         (FILE, IN_FILE),
         (WALK, (pedestrian("Agent2", 20.0, 6.0, (20.0, -0.9)),)),  # the road ends 0.85 m on
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (28.0, -3.0)),)),
+        (walk(20.0, wish.Side.LEFT, end=CENTRED), (pedestrian("Agent2", 20.0, 6.0, (20.0, 0.3)),)),
         (NARROWED, TAPER),
         *((CLOSED, (A_BAR,)), (CLOSED, (replace(A_BAR, heading_rad=math.pi),))),
     ],

@@ -7,6 +7,7 @@ import pytest
 
 from augment.checks import Ground
 from augment.checks.lanes_across import LanesAcross, find_mark, find_picked, resolve_spots
+from augment.checks.wish import measure_wish
 from augment.checks.wish_places import list_absent
 from augment.scene import intent as wish
 from augment.scene.entities import Modification, TurnType
@@ -100,6 +101,20 @@ def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
     assert faults(intent, Modification()) == [f"{car.id} is to be moved and is not."]
     elsewhere = faults(intent, Modification(moved=(right, other)))
     assert f"{other.id} is moved; nobody asked for that." in elsewhere
+
+
+def test_who_is_only_turned_and_slowed_down_stays() -> None:
+    cyclist = wish.Pick(kind=wish.Sight.BICYCLE, lane=wish.LaneChoice.ONCOMING)
+    back = wish.Move(who=cyclist, facing=wish.Facing.AGAINST_LANE, speed_mps=2.0)
+    intent = wish.Intent(moves=(back,))
+    (rider,) = find_picked(lanes_of("terrace-row"), cyclist)
+    right = replace(rider, heading_rad=0.0, speed_mps=2.0)
+    far = replace(right, x_m=right.x_m - 10.0)
+    assert faults(intent, Modification(moved=(right,))) == []
+    for wrong, words in ((far, "and is to stay"), (replace(right, heading_rad=3.1), "; 180 deg")):
+        assert any(words in one for one in faults(intent, Modification(moved=(wrong,))))
+    off = measure_wish(Ground.of(LANDMARK_STREET), Modification(moved=(far,)), intent)
+    assert off.distances_m == pytest.approx([10.0])
 
 
 def test_who_is_to_go_has_to_go_and_nobody_else() -> None:
