@@ -23,7 +23,7 @@ from augment.scene.intent import Intent, IntentOrigin, Purpose
 from augment.scene.intent_parts import Amount
 from augment.services.driving import driving_scores, simulations
 from augment.services.driving.simulations import DRIVES, Options
-from augment.services.judging.displacement import MissingReason, of_augmentation
+from augment.services.judging.displacement import MissingReason, of_rows
 from augment.services.judging.findings import FindingKind, check_augmentation, read_findings
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
@@ -133,7 +133,7 @@ def test_an_open_wish_about_driving_is_held_against_the_drives() -> None:
         assert words == [
             "The hardest braking required of idm is 9.50 m/s²; 3 to 8 m/s² is asked for."
         ]
-    assert of_augmentation(row).why_not is MissingReason.OPEN_WISH
+    assert of_rows([row.pk])[0].why_not is MissingReason.OPEN_WISH
     sheet = augmentation_sheet(job)
     assert list(sheet.columns)[-2:] == ["purpose_served", "purpose_measured"]
     assert [row[-2:] for row in sheet.rows] == [(False, words[0])]

@@ -20,7 +20,7 @@ from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import LanePath, PlannedMotion
-from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.displacement import of_rows
 from augment.services.judging.findings import check_augmentation, check_edit
 from augment.services.running import follow_ups, runner
 from augment.services.scenarios.editing import editor_document
@@ -227,7 +227,7 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     assert made.job.state == "finished"
     assert default_storage.exists(made.image)
     assert made.image != first.image
-    checked, measured = check_augmentation(made), of_augmentation(made)
+    checked, measured = check_augmentation(made), of_rows([made.pk])[0]
     assert checked.findings
     assert len(measured.displacement.matches) == 1
     assert Augmentation.objects.filter(pk=first.pk).values().get() == before

@@ -16,7 +16,7 @@ from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
 from augment.services import read_request, running, scenarios, to_inputs
 from augment.services.judging import check_augmentation
-from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.displacement import of_rows
 from augment.services.running.calls import IMAGES
 from augment.tasks import enqueue_augmentation
 
@@ -45,7 +45,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "corrections": augmentation.corrections.select_related("contestant", "made_by"),
         "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
         "nuplan_results": augmentation.nuplan_results.all(),
-        "measured": of_augmentation(augmentation),
+        "measured": of_rows([augmentation.pk])[0],
         "checked": checked,
         "tries": tries,
         "asking": show_options(augmentation.contestant, augmentation.options),

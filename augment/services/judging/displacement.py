@@ -117,11 +117,6 @@ def of_rows(ids: Collection[int]) -> list[MeasuredRow]:
     return _measure(_rows().defer("modification").filter(pk__in=ids))
 
 
-def of_augmentation(row: Augmentation) -> MeasuredRow:
-    """Measure one row whose scenario is loaded, or take what is stored."""
-    return _measure([row])[0]
-
-
 def groups(measured: Iterable[MeasuredRow], *, by: By) -> list[Group]:
     """Sum up what was measured: by type in the catalogue's order, else by name.
 

@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Case, Exists, F, OuterRef, QuerySet, Value, When
-from django.utils import timezone
 
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
@@ -138,10 +137,9 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
         Conflict: The job is over already.
     """
     before = job.state
-    now = timezone.now()
     waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
-    cancelled = change_all(waiting, state=State.CANCELLED, finished_at=now)
-    _move(job, OPEN, JobState.CANCELLED, "cancelled", finished_at=now)
+    cancelled = change_all(waiting, state=State.CANCELLED, finished_at=DATABASE_TIME)
+    _move(job, OPEN, JobState.CANCELLED, "cancelled", finished_at=DATABASE_TIME)
     after = {"state": JobState.CANCELLED.value, "cancelled": cancelled}
     _log(job, "cancel", actor, before={"state": before}, after=after)
     return job
