@@ -281,11 +281,8 @@ def _as_request(move: intents.Move, agent: TrafficAgent) -> intents.Request:
     """Return a road user's move as the placement of a new one."""
     if move.stays and agent.type is AgentType.PEDESTRIAN:
         return intents.WalkRequest(count=1, motion=move.motion)
-    return replace(
-        move.vehicle_request,
-        body=intents.Body.__members__.get(agent.type.name, intents.Body.VEHICLE),
-        speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
-    )
+    speed_mps = agent.speed_mps if move.speed_mps is None else move.speed_mps
+    return replace(move.as_request(agent.type), speed_mps=speed_mps)
 
 
 def _make_car(

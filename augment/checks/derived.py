@@ -97,7 +97,7 @@ def describe_change(
         agent.id
         for agent in change.changed
         if (agent.motion and agent.id not in wishes)
-        or (agent.walk_to_m and not _crosses(agent, lanes))
+        or (agent.walk_to_m and (agent in change.moved or not _crosses(agent, lanes)))
     ]
     return sentence, wish.Intent(
         requests=requests,
@@ -136,6 +136,8 @@ def _find_ends(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, Lane
     end = end_of_walk(agent) or here
     # Both ends by one lane: each by its own would have them on different ways.
     via = find_place(lanes, ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)).via
+    if agent.motion is not None:
+        via = None  # who starts late does so in the ego's way
     return find_place_along(lanes, via, here), find_place_along(lanes, via, end)
 
 
@@ -328,6 +330,7 @@ def _sentence(
     before = {agent.id: agent for agent in scene.agents}
     for agent in change.moved:
         where = f"move {_who(agent.id, picks)} to {_where(agent, lanes)}"
+        where += _course(agent, before[agent.id].speed_mps, lanes)
         if agent.id in wishes and _stays(agent, before[agent.id]):
             where = f"keep {_who(agent.id, picks)} where it is"
         parts.append(where + _then(agent, wishes))
@@ -364,26 +367,38 @@ def _who(name: str, picks: Mapping[str, wish.Pick]) -> str:
 def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | None) -> str:
     here = _where(agent, lanes)
     if agent.type is AgentType.PEDESTRIAN:
-        if agent.walk_to_m is not None:
-            there = replace(agent, x_m=agent.walk_to_m[0], y_m=agent.walk_to_m[1])
-            ends = [here, _where(there, lanes)]
+        if agent.walk_to_m or agent.motion:
+            ends = [here, _where(_at_end(agent), lanes)]
             if lanes is not None:
                 walk = _find_ends(agent, lanes)
                 ends = [_name_place(end, middle="in the middle of") for end in walk]
             return f"a pedestrian who walks from {ends[0]} to {ends[1]}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
-    what, drives = agent.type.lower().replace("_", " "), not agent.is_stopped
-    if agent.type in (AgentType.VEHICLE, AgentType.BUS) and not drives:
+    what = agent.type.lower().replace("_", " ")
+    if agent.type in (AgentType.VEHICLE, AgentType.BUS) and agent.is_stopped:
         what = f"{'crashed' if kind is ScenarioType.ACCIDENT_SITE else 'parked'} {what}"
-    pace = f", driving at {agent.speed_mps:.1f} m/s" if drives else ""
+    standing_mps = agent.speed_mps if agent.is_stopped else 0.0
+    return f"a {what} {here}{_course(agent, standing_mps, lanes)}"
+
+
+def _course(agent: TrafficAgent, before_mps: float, lanes: LanesAcross | None) -> str:
+    """How somebody is turned, its speed where it is another than before, and its walk."""
     base_rad = 0.0 if lanes is None else _find_place(agent, lanes).tangent_rad
     base = "the ego's direction" if lanes is None else "the lane's direction"
     degrees = math.degrees(difference(agent.heading_rad, base_rad))
-    turn = f"turned {abs(degrees):.0f} degrees to the {_side(degrees)} of {base}"
+    turn = f", turned {abs(degrees):.0f} degrees to the {_side(degrees)} of {base}"
     if abs(degrees) < _STRAIGHT_DEG:
-        turn = f"in {base}"
-    return f"a {what} {here}, {turn}{pace}"
+        turn = f", in {base}"
+    walk = f", walking to {_where(_at_end(agent), lanes)}" if agent.walk_to_m else ""
+    pace = f", driving at {agent.speed_mps:.1f} m/s" if agent.speed_mps else ", standing"
+    turn = "" if agent.type in _HEADLESS else turn
+    return turn + (pace if agent.speed_mps != before_mps else "") + walk
+
+
+def _at_end(agent: TrafficAgent) -> TrafficAgent:
+    x_m, y_m = end_of_walk(agent) or (agent.x_m, agent.y_m)
+    return replace(agent, x_m=x_m, y_m=y_m)
 
 
 def _where(agent: TrafficAgent, lanes: LanesAcross | None) -> str:
@@ -399,6 +414,10 @@ def _name_place(place: LanePlace, *, middle: str = "in") -> str:
     way = "its lane" if place.via is None else _name_way(place.route, place.via)
     lane = _LANES[place.lane].format(place.via or "the ego's lane")
     where = f"{_ahead(place.ahead_m)} the ego along {way}"
+    if place.route.lane_id == place.via:
+        # That way may lead back past the ego: what lies before the point may be ahead.
+        back = "along" if place.ahead_m >= 0.0 else "back along"
+        where = f"{abs(place.ahead_m):.1f} m {back} {place.via} from its point nearest to the ego"
     if abs(place.left_m) < _BESIDE_M:
         return f"{where}, {middle} {lane}"
     where = f"{where}, {'beside' if place.off_m else 'in'} {lane}"
@@ -409,8 +428,6 @@ def _name_place(place: LanePlace, *, middle: str = "in") -> str:
 
 def _name_way(route: EgoRoute, via: str) -> str:
     names = route.lane_ids
-    if route.lane_id == via:
-        return f"{via} from its point nearest to the ego"
     way = map(route.graph.lane, names[names.index(route.lane_id) : names.index(via) + 1])
     turns = [str(lane.turn_type) for lane in way if isinstance(lane, LaneConnector)]
     turns = [turn for turn in turns if turn != TurnType.STRAIGHT]

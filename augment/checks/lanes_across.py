@@ -187,7 +187,8 @@ def find_place(
     """
 
     def misfit(lane: Beside) -> tuple[float, float, float]:
-        turn_rad = difference(lane.tangent_rad, heading_rad or lane.tangent_rad)
+        wanted_rad = lane.tangent_rad if heading_rad is None else heading_rad
+        turn_rad = difference(lane.tangent_rad, wanted_rad)
         # Whole metres and steps of 15 degrees: less does not outweigh the next key.
         return round(lane.off_m), round(abs(turn_rad) / _ALIGNED_RAD), lane.distance_m
 

@@ -292,7 +292,7 @@ def assign_parties(
         keeps = move.motion is None and move.speed_mps is None
         speed_mps = agent.speed_mps if keeps else move.speed_mps
         if agent.id in moved:
-            request = replace(move.vehicle_request, speed_mps=speed_mps)
+            request = replace(move.as_request(agent.type), speed_mps=speed_mps)
             parties.append(Party(request=request, agents=(moved[agent.id],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     movable = {agent.id for _, agent in picked}

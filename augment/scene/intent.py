@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from augment.scene.entities import TurnType
+from augment.scene.entities import AgentType, TurnType
 from augment.scene.intent_parts import Amount as Amount
 from augment.scene.intent_parts import Length as Length
 from augment.scene.intent_parts import MapPlace as MapPlace
@@ -448,11 +448,11 @@ class Move:
         """True if it stays at its place and only its heading, speed or motion changes."""
         return self.spot == Spot()
 
-    @property
-    def vehicle_request(self) -> VehicleRequest:
-        """The same as a request for one vehicle."""
+    def as_request(self, kind: AgentType) -> VehicleRequest:
+        """Return the same as a request for one of a kind."""
+        body = Body.__members__.get(kind.name, Body.VEHICLE)
         same = ("spot", "facing", "turn_deg", "speed_mps", "motion")
-        return VehicleRequest(count=1, **{name: getattr(self, name) for name in same})
+        return VehicleRequest(body=body, count=1, **{name: getattr(self, name) for name in same})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """What a drawing asks for: the drawing itself has to answer it."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -27,12 +28,13 @@ from augment.scene.entities import (
 )
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.planned_motion import PlannedMotion
+from augment.scene.planned_motion import MotionPreset, PlannedMotion
+from augment.scene.presets import PresetNumbers, with_preset
 from tests.checks.test_asked_motions import WISHES
 from tests.checks.worlds import faults_against
 from tests.fixtures import shelf
 from tests.recorded import recorded_moments
-from tests.scenes import junction, pedestrian, scene, vehicle
+from tests.scenes import junction, lane, pedestrian, scene, vehicle
 
 PARKED = vehicle("Agent2", 20.0, -1.0)
 DRIVING = vehicle("Agent3", 40.0, 3.5, 3.14159, speed_mps=7.0)
@@ -149,9 +151,15 @@ def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
             "in the lane's direction, driving at 3.0 m/s",
             ("bicycle: 9 m ahead of the ego", "bicycle: moves at 3 m/s"),
         ),
-        (Modification(moved=(vehicle("Agent2", 30.0, 0.0),)),
-         "move the nearest parked vehicle ahead of the ego to 30.0 m ahead of the ego",
+        (Modification(moved=(vehicle("Agent2", 30.0, 0.0, 0.5, speed_mps=4.0),)),
+         "move the nearest parked vehicle ahead of the ego to 30.0 m ahead of the ego along its "
+         "lane, in the ego's lane, turned 29 degrees to the left of the lane's direction, driving "
+         "at 4.0 m/s.",
          ("parked vehicle 1 ahead of the ego: 30 m ahead of the ego",)),
+        (Modification(moved=(pedestrian("Agent4", 14.0, 0.0, (14.0, 5.0), heading_rad=0.9),)),
+         "move the nearest pedestrian ahead of the ego to 14.0 m ahead of the ego along its lane, "
+         "in the ego's lane, walking to 14.0 m ahead of the ego along its lane, in the oncoming",
+         ("not in any field: “the motion of Agent4”",)),
         (Modification(removed=("Agent3",)), "remove the nearest moving vehicle ahead of the ego",
          ("moving vehicle 1 ahead of the ego: goes",)),
     ],
@@ -159,11 +167,12 @@ def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
 def test_what_is_added_moved_and_removed_is_said(
     change: Modification, words: str, statements: tuple[str, ...]
 ) -> None:
-    here = scene(agents=(PARKED, DRIVING))
+    here = scene(agents=(PARKED, DRIVING, pedestrian("Agent4", 12.0, 6.0)))
     sentence, intent = describe_change(None, change, here)
     assert sentence.startswith("Change the scene: ")
     assert words in sentence
     assert set(statements) <= set(list_statements(intent))
+    assert not [one for one in faults_against(here, change, intent) if one.kind.startswith("asked")]
 
 
 def test_a_walk_from_the_middle_of_the_lane_begins_there_again() -> None:
@@ -181,6 +190,28 @@ def test_who_has_no_name_leaves_words_alone() -> None:
     sentence, intent = describe_change(None, change, here)
     assert "remove Agent3" in sentence
     assert intent is None
+
+
+def test_a_way_of_its_own_that_comes_back_is_not_behind_the_ego() -> None:
+    base = scene()
+    here = replace(base, lanes=(*base.lanes, lane("Lane9", [(80.0, 40.0), (-20.0, 40.0)])))
+    sentence, _ = describe_change(None, Modification(added=(vehicle("Added1", 30.0, 40.0),)), here)
+    assert "30.0 m back along Lane9 from its point nearest to the ego, in Lane9" in sentence
+
+
+def test_who_starts_late_crosses_the_egos_way_wherever_it_waits() -> None:
+    """It waits on a branch, and the middle of its walk is there too."""
+    here = replace(junction(), options=replace(junction().options, goal=TurnType.LEFT))
+    waits = with_preset(
+        MotionPreset.LATE_PEDESTRIAN,
+        here,
+        vehicle("Added1", 34.0, 0.0, type=AgentType.PEDESTRIAN),
+        PresetNumbers(),
+    )
+    change = Modification(added=(waits,))
+    sentence, intent = describe_change(None, change, here)
+    assert re.search("walks from .* along its lane, .* to .* along its lane", sentence)
+    assert not [one for one in faults_against(here, change, intent) if one.kind.startswith("asked")]
 
 
 def test_a_side_of_the_oncoming_lane_is_that_of_the_ego() -> None:
