@@ -264,7 +264,7 @@ class Reader(ABC):
         if path.suffix.lower() != self.suffix or not path.is_file():
             return False
         with path.open("rb") as file:
-            return self.marker in file.read(10_000)
+            return self.marker in file.read(10_000).replace(b"\0", b"")  # as in UTF-16
 
     @abstractmethod
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:

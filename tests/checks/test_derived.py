@@ -172,7 +172,9 @@ def test_what_is_added_moved_and_removed_is_said(
     assert sentence.startswith("Change the scene: ")
     assert words in sentence
     assert set(statements) <= set(list_statements(intent))
-    assert not [one for one in faults_against(here, change, intent) if one.kind.startswith("asked")]
+    assert not [
+        one for one in faults_against(here, change, intent) if one.kind.startswith("asked")
+    ]
 
 
 def test_a_walk_from_the_middle_of_the_lane_begins_there_again() -> None:
@@ -211,7 +213,9 @@ def test_who_starts_late_crosses_the_egos_way_wherever_it_waits() -> None:
     change = Modification(added=(waits,))
     sentence, intent = describe_change(None, change, here)
     assert re.search("walks from .* along its lane, .* to .* along its lane", sentence)
-    assert not [one for one in faults_against(here, change, intent) if one.kind.startswith("asked")]
+    assert not [
+        one for one in faults_against(here, change, intent) if one.kind.startswith("asked")
+    ]
 
 
 def test_a_side_of_the_oncoming_lane_is_that_of_the_ego() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from augment.errors import InvalidDocument
 from augment.formats.commonroad.scenario import ASSUMED, CommonRoad
+from augment.formats.readers import recognise
 from augment.formats.reading import Reading
 from augment.formats.road_map import NO_INTERSECTIONS
 from augment.scene.codec import scene_to_document
@@ -120,6 +121,14 @@ def test_a_namespace_of_the_root_changes_nothing(tmp_path: Path) -> None:
     reading = read(tmp_path, spaced)
     assert reading.scene == read(tmp_path, newer()).scene
     assert "first {urn:o}lanelet 9: unknown" in " ".join(reading.notes)
+
+
+def test_a_file_in_utf_16_is_recognised(tmp_path: Path) -> None:
+    file = tmp_path / "made.xml"
+    text = newer().replace('"1.0"', '"1.0" encoding="utf-16"')
+    file.write_text(text, encoding="utf-16")
+    utf_16 = recognise(file).read(file, item=None, frame=None, name="made")
+    assert utf_16.scene == read(tmp_path, newer()).scene
 
 
 def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def is_catalog(path: Path) -> bool:
     if not path.is_file():
         return False
     with path.open("rb") as file:
-        return _CATALOG in file.read(10_000)
+        return _CATALOG in file.read(10_000).replace(b"\0", b"")
 
 
 def _is_path(text: str) -> bool:
@@ -216,11 +216,8 @@ class ScenarioSource:
         name = element.get("name", "")
         place = f"entity {name[:40]}"
         reference = element.find("CatalogReference")
-        holder = element
-        if reference is not None:
-            holder = Element("ScenarioObject")
-            holder.append(self.resolve_reference(reference))
-        body = next((child for child in holder if child.tag in _KINDS), None)
+        bodies = [*element] if reference is None else [self.resolve_reference(reference)]
+        body = next((child for child in bodies if child.tag in _KINDS), None)
         if body is None:
             raise fault_at(place, f"needs one of {', '.join(_KINDS)} or a CatalogReference")
         category = body.get(_KINDS[body.tag], "") or body.tag.lower()
