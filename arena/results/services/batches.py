@@ -4,7 +4,6 @@ A batch is a study like every other. Its pairs are chosen by its seed before any
 each has a new contestant; the opponents are spread over the newest table.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from django.contrib.auth.models import User
@@ -78,10 +77,8 @@ def open_batch(board: Board, batch: BatchRequest, *, actor: User | None = None) 
         hypotheses=(),
         jobs=tuple(dict.fromkeys(job for plan in plans for job in plan.jobs)),
     )
-    jobs_of: dict[str, Sequence[str]] = {}
-    for plan in plans:
-        for slug in plan.contestants:
-            jobs_of.setdefault(slug, plan.jobs)
+    # The first plan with somebody counts.
+    jobs_of = {slug: plan.jobs for plan in reversed(plans) for slug in plan.contestants}
     study = open_study(study_plan, challengers=batch.newcomers, jobs_of=jobs_of, actor=actor)
     board.studies.add(study)
     require_poolable(board, but_open=True)

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
+from django.db.models import Q
 from django.utils import timezone
 
 from arena.errors import StudyStillOpen
@@ -318,8 +319,7 @@ def _count_attempts(contestant: Contestant | None) -> tuple[int | None, int | No
     own = Submission.objects.filter(contestant=contestant).first() if contestant else None
     if own is None:
         return None, None
-    sent = Submission.objects.filter(pk=own.pk)
-    if own.uploaded_by is not None:  # else nobody knows whose the others are
-        of_benchmark = Submission.objects.filter(benchmark__slug=own.benchmark.slug)
-        sent = of_benchmark.filter(uploaded_by=own.uploaded_by)
+    # Where no sender is known, nobody knows whose the others are.
+    others = Q(benchmark__slug=own.benchmark.slug, uploaded_by=own.uploaded_by or 0)
+    sent = Submission.objects.filter(Q(pk=own.pk) | others)
     return sent.count(), sent.filter(decision=Submission.Decision.WITHDRAWN).count()
