@@ -43,11 +43,7 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
     sides = {side for pair in waiting.values_list("left", "right") for side in pair}
     # Measured before the transaction: nobody else writes while it lasts.
-    errors_m = {
-        measured.row.pk: measured.displacement.error_m
-        for measured in of_rows(sides)
-        if measured.displacement is not None
-    }
+    errors_m = {row.row.pk: row.displacement.error_m for row in of_rows(sides) if row.displacement}
     with transaction.atomic():
         return _cast_all(study, waiting.select_related("expert__person"), errors_m, seed)
 
