@@ -134,10 +134,10 @@ def _find_ends(agent: TrafficAgent, lanes: LanesAcross) -> tuple[LanePlace, Lane
     """Return where a walk begins and ends along the lane in its middle."""
     here = (agent.x_m, agent.y_m)
     end = end_of_walk(agent) or here
-    # Both ends by one lane: each by its own would have them on different ways.
-    via = find_place(lanes, ((here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0)).via
-    if agent.motion is not None:
-        via = None  # who starts late does so in the ego's way
+    # Both ends by one lane: each by its own would have them on different ways. Who starts late
+    # does so in the ego's way.
+    middle = (here[0] + end[0]) / 2.0, (here[1] + end[1]) / 2.0
+    via = None if agent.motion else find_place(lanes, middle).via
     return find_place_along(lanes, via, here), find_place_along(lanes, via, end)
 
 
@@ -336,9 +336,8 @@ def _sentence(
         parts.append(where + _then(agent, wishes))
     parts += [f"remove {_who(name, picks)}" for name in change.removed]
     goal = scene.options.goal
-    way = "" if goal is None else f" The ego is to turn {goal}."
-    if goal is TurnType.STRAIGHT:
-        way = " The ego is to go straight on."
+    turn = "go straight on" if goal is TurnType.STRAIGHT else f"turn {goal}"
+    way = f" The ego is to {turn}." if goal else ""
     lead = "Change the scene" if kind is None else _LEADS[kind]
     if kind is ScenarioType.JAYWALKER and not any(
         agent.id in wishes or (agent.walk_to_m if lanes is None else _crosses(agent, lanes))
@@ -368,10 +367,9 @@ def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | 
     here = _where(agent, lanes)
     if agent.type is AgentType.PEDESTRIAN:
         if agent.walk_to_m or agent.motion:
-            ends = [here, _where(_at_end(agent), lanes)]
-            if lanes is not None:
-                walk = _find_ends(agent, lanes)
-                ends = [_name_place(end, middle="in the middle of") for end in walk]
+            walk = _find_ends(agent, lanes) if lanes else ()
+            ends = [_name_place(end, middle="in the middle of") for end in walk]
+            ends = ends or [here, _where(_at_end(agent), lanes)]
             return f"a pedestrian who walks from {ends[0]} to {ends[1]}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"

@@ -16,7 +16,7 @@ from augment.checks.parties import Bounds, Case, hold
 from augment.geometry.frames import Pose, corners
 from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import AgentType
 from augment.scene.intent_parts import Amount, Purpose
 from augment.scene.motion import Motion, Movement
 
@@ -116,7 +116,8 @@ def measure_passage(situation: ChangedScene) -> float:
     standing = [
         shapely.Polygon(situation.boxes[agent.id].corners_m)
         for agent in situation.everyone
-        if agent.type is not AgentType.EGO_VEHICLE and _stays(agent)
+        if agent.type is not AgentType.EGO_VEHICLE
+        and (agent.is_stopped and agent.motion is None and agent.walk_to_m is None)
     ]
     free = shapely.difference(road, shapely.union_all(standing))
     begin = shapely.Point(situation.ground.scene.ego.x_m, situation.ground.scene.ego.y_m)
@@ -139,10 +140,6 @@ def measure_passage(situation: ChangedScene) -> float:
 
 
 # Private
-
-
-def _stays(agent: TrafficAgent) -> bool:
-    return agent.is_stopped and agent.motion is None and agent.walk_to_m is None
 
 
 def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:

@@ -201,6 +201,16 @@ def test_a_way_of_its_own_that_comes_back_is_not_behind_the_ego() -> None:
     assert "30.0 m back along Lane9 from its point nearest to the ego, in Lane9" in sentence
 
 
+def test_of_crossing_lanes_a_heading_of_zero_tells_which_is_meant() -> None:
+    base, ends = (
+        scene(),
+        {"Lane8": [(30.0, 20.0), (30.0, 60.0)], "Lane9": [(0.0, 40.0), (60.0, 40.0)]},
+    )
+    here = replace(base, lanes=(*base.lanes, *(lane(name, line) for name, line in ends.items())))
+    change = Modification(added=(vehicle("Added1", 30.2, 40.8, 0.0),))
+    assert "in Lane9, 0.8 m left of its centre" in describe_change(None, change, here)[0]
+
+
 def test_who_starts_late_crosses_the_egos_way_wherever_it_waits() -> None:
     """It waits on a branch, and the middle of its walk is there too."""
     here = replace(junction(), options=replace(junction().options, goal=TurnType.LEFT))
