@@ -122,11 +122,9 @@ class LanesAcross:
             return Band(
                 lane_id=own.lane_id, left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad
             )
-        return min(
-            (band for lane in near if (band := _band(lane, tangent_rad, choice))),
-            key=lambda band: abs(band.left_m),
-            default=None,
-        )
+        beside = sorted(near, key=lambda lane: lane.beyond_m)  # at a joint who has not ended
+        bands = (band for lane in beside if (band := _band(lane, tangent_rad, choice)))
+        return min(bands, key=lambda band: round(abs(band.left_m), 2), default=None)
 
     def place(self, choice: intents.LaneChoice, ahead_m: float) -> LanePosition | None:
         """Return the place on a lane next to one on the ego's own, None where there is none.

@@ -62,6 +62,12 @@ def test_a_junction_begins_where_the_ego_s_lane_ends() -> None:
     assert 30.0 < turned_m < 45.0
 
 
+def test_past_the_end_of_a_lane_the_one_that_goes_on_counts() -> None:
+    """The oncoming lane begins 20 m ahead; up to there leads Connector2."""
+    bands = (lanes_of("market-crossing").band(wish.LaneChoice.ONCOMING, m) for m in (19.5, 20.5))
+    assert [band.lane_id for band in bands] == ["Lane8", "Connector2"]
+
+
 def test_a_crosswalk_is_counted_by_its_middle() -> None:
     """Authored from 117 to 120.5 m, the ego at 80 m."""
     middle_m = find_mark(lanes_of("plane-tree-street"), wish.MapPlace.CROSSWALK)
