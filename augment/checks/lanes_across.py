@@ -7,6 +7,7 @@ of `EgoRoute`: ahead along the route from the ego, left across it in its directi
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -81,8 +82,12 @@ class LanesAcross:
 
     route: EgoRoute
     _over: dict[str, "LanesAcross | None"] = field(default_factory=dict, init=False)
+    _bands: dict[tuple[intents.LaneChoice, float], Band | None] = field(
+        default_factory=dict, init=False
+    )
 
     @classmethod
+    @lru_cache(maxsize=16)
     def of(
         cls, ground: Ground, turn: entities.TurnType = entities.TurnType.STRAIGHT
     ) -> "LanesAcross | None":
@@ -113,6 +118,12 @@ class LanesAcross:
 
     def band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         """Return the lane of that choice, None where there is none there."""
+        key = choice, ahead_m
+        if key not in self._bands:
+            self._bands[key] = self._find_band(choice, ahead_m)
+        return self._bands[key]
+
+    def _find_band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         tangent_rad = self.route.heading_at(ahead_m)
         near = self.route.graph.beside(*self.route.position(ahead_m))
         if choice is intents.LaneChoice.OWN:

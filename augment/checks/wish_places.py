@@ -10,8 +10,7 @@ Frame: that of `EgoRoute`, ahead of the ego and left of its way; points are in t
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
@@ -160,6 +159,7 @@ class Place:
     across: Callable[[float], Span | None]
 
     @classmethod
+    @lru_cache(maxsize=64)  # the answers of all contestants are held against the same places
     def of(cls, spot: wish.Spot, lanes: LanesAcross, box_m: float) -> "Place":
         """Return the place that a spot admits for an object of that width."""
         lane = spot.lane or (wish.LaneChoice.OWN if spot.lateral is not None else None)
@@ -199,7 +199,7 @@ class Place:
         """The place in strips from station to station, as points, lines and polygons."""
         route = self.lanes.route
         reach = (-route.ego_s_m, route.line.length_m - route.ego_s_m)
-        pieces: list[shapely.Geometry] = []
+        pieces = list[NDArray[np.object_]]()
         for low_m, high_m in _intersect(self.stations_m, [reach]):
             count = max(math.ceil((high_m - low_m) / _STRIP_M), 1) + (high_m > low_m)
             sides = [
@@ -207,11 +207,13 @@ class Place:
                 for station_m in np.linspace(low_m, high_m, count).tolist()
                 if (span := self.across(station_m)) is not None
             ]
-            pieces += [shapely.LineString(ends) for ends in sides]
-            # (low, high) of two stations, as a ring round the strip between them.
-            rings = [[a, b, d, c] for (a, b), (c, d) in pairwise(sides)]
-            pieces += [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-        return np.array(pieces, dtype=object)
+            # (S, 2, 2) the low and the high end at each station, as points in metres.
+            ends = np.array(sides, dtype=np.float64).reshape(-1, 2, 2)
+            # (S - 1, 4, 2) from one station to the next and back, round the strip between them.
+            rings = np.concatenate([ends[:-1], ends[1:, ::-1]], axis=1)
+            strips = shapely.make_valid(np.asarray(shapely.polygons(rings)))
+            pieces += [np.asarray(shapely.linestrings(ends)), np.asarray(strips)]
+        return np.concatenate(pieces) if pieces else np.array([], dtype=object)
 
 
 def _intersect(spans: Iterable[Span], others: Sequence[Span]) -> list[Span]:
