@@ -29,13 +29,26 @@ def vote_rows(votes: Iterable[RatedVote], names: Mapping[str, str]) -> Iterator[
         names: The judges' pseudonyms by their codes, as they were when the votes were frozen.
     """
     for vote in votes:
-        is_equal = vote.outcome == Vote.Outcome.EQUAL.value
         yield (
-            *(vote.left, vote.right, BOTH_BAD if vote.both_miss else WINNERS[vote.outcome]),
-            *(names.get(vote.judge, vote.judge), vote.item, vote.type, vote.kind),
-            *("" if is_equal else vote.outcome, vote.ms_visible, vote.is_simulated, vote.at),
-            *(vote.position, vote.aids, vote.comment, vote.left_code, vote.right_code),
-            *(vote.strength, vote.question, faults_text(vote.faults)),
+            vote.left,
+            vote.right,
+            BOTH_BAD if vote.both_miss else WINNERS[vote.outcome],
+            names.get(vote.judge, vote.judge),
+            vote.item,
+            vote.type,
+            vote.kind,
+            vote.outcome if vote.outcome != Vote.Outcome.EQUAL.value else "",
+            vote.ms_visible,
+            vote.is_simulated,
+            vote.at,
+            vote.position,
+            vote.aids,
+            vote.comment,
+            vote.left_code,
+            vote.right_code,
+            vote.strength,
+            vote.question,
+            faults_text(vote.faults),
         )
 
 
