@@ -31,10 +31,11 @@ sqlite-tests:
 	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not slow"
 
 postgres-tests:
-	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow"
+	$(BIN)/python -m tests.on_postgres --locks -m "postgres and not redis and not slow"
 
-test-all: chromium receivers lint ## Style, layers, types and the slow tests: whole journeys, kills, all roles of the API
+test-all: chromium receivers lint ## Style, layers, types and the slow tests: whole journeys, kills, all that differs on PostgreSQL
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -m slow
+	$(BIN)/python -m tests.on_postgres -m "postgres and not redis and not slow"
 
 check: lint ## The quick round: style, layers, types and the tests of the pure packages
 	$(BIN)/python -m pytest -n 2 -q -m "not slow and not realdata" $(PURE:%=tests/%)
