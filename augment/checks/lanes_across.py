@@ -87,7 +87,7 @@ class LanesAcross:
     )
 
     @classmethod
-    @lru_cache(maxsize=16)
+    @lru_cache(maxsize=4)
     def of(
         cls, ground: Ground, turn: entities.TurnType = entities.TurnType.STRAIGHT
     ) -> "LanesAcross | None":

@@ -159,7 +159,7 @@ class Place:
     across: Callable[[float], Span | None]
 
     @classmethod
-    @lru_cache(maxsize=64)  # the answers of all contestants are held against the same places
+    @lru_cache(maxsize=8)  # the answers of all contestants are held against the same places
     def of(cls, spot: wish.Spot, lanes: LanesAcross, box_m: float) -> "Place":
         """Return the place that a spot admits for an object of that width."""
         lane = spot.lane or (wish.LaneChoice.OWN if spot.lateral is not None else None)
