@@ -1,4 +1,4 @@
-"""Environments of their own for what a benchmark runs beside the project's."""
+"""Python environments of what a benchmark runs beside the project."""
 
 import hashlib
 import os

@@ -30,7 +30,7 @@ from bench.report import ROOT, load, table, write_section
 
 HEADING = "Bootstrap and closed form, with many contestants"
 RESAMPLES_HEADING = "Intervals by resampled votes, beside others"
-REPEATS = 5
+REPEATS, ROUNDS = 5, 1000
 TIES = 0.3
 WINNERS = ("model_a", "tie", "model_b")
 
@@ -91,11 +91,10 @@ class Rival:
     """
 
     program: str
-    rounds: int = 1000
+    rounds: int = ROUNDS
     is_ours: bool = True
 
 
-ROUNDS = 1000
 PROGRAM = """
 import resource, sys, time
 import numpy as np

@@ -264,7 +264,7 @@ def _vehicle(
     agent: TrafficAgent, lanes: LanesAcross, motion: wish.MotionWish | None = None
 ) -> wish.VehicleRequest:
     place = _find_place(agent, lanes)
-    body = wish.Body.__members__.get(agent.type.name, wish.Body.VEHICLE)
+    body = wish.Body.of(agent.type)
     if motion is not None and motion.preset is MotionPreset.RED_LIGHT:
         from_left = lanes.route.locate_agent(agent).left_m > 0.0
         comes = replace(motion, side=wish.Side.LEFT if from_left else wish.Side.RIGHT)
@@ -389,7 +389,8 @@ def _course(agent: TrafficAgent, before_mps: float, lanes: LanesAcross | None) -
     if abs(degrees) < _STRAIGHT_DEG:
         turn = f", in {base}"
     walk = f", walking to {_where(_at_end(agent), lanes)}" if agent.walk_to_m else ""
-    pace = f", driving at {agent.speed_mps:.1f} m/s" if agent.speed_mps else ", standing"
+    verb = "walking" if agent.type is AgentType.PEDESTRIAN else "driving"
+    pace = ", standing" if agent.is_stopped else f", {verb} at {agent.speed_mps:.1f} m/s"
     turn = "" if agent.type in _HEADLESS else turn
     return turn + (pace if agent.speed_mps != before_mps else "") + walk
 

@@ -30,6 +30,8 @@ _BESIDE_M = 15.0
 # Who is left or right of the ego's way is at least so far off it.
 _ON_A_SIDE_M = 1.0
 _ALIGNED_RAD = math.radians(15.0)
+_MOST_BANDS = 20_000
+"""So many stations of a scene are kept."""
 _MISSED_M = 0.1
 """A place that leads further from its point than this does not tell where the point is."""
 _VEHICLES = (entities.AgentType.VEHICLE, entities.AgentType.BUS)
@@ -119,9 +121,9 @@ class LanesAcross:
     def band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         """Return the lane of that choice, None where there is none there."""
         key = choice, ahead_m
-        if key not in self._bands:
+        if key not in self._bands and len(self._bands) < _MOST_BANDS:
             self._bands[key] = self._find_band(choice, ahead_m)
-        return self._bands[key]
+        return self._bands[key] if key in self._bands else self._find_band(choice, ahead_m)
 
     def _find_band(self, choice: intents.LaneChoice, ahead_m: float) -> Band | None:
         tangent_rad = self.route.heading_at(ahead_m)
@@ -133,9 +135,10 @@ class LanesAcross:
             return Band(
                 lane_id=own.lane_id, left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad
             )
-        beside = sorted(near, key=lambda lane: lane.beyond_m)  # at a joint who has not ended
+        # The nearest, and at a joint the one that has not ended.
+        beside = sorted(near, key=lambda lane: (round(abs(lane.d_m), 2), lane.beyond_m))
         bands = (band for lane in beside if (band := _band(lane, tangent_rad, choice)))
-        return min(bands, key=lambda band: round(abs(band.left_m), 2), default=None)
+        return next(bands, None)
 
     def place(self, choice: intents.LaneChoice, ahead_m: float) -> LanePosition | None:
         """Return the place on a lane next to one on the ego's own, None where there is none.
@@ -287,10 +290,13 @@ def resolve_spots(intent: intents.Intent, lanes: LanesAcross) -> intents.Intent:
         spot = resolve_spot(spot, lanes, named)
         named[request.name] = spot
         requests.append(replace(request, spot=spot))
-    moves = tuple(
-        replace(move, spot=resolve_spot(move.spot, lanes, named)) for move in intent.moves
-    )
-    return replace(intent, requests=tuple(requests), moves=moves)
+    moves = [
+        move
+        if move.stays
+        else replace(move, spot=_or_anywhere(resolve_spot(move.spot, lanes, named)))
+        for move in intent.moves
+    ]
+    return replace(intent, requests=tuple(requests), moves=tuple(moves))
 
 
 def resolve_spot(
@@ -336,6 +342,14 @@ def resolve_spot(
         relation=intents.Relation.AHEAD if is_ahead else intents.Relation.BEHIND,
         distance=intents.Length(low_m=low_m, high_m=high_m),
     )
+
+
+def _or_anywhere(spot: intents.Spot) -> intents.Spot:
+    """Return an open spot as anywhere: of a move it would mean to stay."""
+    if spot != intents.Spot():
+        return spot
+    whole = intents.Length(low_m=-math.inf, high_m=math.inf)
+    return intents.Spot(relation=intents.Relation.AHEAD, distance=whole)
 
 
 def _fits(

@@ -117,7 +117,9 @@ def measure_passage(situation: ChangedScene) -> float:
         shapely.Polygon(situation.boxes[agent.id].corners_m)
         for agent in situation.everyone
         if agent.type is not AgentType.EGO_VEHICLE
-        and (agent.is_stopped and agent.motion is None and agent.walk_to_m is None)
+        and agent.is_stopped
+        and agent.motion is None
+        and agent.walk_to_m is None
     ]
     free = shapely.difference(road, shapely.union_all(standing))
     begin = shapely.Point(situation.ground.scene.ego.x_m, situation.ground.scene.ego.y_m)

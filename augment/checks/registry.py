@@ -114,12 +114,13 @@ def _drop_answered(
     placed = set(answering)
     for party in case.parties:
         placed.update(agent.id for agent, _ in party.mistyped)
-        request = party.request
-        if not isinstance(request, VehicleRequest) or request.spot.lane or request.facing:
+        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None:
             answering.update(agent.id for agent in party.everyone)
     for finding in findings:
         if finding.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE):
             placed.update(finding.agents)
+        if finding.kind is FindingKind.ASKED_HEADING:
+            answering.update(finding.agents)
     surplus = {agent.id for agent in case.surplus}
     for finding in alone:
         name, is_doubtful = finding.agents[0], finding.severity is Severity.DOUBTFUL

@@ -255,8 +255,9 @@ class _Fitting:
 
     def _place_open(self, request: wish.VehicleRequest, agent: TrafficAgent) -> Point:
         """Return where one belongs of whom no place is said: where he is or was, or an arm."""
-        before, motion = {one.id: one for one in self._lanes.route.scene.agents}, request.motion
-        here = before.get(agent.id, agent).pose.beside(0.0)
+        before = {before.id: before for before in self._lanes.route.scene.agents}
+        stands, motion = before.get(agent.id, agent), request.motion
+        here = stands.x_m, stands.y_m
         if agent.id in before or motion is None or motion.preset is not MotionPreset.RED_LIGHT:
             return here
         graph, reach_m = self._lanes.route.graph, _WAITS_M if request.speed_mps == 0.0 else _ARM_M

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from email.utils import format_datetime, parsedate_to_datetime
+from email.utils import parsedate_to_datetime
 from itertools import islice
 
 from augment.errors import ModelFault, ParameterRefused
@@ -448,10 +448,12 @@ def _read_wait(fields: Mapping[str, str]) -> tuple[float | None, str]:
                 seconds = float(match["number"] or 0) / (1000.0 if is_ms else 1.0)
                 seconds += 60.0 * float(match["minutes"] or 0)
             else:
-                # By the server's clock, where it says: ours may be wrong. HTTP knows GMT alone.
-                dates = text, fields.get("date", "") or format_datetime(datetime.now(UTC))
-                until, now = (parsedate_to_datetime(date).replace(tzinfo=UTC) for date in dates)
-                seconds = (until - now).total_seconds()
+                until, now = parsedate_to_datetime(text).replace(tzinfo=UTC), datetime.now(UTC)
+                with suppress(
+                    ValueError
+                ):  # by the server's clock where it says: ours may be wrong
+                    now = parsedate_to_datetime(fields.get("date", "")).replace(tzinfo=UTC)
+                seconds = (until - now).total_seconds()  # HTTP knows GMT alone
         except (ValueError, OverflowError):
             continue
         if math.isfinite(seconds):

@@ -70,6 +70,11 @@ class Body(StrEnum):
     TRAFFIC_CONE = "traffic cone"
     PEDESTRIAN = "pedestrian"
 
+    @classmethod
+    def of(cls, kind: AgentType) -> Body:
+        """Return the body of a kind of agent; of what has none of its own a vehicle's."""
+        return cls.__members__.get(kind.name, cls.VEHICLE)
+
 
 class Facing(StrEnum):
     """Heading relative to the direction of its lane."""
@@ -450,9 +455,10 @@ class Move:
 
     def as_request(self, kind: AgentType) -> VehicleRequest:
         """Return the same as a request for one of a kind."""
-        body = Body.__members__.get(kind.name, Body.VEHICLE)
         same = ("spot", "facing", "turn_deg", "speed_mps", "motion")
-        return VehicleRequest(body=body, count=1, **{name: getattr(self, name) for name in same})
+        return VehicleRequest(
+            body=Body.of(kind), count=1, **{name: getattr(self, name) for name in same}
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

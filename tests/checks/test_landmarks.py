@@ -121,6 +121,13 @@ def test_who_is_only_turned_and_slowed_down_stays() -> None:
         assert any(words in one for one in faults(intent, Modification(moved=(wrong,))))
     off = measure_wish(Ground.of(LANDMARK_STREET), Modification(moved=(far,)), intent)
     assert off.distances_m == pytest.approx([10.0])
+    # What its place is counted from is not there: it may be anywhere.
+    past = wish.Spot(relation=wish.Relation.AHEAD, landmark=wish.Pick(kind=wish.Sight.BUS))
+    nowhere = wish.Intent(moves=(wish.Move(who=cyclist, spot=past),))
+    moved = Modification(moved=(replace(rider, x_m=rider.x_m - 10.0),))
+    assert faults(nowhere, moved) == []
+    anywhere = measure_wish(Ground.of(LANDMARK_STREET), moved, nowhere)
+    assert anywhere.distances_m == pytest.approx([0.0])
 
 
 def test_who_is_to_go_has_to_go_and_nobody_else() -> None:

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.checks import Finding, FindingKind, Severity
+from augment.checks import Finding, FindingKind, Ground, Severity
+from augment.checks.registry import check_against_intent
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, Area, AreaKind, Modification, Scene, TrafficAgent
+from augment.scene.intent import Facing, Intent, VehicleRequest
 from tests.checks.worlds import findings, severities
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.recorded import recorded
@@ -149,3 +151,11 @@ def test_most_recorded_vehicles_have_nothing_wrong_and_none_is_impossible(realda
     assert faulty["driving"] <= 0.05 * totals["driving"]
     assert unplaced["standing or creeping"] <= 0.25 * totals["standing or creeping"]
     assert faulty.total() <= 0.25 * totals.total()
+
+
+def test_a_direction_that_is_held_against_no_lane_leaves_its_doubt() -> None:
+    wish = Intent(requests=(VehicleRequest(facing=Facing.WITH_LANE, count=1),))
+    across = Modification(added=(vehicle("Added1", 40.0, 0.0, 1.5),))
+    findings = check_against_intent(Ground.of(scene()), across, wish)
+    headings = [one.severity for one in findings if one.kind is FindingKind.HEADING]
+    assert headings == [Severity.DOUBTFUL]

@@ -75,7 +75,7 @@ def test_the_plan_tells_of_newcomers_and_of_what_came_later() -> None:
     rating = rate(study=voted(batch), rounds=100, filters=filters)
     text = exported("latex", "--rating", str(rating.code), study=batch.name)
     assert "compared 4 contestants on 5 scenarios" in text
-    assert "each of 2 accounts, each with dot; 18 more were planned later" in text
+    assert "each of 2 accounts, every pair with dot; 18 more were planned later" in text
     assert "left out: 6 not asked for." in text
 
 

@@ -289,6 +289,7 @@ DATE = "Wed, 21 Oct 2015 07:28:00 GMT"
         ({"retry-after-ms": "x", "retry-after": "5 seconds"}, 5.0),
         ({"retry-after": DATE}, 0.0),
         ({"retry-after": DATE, "date": DATE.replace("28:00", "27:15")}, 45.0),
+        ({"retry-after": DATE, "date": "2015-10-21T07:27:15Z"}, 0.0),
         ({"body": "37.5s"}, 37.5),
         *(
             ({"sentence": f"Slow down. {asks}. More at x."}, wait_s)

@@ -134,7 +134,7 @@ def _tell_plan(snapshot: Snapshot, frozen: dict[str, Any]) -> str:
         f"each of {count_text(frozen['experts'], 'account|')}"
     )
     if challengers := frozen["rules"].get("challengers"):
-        plan += f", each with {' or '.join(challengers)}"
+        plan += f", every pair with {' or '.join(challengers)}"
     if later := snapshot.study.matchups.filter(batch__gt=0, kind=MAIN).count():
         plan += f"; {later} more were planned later, for who came by a link or took over"
     settled = len(frozen["rules"].get("identical", ()))

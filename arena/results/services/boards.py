@@ -320,6 +320,6 @@ def _count_attempts(contestant: Contestant | None) -> tuple[int | None, int | No
     if own is None:
         return None, None
     # Where no sender is known, nobody knows whose the others are.
-    others = Q(benchmark__slug=own.benchmark.slug, uploaded_by=own.uploaded_by or 0)
+    others = Q(benchmark__slug=own.benchmark.slug, uploaded_by_id=own.uploaded_by_id or 0)
     sent = Submission.objects.filter(Q(pk=own.pk) | others)
     return sent.count(), sent.filter(decision=Submission.Decision.WITHDRAWN).count()

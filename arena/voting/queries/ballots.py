@@ -136,8 +136,9 @@ def find_undrawn(study: Study) -> QuerySet[Matchup]:
 
 def is_being_drawn(study: Study) -> bool:
     """Return whether a worker began to draw within the last half minute."""
-    since = database_now().timestamp() - 30.0
-    return find_undrawn(study).filter(view__since__gt=since).exists()
+    now = database_now().timestamp()
+    recent = find_undrawn(study).filter(view__since__gt=now - 30.0, view__since__lte=now)
+    return recent.exists()
 
 
 def _is_drawn(matchup: Matchup) -> bool:

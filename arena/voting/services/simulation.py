@@ -5,12 +5,11 @@ reference, misjudges distances a little, calls close ones equal, and now and the
 key, as people do. Every question of a study is answered so, each with noise of its own.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from uuid import uuid5
 
 import numpy as np
 from django.db import transaction
-from django.db.models import QuerySet
 
 from arena.models import Matchup, Study, Vote
 from arena.voting.services.casting import Decision, cast_vote
@@ -40,21 +39,26 @@ def simulate_votes(*, study: Study, seed: int) -> int:
     """
     if not study.allow_simulated:
         raise Conflict(f"The study {study.name!r} does not allow simulated votes.")
-    waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
-    sides = {side for pair in waiting.values_list("left", "right") for side in pair}
+    undecided = study.matchups.filter(votes=None, expert__person__is_simulated=True)
+    waiting = undecided.select_related("expert__person").order_by("expert__username", "position")
+    sides = {side for pair in waiting for side in (pair.left_id, pair.right_id)}
     # Measured before the transaction: nobody else writes while it lasts.
-    errors_m = {row.row.pk: row.displacement.error_m for row in of_rows(sides) if row.displacement}
+    errors_m = {
+        measured.row.pk: measured.displacement.error_m
+        for measured in of_rows(sides)
+        if measured.displacement is not None
+    }
     with transaction.atomic():
-        return _cast_all(study, waiting.select_related("expert__person"), errors_m, seed)
+        return _cast_all(study, waiting, errors_m, seed)
 
 
 def _cast_all(
-    study: Study, waiting: QuerySet[Matchup], errors_m: Mapping[int, float], seed: int
+    study: Study, waiting: Iterable[Matchup], errors_m: Mapping[int, float], seed: int
 ) -> int:
     """Vote on matchups; a change whose error nobody knows has none."""
     rng = np.random.default_rng(seed)
     cast = 0
-    for matchup in waiting.order_by("expert__username", "position"):
+    for matchup in waiting:
         left_m, right_m = (errors_m.get(key, 0.0) for key in (matchup.left_id, matchup.right_id))
         for question in study.questions:
             is_primary = question == study.questions[0]
