@@ -30,7 +30,7 @@ _FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re
 # Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
 # takes grows no faster than its length.
 _STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
-_STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_STRING_OR_COMMENT = re.compile(rf"({_STRING})|(?://|#)[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
 _THOUGHTS_BEGIN = re.compile(
     r"\s*(?:<(?:seed:)?(?:think|thinking|thought|reasoning)>|\[THINK\]|◁think▷"
@@ -97,8 +97,9 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
     wished = re.compile(rf'"({"|".join(sorted(keys))})"\s*:\s*(?:\[\s*)?(?!null)[^\[\]\s]')
     text = _WRAPPER.sub("", without_thoughts(answer))
-    # The last fence may lack its end; without any fences bare objects count.
-    blocks = [match.group(1) for match in _FENCE.finditer(text)] or _bare_objects(text)
+    # The last fence may lack its end; bare objects count where no fence holds a block.
+    blocks = [match.group(1) for match in _FENCE.finditer(text)]
+    blocks = blocks if any(map(named.search, blocks)) else _bare_objects(text)
     for number, block in reversed([*enumerate(blocks)]):
         if not named.search(block):
             continue
@@ -170,6 +171,15 @@ def only_thinks(answer: str) -> bool:
 def without_thoughts(answer: str) -> str:
     """Return the text after the last reasoning tag of models that think aloud."""
     return _THOUGHTS_END.split(answer)[-1]
+
+
+def without_nulls(value: object, depth: int = 8) -> object:
+    """Return a part of an answer without its nulls, for what is null is absent, to a depth."""
+    if isinstance(value, list) and depth:
+        return [without_nulls(part, depth - 1) for part in value]
+    if not isinstance(value, dict) or not depth:
+        return value
+    return {key: without_nulls(part, depth - 1) for key, part in value.items() if part is not None}
 
 
 # Private

@@ -23,6 +23,7 @@ from augment.prompts.blocks import (
     last_object,
     refuses,
     validate,
+    without_nulls,
     without_thoughts,
 )
 from augment.prompts.extent import find_spans
@@ -66,7 +67,8 @@ _NULL: _Schema = {"type": "null"}
 _Item = TypeVar("_Item")
 _Id = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 _Size = Annotated[float, Field(ge=0.1, le=20.0)]
-_Several = Annotated[list[_Item], Field(max_length=MOST_AGENTS)]
+_OR_NONE = BeforeValidator(lambda items: [] if items is None else items)
+_Several = Annotated[list[_Item], Field(max_length=MOST_AGENTS), _OR_NONE]
 _Words = Annotated[str, Field(min_length=1, max_length=LONGEST_ENTRY)]
 _Rating = Annotated[int, Field(ge=1, le=5)]
 
@@ -82,7 +84,7 @@ class _Agent(Strict):
     speed_mps: float = Field(ge=0.0, le=60.0)
     lane: str | None
     walk_to: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
-    motion: PlannedMotion | None = None
+    motion: Annotated[PlannedMotion | None, BeforeValidator(without_nulls)] = None
 
     @property
     def path_m(self) -> tuple[tuple[float, float], ...]:
@@ -104,7 +106,7 @@ class ReadReply:
 
     Attributes:
         notes: The answer's own Insights and Summary.
-        mended: Whether comments or trailing commas had to be taken out of its JSON.
+        mended: Whether its JSON had comments, trailing commas, or null for a list.
         is_refusal: Whether it changes nothing and names no action either; an answer to a
             follow-up may take back all that was placed.
     """
@@ -142,8 +144,8 @@ class Ratings(Strict):
         return (self.compliance + self.realism + self.logical_consistency) / 3.0
 
 
-_Feedback = Annotated[list[Correction], Field(max_length=MOST_FEEDBACK)]
-_Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK)]
+_Feedback = Annotated[list[Correction], Field(max_length=MOST_FEEDBACK), _OR_NONE]
+_Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK), _OR_NONE]
 
 
 class RatedReview(Strict):
@@ -224,7 +226,7 @@ def read_reply(
     return ReadReply(
         modification=modification,
         notes=block.unchanged or answer_notes(sections or answer),
-        mended=mended,
+        mended=mended or any(document.get(key, ()) is None for key in _LISTS),
         is_refusal=modification.is_empty and "{" not in actions,
     )
 
@@ -386,7 +388,7 @@ def read_intent(answer: str) -> Intent:
     if document.get("beyond") and not any(document.get(name) for name in _ASKED):
         document = {**document, "unmet": NOTHING_TO_PLACE}
     try:
-        return intent_from_parts(document)
+        return intent_from_parts(without_nulls(document))
     except InvalidDocument as fault:
         problems = fault.problems[:_MOST_PROBLEMS]
     raise ReplyUnreadable(

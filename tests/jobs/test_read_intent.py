@@ -59,7 +59,7 @@ def test_what_was_read_waits_and_counts_once_it_is_accepted() -> None:
 @pytest.mark.parametrize(
     "said",
     [
-        {"removals": [{"kind": "bus"}]},
+        {"removals": [{"kind": "bus", "ordinal": None}], "requests": None, "route": None},
         {"moves": [{"who": {"kind": "bus"}, "speed_mps": 2, "spot": {"relation": "ahead"}}]},
         {"purpose": {"passage": {"low_m": 3}}, "beyond": ["make it rain"]},
     ],

@@ -21,6 +21,7 @@ from augment.prompts.reply import (
 )
 from augment.prompts.vectors import short_names, with_short_ids
 from augment.scene.entities import TrafficAgent
+from augment.scene.planned_motion import PlannedMotion
 from tests.fixtures.shelf import HARD_SLUGS, MOVING_SLUGS, SLUGS, entry, shown_scene
 from tests.scenes import scene, vehicle
 from tests.variants.playing import GOOD, agent, block, rating
@@ -86,6 +87,7 @@ def at(name: str) -> dict[str, object]:
         f"<THINK>```json\n{DRAFT}\n```</THINK >{GOOD}",
         f'```json\n{{"remove": []}}\n```\n```json\n{{"add": [{json.dumps(agent())}]}}\n```',
         GOOD + '\n```json\n{"Action": "add"}\n```',
+        f"```python\nx = 19.0 + 2.4\n```\nModified Vectors:\n```json {block(agent())} ```",
     ],
 )
 def test_the_last_block_with_the_keys_counts(text: str) -> None:
@@ -100,6 +102,8 @@ def test_the_last_block_with_the_keys_counts(text: str) -> None:
         GOOD.replace('"move": [],', '"move": [], // nothing "moves": 1\n'),
         GOOD.replace('"move": []', '/* none, */ "move": []'),
         GOOD.replace('"remove": []', '"remove": [], // the end\n'),
+        GOOD.replace('"move": []', '# "move": 1\n"move": []'),
+        GOOD.replace('"move": []', '"move": null').replace('"remove": []', '"remove": null'),
     ],
 )
 def test_comments_and_trailing_commas_are_mended(text: str) -> None:
@@ -243,6 +247,12 @@ def test_an_unreadable_motion_is_refused_with_its_reason(motion: object, problem
 def test_nobody_has_a_walk_and_a_motion() -> None:
     both = agent(type="PEDESTRIAN", walk_to=[1.0, 2.0], motion={"speeds": [[0, 2]]})
     assert problems(block(both)) == ["Agent2: it has walk_to or a motion, not both"]
+
+
+def test_null_is_absent_in_motions_and_empty_in_reviews() -> None:
+    text = block(agent(motion={"start": None, "path": None, "speeds": None}))
+    assert read_reply(text, scene()).modification.added[0].motion == PlannedMotion()
+    assert read_verdict('{"verdict": "accept", "feedback": null}').feedback == []
 
 
 READERS: list[Callable[[str], object]] = [
