@@ -1,7 +1,9 @@
 """The drive itself: plan, track, let traffic answer, 150 times; and who it is measured by."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -80,21 +82,25 @@ def run(
         after_step: Told the number of steps done, for heartbeats; it may raise to stop.
 
     Raises:
-        CannotDrive: The ego is on no lane, or the planner's answer has another shape.
+        CannotDrive: The ego is on no lane, the planner's answer has another shape, or it exits.
     """
     road = road or Road(setting.scene, setting.recording)
     body = EgoBody.of(setting.scene.ego)
     states = [start_state(setting.scene.ego, body)]
     traffic = Traffic(setting, road, body, states[0])
-    planner.start(road, body)
     objects, plans, at_end = [traffic.objects()], list[Plan](), False
     goal_m = _goal_m(setting, road, body)
+    with _exits_told():
+        planner.start(road, body)
     for step in range(steps or STEPS[setting.scene.options.interplan is not None]):
         if road.end_m < road.centreline.length_m:
             at_end = road.centreline.station_of(states[-1]) + body.front_m >= road.end_m
         if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
             break
-        plans.append(planner.plan(Situation(step=step, ego=states[-1], objects=objects[-1])))
+        situation = Situation(step=step, ego=states[-1], objects=objects[-1])
+        with _exits_told():
+            # Of a copy, for whoever computes in place: a drive is not to change by it.
+            plans.append(planner.plan(deepcopy(situation)))
         # (1, T, 3) in, (1, 2, 6) out: one reference, the state now and after one step.
         following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
         # With the ego of the same moment: neither side knows the other's next step.
@@ -112,6 +118,15 @@ def run(
         at_map_end=at_end,
         recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
     )
+
+
+@contextmanager
+def _exits_told() -> Iterator[None]:
+    """Let a planner that exits fail its drive, for it would end worker after worker."""
+    try:
+        yield
+    except SystemExit as error:
+        raise CannotDrive(f"The planner ended the process: exit {error.code!r}.") from error
 
 
 def _goal_m(setting: DriveSetting, road: Road, body: EgoBody) -> float:

@@ -43,10 +43,10 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
     module, _, attribute = name.rpartition(".")
     try:
         planner = getattr(importlib.import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
+    except (Exception, SystemExit) as error:
         raise CannotDrive(
-            f"The planner {name} can't be made: {error}. It is the dotted path of a "
-            "class without arguments."
+            f"The planner {name} can't be made ({type(error).__name__}: {error}). It is the "
+            "dotted path of a class without arguments."
         ) from error
     if not isinstance(planner, Planner):
         raise CannotDrive(

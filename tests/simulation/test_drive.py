@@ -27,7 +27,8 @@ from augment.scene.entities import (
 from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, find_expert, run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
-from augment.simulation.planning import IdmPlanner
+from augment.simulation.planners import planner_named
+from augment.simulation.planning import IdmPlanner, Plan, Situation
 from augment.simulation.road import Road, find_route
 from augment.simulation.score import collisions, progress_ratio, score_drive
 from augment.simulation.states import X, Y
@@ -131,6 +132,38 @@ def test_an_ego_off_every_lane_can_not_be_driven() -> None:
     lost = replace(street(), ego=replace(street().ego, y_m=-30.0))
     with pytest.raises(CannotDrive, match="no lane"):
         run(DriveSetting(scene=lost), ConstantSpeed(8.0))
+
+
+class InPlace(ConstantSpeed):
+    """Computes in the ego's frame without a copy."""
+
+    def plan(self, situation: Situation) -> Plan:
+        plan = super().plan(situation)
+        situation.objects.boxes[:, :2] -= situation.ego[:2]
+        situation.ego[:] = 0.0
+        return plan
+
+
+class Exits(ConstantSpeed):
+    def plan(self, situation: Situation) -> Plan:
+        sys.exit("no way out")
+
+
+def test_a_planner_that_computes_in_place_drives_as_with_copies() -> None:
+    drives = [run(busy(), planner(8.0), steps=8) for planner in (ConstantSpeed, InPlace)]
+    assert (drives[0].states == drives[1].states).all()
+    assert (drives[0].objects[4].boxes == drives[1].objects[4].boxes).all()
+
+
+def test_a_planner_that_exits_fails_the_drive_and_not_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(CannotDrive, match="no way out"):
+        run(busy(), Exits(8.0))
+    (tmp_path / "planner_of_one.py").write_text("if True\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(CannotDrive, match="SyntaxError: expected ':'"):
+        planner_named("planner_of_one.Mine", allowed=["planner_of_one.Mine"])
 
 
 @pytest.mark.parametrize(
