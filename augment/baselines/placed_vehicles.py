@@ -86,8 +86,7 @@ def place_vehicles(
         return (give_motion(wish, ground, vehicle, rng),)
     apart_m = request.spacing.draw(rng) if request.spacing else _size_m(body)[0] + BUMPER_GAP_M
     d_m = _offset_m(request, ground, distance_m, rng)
-    open_to = Facing.ACROSS if body is Body.BARRIER else Facing.WITH_LANE
-    turn_rad = _FACING_RAD[request.facing or open_to] + math.radians(request.turn_deg)
+    turn_rad = turn_from_lane(request)
     added = []
     for index in range(request.count or 1):
         centre = ground.beside(distance_m + index * apart_m, lane)
@@ -102,6 +101,12 @@ def place_vehicles(
         )
         added.append(agent if wish is None else give_motion(wish, ground, agent, rng))
     return tuple(added)
+
+
+def turn_from_lane(request: VehicleRequest) -> float:
+    """Return how far to the left of its lane's direction a vehicle is to be turned, in rad."""
+    open_to = Facing.ACROSS if request.body is Body.BARRIER else Facing.WITH_LANE
+    return _FACING_RAD[request.facing or open_to] + math.radians(request.turn_deg)
 
 
 def _offset_m(

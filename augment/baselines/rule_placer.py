@@ -16,17 +16,22 @@ import numpy as np
 
 from augment.baselines.placed_motions import give_motion, is_on_other_arm
 from augment.baselines.placed_people import place_cones, place_walkers
-from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
+from augment.baselines.placed_vehicles import (
+    count_arrangements,
+    place_crash,
+    place_vehicles,
+    turn_from_lane,
+)
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
+from augment.checks.lanes_across import LanesAcross, find_picked, find_place, resolve_spots
 from augment.checks.registry import check_against_intent
 from augment.checks.wish_places import Span, find_off, list_absent, list_stations
 from augment.errors import CannotPlace
-from augment.geometry.frames import overlap
+from augment.geometry.frames import overlap, wrap
 from augment.scene import intent as intents
 from augment.scene.codec import intent_from_document, intent_to_document
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
+from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent_parts import MotionWish
 from augment.scene.numbers import draw_ranges
 
@@ -91,8 +96,10 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
             if agent_before.id != agent.id
         )
         fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
-        stays = move.stays and move.motion is not None
-        moved, sentence = fitting.fit(_as_request(move, agent), agent if stays else None)
+        request = move.as_request(agent.type)
+        if request.speed_mps is None and not move.stays:
+            request = replace(request, speed_mps=agent.speed_mps)
+        moved, sentence = fitting.fit(request, agent if move.stays else None)
         same = {name: getattr(agent, name) for name in ("id", "type", "length_m", "width_m")}
         changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
         sentences.append(f"{agent.id} is moved. {sentence}")
@@ -187,7 +194,7 @@ class _Fitting:
 
         Args:
             request: What is asked for.
-            of: Whose door it is, or who only moves otherwise where it is.
+            of: Whose door it is, or who only acts anew where it is.
         """
         for open_part in list_open(request) if of is None else ():
             raise CannotPlace(open_part)
@@ -237,9 +244,11 @@ class _Fitting:
         arrangement: int,
         of: TrafficAgent | None,
     ) -> _Agents:
-        wish: MotionWish | None = getattr(request, "motion", None)
-        if of is not None and wish is not None:
-            return (_round(give_motion(wish, self._place, of, rng)),)
+        if of is not None:
+            wish: MotionWish | None = getattr(request, "motion", None)
+            if isinstance(request, intents.VehicleRequest):
+                of = self._turn(request, of)
+            return (_round(of if wish is None else give_motion(wish, self._place, of, rng)),)
         along = self._place.over(request.spot.via)
         match request:
             case intents.VehicleRequest():
@@ -253,6 +262,17 @@ class _Fitting:
             case intents.DoorRequest():
                 raise AssertionError("a door is of somebody")
         return tuple(map(_round, agents))
+
+    def _turn(self, request: intents.VehicleRequest, of: TrafficAgent) -> TrafficAgent:
+        """Return a road user where it is, turned and as fast as is asked for."""
+        if request.speed_mps is not None:
+            of = replace(of, speed_mps=request.speed_mps)
+        if request.facing is not None:
+            lane = find_place(self._place.lanes, (of.x_m, of.y_m))
+            of = replace(of, heading_rad=wrap(lane.tangent_rad + turn_from_lane(request)))
+        # Who stands goes nowhere, and who is turned not where it went.
+        ends = request.facing is not None or request.speed_mps == 0.0
+        return replace(of, walk_to_m=None, motion=None) if ends else of
 
     def _judge(
         self, request: intents.Request, distance_m: float, agents: _Agents
@@ -275,14 +295,6 @@ class _Fitting:
         findings = check_against_intent(ground, Modification(added=own), intent)
         wrong = (finding.sentence() for finding in findings if finding.severity is Severity.WRONG)
         return next(wrong, ""), sum(finding.severity is Severity.DOUBTFUL for finding in findings)
-
-
-def _as_request(move: intents.Move, agent: TrafficAgent) -> intents.Request:
-    """Return a road user's move as the placement of a new one."""
-    if move.stays and agent.type is AgentType.PEDESTRIAN:
-        return intents.WalkRequest(count=1, motion=move.motion)
-    speed_mps = agent.speed_mps if move.speed_mps is None else move.speed_mps
-    return replace(move.as_request(agent.type), speed_mps=speed_mps)
 
 
 def _make_car(

@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,14 +28,18 @@ from augment.scene.entities import (
 )
 from augment.scene.intent import (
     Body,
+    Facing,
     Intent,
     LaneChoice,
     Lateral,
     LateralTarget,
+    Move,
     Nearness,
+    Pick,
     Relation,
     Shape,
     Side,
+    Sight,
     Spot,
     VehicleRequest,
     WalkRequest,
@@ -54,7 +59,7 @@ from tests.intents import (
     walk,
 )
 from tests.recorded import recorded
-from tests.scenes import curve, scene, vehicle
+from tests.scenes import curve, pedestrian, scene, vehicle
 
 
 def added(shown: Scene, intent: Intent, *, seed: int = 0) -> tuple[TrafficAgent, ...]:
@@ -262,6 +267,32 @@ def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
         assert all(overlap(first, second).depth_m == 0.0 for second in boxes[i + 1 :])
     for a, b in itertools.pairwise(cars):
         assert 3.3 < math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) < 6.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "deed", "heading_rad", "speed_mps", "walks"),
+    [
+        (Sight.PARKED, {"facing": Facing.AGAINST_LANE}, math.pi, 0.0, False),
+        (Sight.PARKED, {"facing": Facing.WITH_LANE, "turn_deg": 30.0}, math.pi / 6.0, 0.0, False),
+        (Sight.BICYCLE, {"speed_mps": 2.0}, 0.0, 2.0, False),
+        (Sight.BICYCLE, {"facing": Facing.ACROSS, "speed_mps": 1.0}, math.pi / 2.0, 1.0, False),
+        (Sight.PEDESTRIAN, {"speed_mps": 2.0}, math.pi / 2.0, 2.0, True),
+        (Sight.PEDESTRIAN, {"speed_mps": 0.0}, math.pi / 2.0, 0.0, False),
+        (Sight.PEDESTRIAN, {"facing": Facing.WITH_LANE}, 0.0, 1.2, False),
+    ],
+)
+def test_who_is_only_turned_or_slowed_down_stays(
+    kind: Sight, deed: dict[str, Any], heading_rad: float, speed_mps: float, walks: bool
+) -> None:
+    rider = vehicle("Agent3", 40.0, 0.0, type=AgentType.BICYCLE, speed_mps=4.0, width_m=0.7)
+    rider = replace(rider, length_m=1.8)
+    walker = pedestrian("Agent4", 20.0, -4.0, (20.0, 6.0), speed_mps=1.2)
+    shown = scene(agents=(vehicle("Agent2", 25.0, 0.5), rider, walker))
+    (moved,) = place(shown, Intent(moves=(Move(who=Pick(kind=kind), **deed),))).modification.moved
+    before = next(agent for agent in shown.agents if agent.id == moved.id)
+    assert (moved.x_m, moved.y_m, moved.speed_mps) == (before.x_m, before.y_m, speed_mps)
+    assert moved.heading_rad == pytest.approx(heading_rad, abs=1e-4)
+    assert moved.walk_to_m == (before.walk_to_m if walks else None)
 
 
 def of_type(agents: tuple[TrafficAgent, ...], kind: AgentType) -> list[TrafficAgent]:
