@@ -4,7 +4,8 @@
 
 Runs the demo in that folder unless it is there, opens a study of it, has its pairs drawn and
 writes `sheet.png`: of each pair both pictures, pixels a metre in a window of 1280x720, and by how
-many pixels the changes differ there, or in their inset. Of films it says how often somebody
+many pixels the changes differ there, or in their inset; a pair that nobody can tell apart is shown
+as one of the sample that tests the rule, and is marked. Of films it says how often somebody
 changed, or the ego, is out of the frame.
 """
 
@@ -38,7 +39,7 @@ def write_sheet(folder: str, pairs: int) -> None:
     width, height = _CELL_PX
     sheet = Image.new("RGB", (4 * width, -(-len(rows) // 2) * (height + _TEXT_PX)), "white")
     pen = ImageDraw.Draw(sheet)
-    for number, (row, px_per_m, differs_px, _) in enumerate(rows):
+    for number, (row, px_per_m, differs_px, _, alike) in enumerate(rows):
         left, top = number % 2 * 2 * width, number // 2 * (height + _TEXT_PX)
         for side, name in enumerate((row.left_image, row.right_image)):
             with default_storage.open(name) as file:
@@ -46,23 +47,26 @@ def write_sheet(folder: str, pairs: int) -> None:
             picture.thumbnail((width - 4, height))
             sheet.paste(picture, (left + side * width, top + _TEXT_PX))
         differs = "other things" if differs_px is None else f"{differs_px:.1f} px"
+        differs += ", alike" if alike else ""
         text = f"{row.position}: {px_per_m:.1f} px/m, {differs}, {row.scenario.slug}"
         pen.text((left, top), text, fill=0)
     sheet.save(Path(folder) / "sheet.png")
     stills = sorted(px_per_m for row, px_per_m, *_ in rows if "-film/" not in row.left_image)
-    films = [outside for row, *_, outside in rows if "-film/" in row.left_image]
-    compared = [differs_px for *_, differs_px, _ in rows if differs_px is not None]
+    films = [outside for row, *_, outside, _ in rows if "-film/" in row.left_image]
+    compared = [px for *_, px, _, alike in rows if px is not None and not alike]
     print(f"Stills {len(stills)}: median {statistics.median(stills):.1f} px/m,", end=" ")
     print(f"5 % below {stills[len(stills) // 20]:.1f}, least {stills[0]:.1f}.")
     print(f"Films {len(films)}: moments with somebody outside {sum(films)}.")
     print(f"Least difference of {len(compared)} comparable pairs: {min(compared):.1f} px.")
+    print(f"Shown as a sample of those that look alike: {sum(alike for *_, alike in rows)}.")
 
 
 # Private
 
 
 def _open_study(pairs: int) -> Any:
-    from arena.models import Study
+    from django.contrib.auth.models import User
+
     from arena.people.services import create_person
     from arena.studies.services.opening import open_study
     from arena.studies.services.plan import StudyPlan
@@ -70,12 +74,12 @@ def _open_study(pairs: int) -> Any:
     from augment.models import Augmentation
 
     done = Augmentation.objects.filter(state=Augmentation.State.DONE)
-    username = f"sheet-{Study.objects.count() + 1}"
+    username = f"sheet-{User.objects.count()}"
     create_person(username=username, password=None, role="expert")
     study = open_study(
         StudyPlan(
-            name=f"{STUDY} {Study.objects.count() + 1}",
-            contestants=("reference", "rule-placer", "sim-good-otm", "sim-careless-otm"),
+            name=f"{STUDY} of {username}",
+            contestants=tuple(set(done.values_list("contestant__slug", flat=True))),
             scenarios=tuple(set(done.values_list("scenario__slug", flat=True))),
             experts=(username,),
             votes_per_expert=pairs,
@@ -90,10 +94,10 @@ def _open_study(pairs: int) -> Any:
     return study
 
 
-def _measure(row: Any) -> tuple[Any, float, float | None, int]:
-    """Return a matchup, its px a metre, by how many px it differs, and moments out of frame."""
+def _measure(row: Any) -> tuple[Any, float, float | None, int, bool]:
+    """Return a matchup, px a metre, px of difference, moments out of frame, and if it is alike."""
     from augment.geometry.frames import Pose, corners
-    from augment.metrics.displacement import find_shifts
+    from augment.metrics.displacement import are_alike, find_shifts
     from augment.render.pair_window import film_states
     from augment.services.scenarios.pair_pictures import frame_pair
 
@@ -112,7 +116,7 @@ def _measure(row: Any) -> tuple[Any, float, float | None, int]:
                 outside += bool(
                     (box < 0.0).any() or (box > [camera.width_px, camera.height_px]).any()
                 )
-    return row, camera.px_per_m, differs_px, outside
+    return row, camera.px_per_m, differs_px, outside, are_alike(*sides)
 
 
 if __name__ == "__main__":
