@@ -57,14 +57,15 @@ def judge_rater(rater: PanelRater) -> Judgement:
     if evidence.scale > 0.0:
         # In units of the gain that is expected of somebody who judges as the others do.
         attention, error = evidence.gain / evidence.scale, evidence.looking**0.5 / evidence.scale
+        by_chance = MORE * evidence.guessing**0.5 / evidence.scale
         reasons.append(
-            f"attention {whole_percent(attention)} % ± {whole_percent(MORE * error)}, where "
-            "guessing is 0 and the others are 100"
+            f"attention {whole_percent(attention)} %, where guessing is 0 ± "
+            f"{whole_percent(by_chance)} and the others are 100 ± {whole_percent(MORE * error)}"
         )
         is_half = attention >= 0.5
         if not is_half and attention + LESS * error < 1.0 and evidence.scale >= LEAST_SCALE:
             reliability = Reliability.LOOK
-        elif not must_look and is_half and evidence.gain > MORE * evidence.guessing**0.5:
+        elif not must_look and is_half and attention > by_chance:
             reliability = Reliability.RELIABLE
     counts = {
         f"passed {passed} of {checks} attention checks": checks,

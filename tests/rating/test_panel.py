@@ -38,7 +38,7 @@ SURE = evidence(9.0, 9.0)
         ({}, "can't tell yet", "too few attention checks (0) and hidden repeats (0) to tell"),
         ({"repeats": (5, 2)}, "can't tell yet", "alike; too few attention checks (0) to tell"),
         ({"checks": (5, 4), "ties": 1.0}, "reliable", "passed 4 of 5 attention checks"),
-        ({"evidence": SURE}, "reliable", "attention 100 % ± 67, where guessing is 0"),
+        ({"evidence": SURE}, "reliable", "guessing is 0 ± 67 and the others are 100 ± 67"),
         ({"evidence": evidence(6.1, 9.0)}, "reliable", "attention 68 %"),
         ({"evidence": evidence(5.9, 9.0)}, "can't tell yet", "too few attention checks"),
         ({"evidence": evidence(3.9, 8.0)}, "can't tell yet", "attention 49 %"),
