@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from datetime import timedelta
 from threading import Barrier
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from django.apps import apps
@@ -122,24 +124,25 @@ def taken(kind: WorkKind[Any], row: Work, now: Any = NOON) -> Lease[Any]:
     return held
 
 
-def test_a_waiting_row_is_taken_once_and_settled_once(kind: WorkKind[Any], row: Work) -> None:
+def waiting(kind: WorkKind[Any]) -> dict[str, str]:
+    """What else is set where a failed row is to wait again."""
+    return {"state": "queued"} if kind.name == "uploadmoment" else {}
+
+
+def test_a_waiting_row_is_taken_once_kept_and_settled_once(kind: WorkKind[Any], row: Work) -> None:
     held = taken(kind, row)
     assert (row.state in row.UNDER_WAY, row.claim, row.heartbeat_at) == (True, held.token, NOON)
     assert kind.take(row.pk, now=NOON) is None
     assert kind.take(row.pk + 1000, now=NOON) is None
+    assert held.renew(now=NOON + timedelta(seconds=15))
+    assert kind.take_back_lost(now=LATER) == []
+    assert held.is_held()
     assert held.settle(Settlement(state="failed", reason="no\0 luck"), now=LATER)
     assert not held.settle(Settlement(state="failed", reason="twice"), now=LATER)
     row.refresh_from_db()
     assert (row.state, row.reason, row.finished_at) == ("failed", "no\u2400 luck", LATER)
     assert (row.claim, row.heartbeat_at) == (None, None)
     assert kind.take(row.pk, now=LATER) is None
-
-
-def test_a_heartbeat_keeps_a_lease(kind: WorkKind[Any], row: Work) -> None:
-    held = taken(kind, row)
-    assert held.renew(now=NOON + timedelta(seconds=15))
-    assert kind.take_back_lost(now=LATER) == []
-    assert held.is_held()
 
 
 def test_who_lost_a_lease_writes_nothing(
@@ -171,7 +174,7 @@ def test_a_row_that_ends_worker_after_worker_fails_and_may_be_tried_again(
         assert bool(waits_again) == (number < kind.lost_limit)
     row.refresh_from_db()
     assert (row.state, row.claim, row.lost, "ost" in row.reason) == ("failed", None, 0, True)
-    assert row.wait_again(**({"state": "queued"} if kind.name == "uploadmoment" else {}))
+    assert row.wait_again(**waiting(kind))
     assert (row.state in row.UNDER_WAY, row.reason, row.sent_at) == (True, "", None)
     assert not row.wait_again()
 
@@ -187,66 +190,49 @@ def test_a_rating_that_has_lost_its_last_worker_is_logged_as_failed() -> None:
     assert logged.after == {"snapshot": str(row.code), "why": row.reason}
 
 
-def test_a_row_that_is_given_back_waits_without_a_message(kind: WorkKind[Any], row: Work) -> None:
-    before = row.state
-    kind.mark_sent([row.pk], now=NOON)
-    assert taken(kind, row).release(now=LATER)
-    row.refresh_from_db()
-    assert (row.state, row.claim, row.sent_at) == (before, None, None)
-
-
 def test_rows_without_a_message_or_an_old_one_are_unsent(kind: WorkKind[Any], row: Work) -> None:
-    age = timedelta(minutes=10)
+    before, age = row.state, timedelta(minutes=10)
     assert row.pk in kind.find_unsent(now=NOON, older_than=age)
     kind.mark_sent([row.pk], now=NOON - MINUTE)
     assert row.pk not in kind.find_unsent(now=NOON, older_than=age)
     kind.mark_sent([row.pk], now=NOON - 11 * MINUTE)
     assert row.pk in kind.find_unsent(now=NOON, older_than=age)
-    taken(kind, row)
+    held = taken(kind, row)
     assert row.pk not in kind.find_unsent(now=NOON, older_than=age)
-
-
-@pytest.mark.parametrize(
-    ("error", "state", "reason"),
-    [
-        (Conflict("It changed."), "failed", "It changed."),
-        (KeyError("nobody foresaw this"), "failed", "unexpected: KeyError: 'nobody foresaw this'"),
-        (WorkerStopping("it stops"), None, ""),
-        (BudgetSpent("5 calls"), None, ""),
-        (LeaseLost(), "held", ""),
-    ],
-)
-def test_no_row_hangs_when_the_work_breaks(
-    kind: WorkKind[Any],
-    row: Work,
-    error: Exception,
-    state: str | None,
-    reason: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def run(row: Work, held: object) -> None:
-        raise error
-
-    before = row.state
-    monkeypatch.setattr(kind, "run", run)
-    assert kind.perform(row.pk)
+    assert held.release(now=LATER)
     row.refresh_from_db()
-    assert (row.claim is not None) == (state == "held")
-    if state != "held":
-        assert (row.state, row.reason) == (state or before, reason)
+    assert (row.state, row.claim, row.sent_at) == (before, None, None)
 
 
-def test_a_worker_that_is_killed_gently_gives_its_row_back(
+BREAKS: list[tuple[BaseException, str | None, str]] = [
+    (WorkerStopping("it stops"), None, ""),
+    (SystemExit(), None, ""),
+    (Conflict("It changed."), "failed", "It changed."),
+    (KeyError("nobody foresaw this"), "failed", "unexpected: KeyError: 'nobody foresaw this'"),
+    (LeaseLost(), "held", ""),
+    (BudgetSpent("5 calls"), None, ""),
+]
+"""What ends the work, the state of its row then (none for the one before), and its reason."""
+
+
+def test_no_row_hangs_when_the_work_breaks(
     kind: WorkKind[Any], row: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def run(row: Work, held: object) -> None:
-        raise SystemExit
-
-    monkeypatch.setattr(kind, "run", run)
-    with pytest.raises(SystemExit):
-        kind.perform(row.pk)
-    row.refresh_from_db()
-    assert (row.claim, row.state in row.UNDER_WAY) == (None, True)
+    before = row.state
+    monkeypatch.setattr(kind, "lost_limit", 5)
+    for error, state, reason in BREAKS:
+        monkeypatch.setattr(kind, "run", Mock(side_effect=error))
+        with pytest.raises(SystemExit) if isinstance(error, SystemExit) else nullcontext():
+            assert kind.perform(row.pk)
+        row.refresh_from_db()
+        assert (row.claim is not None) == (state == "held")
+        if state == "held":
+            assert kind.take_back_lost(now=timezone.now() + MINUTE) == [row.pk]
+        else:
+            assert (row.state, row.reason) == (state or before, reason)
+        if state == "failed":
+            assert row.wait_again(**waiting(kind))
+            JudgeRun.objects.update(state="running")  # it was over with its only pair
 
 
 # --- Threads -------------------------------------------------------------------------------------
