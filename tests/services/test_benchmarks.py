@@ -199,19 +199,14 @@ def test_what_has_no_reference_is_for_the_test() -> None:
     assert set(row.items.values_list("split", flat=True)) == {"test"}
 
 
-@pytest.mark.parametrize(
-    ("changes", "fault", "reason"),
-    [
+def test_what_is_asked_for_is_checked(streets: list[Scenario]) -> None:
+    for changes, fault, reason in (
         ({"slug": "No slug"}, InvalidDocument, "slug"),
         ({"title": " "}, InvalidDocument, "title"),
         ({"practice": 95.0}, InvalidDocument, "practice: goes from 0 to 90, not 95"),
-    ],
-)
-def test_what_is_asked_for_is_checked(
-    changes: dict[str, object], fault: type[Exception], reason: str, streets: list[Scenario]
-) -> None:
-    with pytest.raises(fault, match=reason):
-        make_benchmark(asked(**changes))
+    ):
+        with pytest.raises(fault, match=reason):
+            make_benchmark(asked(**changes))
     with pytest.raises(Conflict, match="1 to 2000 scenarios; these are 0"):
         make_benchmark(asked("paper"))
     assert not Benchmark.objects.exists()

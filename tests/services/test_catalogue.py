@@ -262,6 +262,15 @@ def test_an_older_installation_is_upgraded_but_for_what_was_augmented(folder: Pa
     assert Augmentation.objects.get().scenario.instruction == PARKED["instruction"]
 
 
+def test_a_changed_file_follows_neither_itself_nor_nothing(folder: Path) -> None:
+    add_copy(folder, "then", follows="parked-car")
+    load_catalogue(folder=folder)
+    for followed in ("no-such", "then"):
+        add_copy(folder, "then", follows=followed)
+        with pytest.raises((Conflict, UnknownName), match=followed):
+            load_catalogue(folder=folder)
+
+
 def test_rows_from_elsewhere_are_never_replaced(folder: Path) -> None:
     import_scene(source="json", path=folder / "scenes/street.json", frame=0, slug="street")
     with pytest.raises(Conflict, match="from the source 'json'"):

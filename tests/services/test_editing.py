@@ -86,9 +86,9 @@ def test_what_is_added_ahead_is_on_its_lane(here: Scene, pose: tuple[float, floa
     assert shown["ahead"] == pytest.approx(pose, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("agent", "x_m", "y_m", "heading_rad"),
-    [
+def test_an_agent_is_put_on_the_centreline() -> None:
+    here = add_scenario("street", reference=None)
+    for agent, x_m, y_m, heading_rad in (
         (CAR, 20.0, 0.0, 0.0),
         (vehicle("Added1", 20.0, 0.4, 3.0), 20.0, 0.0, math.pi),  # against its lane
         (vehicle("Added1", 20.0, 3.0, 3.0), 20.0, 3.5, math.pi),  # along the other one
@@ -97,17 +97,12 @@ def test_what_is_added_ahead_is_on_its_lane(here: Scene, pose: tuple[float, floa
         (pedestrian("Added1", 20.0, -1.0, (20.0, 6.0)), 20.0, 0.0, math.pi / 2),  # walks across
         (pedestrian("Added1", 20.0, -1.0, (26.0, 6.0)), 20.0, 0.0, math.pi / 4),
         (pedestrian("Added1", 20.0, -1.0, (20.0, 0.0)), 20.0, 0.0, math.pi / 2),  # is there
-    ],
-)
-def test_an_agent_is_put_on_the_centreline(
-    agent: TrafficAgent, x_m: float, y_m: float, heading_rad: float
-) -> None:
-    here = add_scenario("street", reference=None)
-    found = check_edit(here, document(agent), snapped="Added1").modification
-    [snapped] = found["add"]
-    assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
-    turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
-    assert turn == pytest.approx(0.0, abs=1e-6)
+    ):
+        found = check_edit(here, document(agent), snapped="Added1").modification
+        [snapped] = found["add"]
+        assert (snapped["x_m"], snapped["y_m"]) == pytest.approx((x_m, y_m))
+        turn = math.remainder(snapped["heading_rad"] - heading_rad, 2.0 * math.pi)
+        assert turn == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_agent_is_given_a_motion_by_name_and_loses_it_again() -> None:
@@ -137,20 +132,17 @@ def test_a_door_comes_as_an_object_of_its_own_and_once() -> None:
     assert again.presets["Added1-door"]["within_m"] == 9.0
 
 
-@pytest.mark.parametrize(
-    ("wish", "problem"),
-    [
+def test_a_motion_that_can_t_be_is_refused_in_words() -> None:
+    here = add_scenario("street", reference=None)
+    for wish, problem in (
         ({"agent_id": "Added1", "preset": "cut_in"}, "Cut-in: it has to drive."),
         ({"agent_id": "Added1", "preset": "leap"}, "Input should be 'cut_in'"),
         ({"agent_id": "Added7", "preset": "cut_in"}, "Unknown agent 'Added7'. Known: Added1."),
         ({"agent_id": "Added1", "preset": "cut_in", "number": 0.0}, "greater than 0"),
-    ],
-)
-def test_a_motion_that_can_t_be_is_refused_in_words(wish: dict[str, Any], problem: str) -> None:
-    here = add_scenario("street", reference=None)
-    found = check_edit(here, document(PARKED), preset=wish)
-    assert problem in found.problem
-    assert found.modification is None
+    ):
+        found = check_edit(here, document(PARKED), preset=wish)
+        assert problem in found.problem
+        assert found.modification is None
 
 
 def test_a_drawn_reference_is_kept_drawn_and_told() -> None:

@@ -15,17 +15,14 @@ from augment.services.scenarios import uploads
 from augment.services.scenarios.scene_imports import note_sentences
 from tests.formats.av2_logs import write_log
 from tests.formats.openscenario_files import CAR, ROADS, catalog, scenario
+from tests.formats.test_archive import folder_as_zip
 
 pytestmark = pytest.mark.django_db
 
 
 @pytest.fixture
 def log(tmp_path: Path) -> bytes:
-    folder, packed = write_log(tmp_path / "log"), BytesIO()
-    with zipfile.ZipFile(packed, "w") as made:
-        for file in sorted(folder.rglob("*")):
-            made.write(file, file.relative_to(tmp_path))
-    return packed.getvalue()
+    return folder_as_zip(tmp_path / "log.zip", write_log(tmp_path / "log")).read_bytes()
 
 
 def sent(content: bytes, name: str = "log.zip", source: str = "") -> SceneUpload:
@@ -83,20 +80,17 @@ def test_a_long_recording_offers_its_start(log: bytes, monkeypatch: pytest.Monke
     assert list(states) == [(0, "drawn"), (1, "queued"), (2, "queued")]
 
 
-@pytest.mark.parametrize(
-    ("content", "name", "reason"),
-    [
+def test_what_can_not_be_read_leaves_no_scene() -> None:
+    for content, name, reason in (
         (b"hello", "notes.txt", "none of the formats"),
         (b"PK\x03\x04 and nothing", "log.zip", "is broken"),
         (b"{}", "scene.json", "none of the formats"),
         (b'{"format": "scenario-arena/scene"', "scene.json", "scene.json"),
-    ],
-)
-def test_what_can_not_be_read_leaves_no_scene(content: bytes, name: str, reason: str) -> None:
-    row = read(sent(content, name))
-    assert (row.state, row.tracks) == ("failed", [])
-    assert reason in row.reason
-    assert not BaseScene.objects.exists()
+    ):
+        row = read(sent(content, name))
+        assert (row.state, row.tracks) == ("failed", [])
+        assert reason in row.reason
+        assert not BaseScene.objects.exists()
 
 
 def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> None:
@@ -119,18 +113,15 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
         assert moment.scene.slug == "first"
 
 
-@pytest.mark.parametrize(
-    ("given", "kept"),
-    [
+def test_a_name_is_kept_in_plain_letters() -> None:
+    for given, kept in (
         ("../../etc/passwd", "passwd"),
         ("a b/ü?.json", "json"),
         ("C:\\logs\\my log.zip", "my-log.zip"),
         ("...", "file"),
         ("x" * 200 + ".json", "x" * 60 + "x" * 35 + ".json"),
-    ],
-)
-def test_a_name_is_kept_in_plain_letters(given: str, kept: str) -> None:
-    assert uploads.plain_name(given) == kept
+    ):
+        assert uploads.plain_name(given) == kept
 
 
 def test_a_zip_of_a_scenario_with_map_and_catalog_offers_each_ego() -> None:
