@@ -22,7 +22,7 @@ from arena.rating.models import ELO_PER_LOGIT, DidNotConverge, Meetings, to_elo
 from arena.rating.rules import Unit
 from arena.rating.sandwich import design_matrix, estimate_spread, pulls_of_model
 from bench.report import table
-from bench.worlds import THRESHOLDS, World, paper_ratings
+from bench.worlds import THRESHOLDS, World, chances, paper_ratings
 
 EXPERTS, VOTES, VOTED_SCENARIOS, ALL_SCENARIOS = 9, 40, 50, 200
 RATIOS = (1, 5, 20)
@@ -52,8 +52,7 @@ def hold_study(rng: np.random.Generator, unit_sd: float, votes_each: int = VOTES
     scenario, pair = unit // 36, unit % 36
     own = gap[scenario, pair] + taste[expert, LEFT[pair]] - taste[expert, RIGHT[pair]]
     threshold = THRESHOLDS[rng.integers(0, len(THRESHOLDS), EXPERTS)][expert]
-    win = 1.0 / (1.0 + threshold * np.exp(-own / ELO_PER_LOGIT))
-    loss = 1.0 / (1.0 + threshold * np.exp(own / ELO_PER_LOGIT))
+    win, loss = chances(own / ELO_PER_LOGIT, threshold)
     drawn = rng.random(len(unit))
     votes = Comparisons(
         names=tuple(f"c{index}" for index in range(len(ratings))),
@@ -71,9 +70,7 @@ Judge = Callable[[FloatArray, np.random.Generator], FloatArray]
 
 
 def _expected(gap: FloatArray) -> FloatArray:
-    middle = float(np.median(THRESHOLDS))
-    win = 1.0 / (1.0 + middle * np.exp(-gap / ELO_PER_LOGIT))
-    loss = 1.0 / (1.0 + middle * np.exp(gap / ELO_PER_LOGIT))
+    win, loss = chances(gap / ELO_PER_LOGIT, np.asarray(np.median(THRESHOLDS)))
     return np.asarray(0.5 * (1.0 + win - loss))
 
 

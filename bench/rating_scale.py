@@ -17,16 +17,16 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from arena.rating.comparisons import Comparisons, IntArray
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, rate
-from arena.rating.models import ELO_PER_LOGIT
 from bench.environments import make_environment
 from bench.report import ROOT, load, table, write_section
+from tests.rating.votes import simulated
 
 HEADING = "Bootstrap and closed form, with many contestants"
 RESAMPLES_HEADING = "Intervals by resampled votes, beside others"
@@ -187,21 +187,11 @@ took = time.process_time() - before
 def drawn(crowd: Crowd, seed: int = 1) -> Comparisons:
     """Votes whose expected score is exactly logistic."""
     rng = np.random.default_rng(seed)
-    strength = rng.normal(0.0, 100.0, crowd.contestants) / ELO_PER_LOGIT
-    first: IntArray = rng.integers(0, crowd.contestants, crowd.votes)
-    second = (first + rng.integers(1, crowd.contestants, crowd.votes)) % crowd.contestants
-    chance = 1.0 / (1.0 + np.exp(strength[second] - strength[first]))
-    tied = TIES * np.minimum(chance, 1.0 - chance)
-    dice = rng.random(crowd.votes)
+    elo = rng.normal(1000.0, 100.0, crowd.contestants).tolist()
+    votes = simulated(elo, crowd.votes, seed, ties=TIES, scenarios=crowd.scenarios)
     busy = 1.0 / np.arange(1.0, crowd.experts + 1.0) ** 0.7
-    return Comparisons(
-        names=tuple(f"c{number}" for number in range(crowd.contestants)),
-        first=first,
-        second=second,
-        score=np.where(dice < chance - tied, 1.0, np.where(dice < chance + tied, 0.5, 0.0)),
-        expert=rng.choice(crowd.experts, crowd.votes, p=busy / busy.sum()),
-        scenario=rng.integers(0, crowd.scenarios, crowd.votes),
-    )
+    expert = rng.choice(crowd.experts, crowd.votes, p=busy / busy.sum())
+    return replace(votes, expert=expert)
 
 
 def measure(crowd: Crowd, intervals: Intervals) -> dict[str, float]:

@@ -120,7 +120,7 @@ class World:
         spread = np.sqrt(variance) / ELO_PER_LOGIT
         nodes, weights = np.polynomial.hermite_e.hermegauss(60)
         gaps = (strengths[low] - strengths[high])[:, None] + side / ELO_PER_LOGIT + spread * nodes
-        win, loss = _chances(gaps[None], thresholds[:, None, None])
+        win, loss = chances(gaps[None], thresholds[:, None, None])
         return win, loss, weights / weights.sum()
 
     def votes(self, rng: np.random.Generator) -> Comparisons:
@@ -206,7 +206,7 @@ class _Panel:
         seen = self.seen[scenario, expert]
         rows = np.arange(len(expert))
         gap = (seen[rows, first] - seen[rows, second] + self.side[expert]) / ELO_PER_LOGIT
-        win, loss = _chances(gap, self.threshold[expert])
+        win, loss = chances(gap, self.threshold[expert])
         at_random = self.is_spammer[expert]
         win, loss = np.where(at_random, 1 / 3, win), np.where(at_random, 1 / 3, loss)
         drawn = rng.random(len(rows))
@@ -241,7 +241,7 @@ def rate_scores(contestants: int, games: FloatArray, scores: FloatArray) -> Floa
     return to_elo(fit(Meetings(contestants, pairs), games[:, None], scored[:, None])[:, 0])
 
 
-def _chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:
+def chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The chances that the first wins and loses; the rest are ties."""
     win, loss = 1.0 / (1.0 + threshold * np.exp(-gap)), 1.0 / (1.0 + threshold * np.exp(gap))
     return win, loss

@@ -10,8 +10,9 @@ import numpy as np
 from augment.benchmark.folder import write_folder
 from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Split, Stratum
 from augment.scene.entities import AgentType, Modification, Scene
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording
 from tests.scenes import cone, scene, vehicle
+from tests.simulation.worlds import track
 
 SECRET_M = 43.2187654
 """A number that stands in references of the test alone."""
@@ -20,15 +21,7 @@ CAR = vehicle("Agent2", 20.0, 0.0)
 RECORDING = Recording(
     times_s=np.array([0.0, 0.5, 1.0]),
     ego=np.array([[0.0, 0.0, 0.0, 8.0], [4.0, 0.0, 0.0, 8.0], [8.0, 0.0, 0.0, 8.0]]),
-    tracks=(
-        Track(
-            agent_id="Agent2",
-            type=CAR.type,
-            length_m=CAR.length_m,
-            width_m=CAR.width_m,
-            states=np.array([[20.0, 0.0, 0.0, 0.0]] * 2 + [[np.nan] * 4]),
-        ),
-    ),
+    tracks=(track(CAR, np.array([[20.0, 0.0, 0.0, 0.0]] * 2 + [[np.nan] * 4])),),
 )
 
 

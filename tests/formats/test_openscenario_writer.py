@@ -1,6 +1,5 @@
 """Scenarios go out as OpenSCENARIO with an OpenDRIVE map, and ASAM's own checks find no fault."""
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,6 @@ import pytest
 from augment.formats.openscenario.writer import REAR_AXLE_SHARE, write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
-from augment.scene.codec import scene_from_document
 from augment.scene.entities import Lane, Scene
 from augment.scene.lane_graph import AnyLane
 from augment.scene.planned_motion import (
@@ -24,13 +22,13 @@ from augment.scene.planned_motion import (
     PointPath,
 )
 from augment.scene.recording import Recording
+from tests.fixtures.shelf import whole_scene
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, moving, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
 from tests.scene.test_planned_motion import with_motion
 from tests.scenes import curve, pedestrian, vehicle
 
-SCENES = Path(__file__).parents[2] / "fixtures" / "scenes"
 NOT_FOR_US = "check_asam_xodr_junctions_connection_one_link_to_incoming"
 """It holds for versions of OpenDRIVE before 1.7 alone, and says so."""
 
@@ -45,10 +43,6 @@ def lines(given: Cell) -> list[str]:
     return [str(loss) for loss in write([given]).losses]
 
 
-def authored(name: str) -> Scene:
-    return scene_from_document(json.loads((SCENES / f"{name}.json").read_text()))
-
-
 @pytest.mark.slow
 def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) -> None:
     log, seen = recorded(realdata)
@@ -59,8 +53,8 @@ def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) 
         cell(before, recording=recording, keeps_traffic=True, added=(), stem="recorded"),
         cell(log, recording=seen, keeps_traffic=True, added=(), stem="log"),
         scene_of_motions(),
-        cell(authored("station-cross"), added=(), stem="left-hand"),
-        cell(authored("reservoir-road"), added=(), stem="bends"),
+        cell(whole_scene("station-cross"), added=(), stem="left-hand"),
+        cell(whole_scene("reservoir-road"), added=(), stem="bends"),
     ]
     made = write(cells).files
     for name, content in made.items():

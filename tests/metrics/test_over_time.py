@@ -7,11 +7,12 @@ import pytest
 
 from augment.checks import Ground
 from augment.metrics.displacement import Displacement, OverTime, are_alike, displacement, summarise
-from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.planned_motion import AtPlace, AtTime, LanePath, NearEgo, PlannedMotion, Trigger
-from augment.scene.recording import Recording, Track
+from augment.scene.recording import Recording
 from tests.scene.test_planned_motion import two_lanes, with_motion
 from tests.scenes import cone, pedestrian, scene, vehicle
+from tests.simulation.worlds import track
 
 FIVE_MPS = ((0.0, 5.0), (60.0, 5.0))
 
@@ -102,14 +103,8 @@ def recorded_at(ego_mps: float) -> Recording:
     times_s = np.linspace(0.0, 10.0, 101)
     states = np.zeros((2, 101, 4))
     states[:, :, 0] = np.outer([ego_mps, 5.0], times_s)
-    track = Track(
-        agent_id="Agent9",
-        type=AgentType.VEHICLE,
-        length_m=4.8,
-        width_m=2.0,
-        states=states[1] + (0.0, 7.0, 0.0, 5.0),
-    )
-    return Recording(times_s=times_s, ego=states[0] + (0.0, 0.0, 0.0, ego_mps), tracks=(track,))
+    other = track(vehicle("Agent9", 0.0, 7.0), states[1] + (0.0, 7.0, 0.0, 5.0))
+    return Recording(times_s=times_s, ego=states[0] + (0.0, 0.0, 0.0, ego_mps), tracks=(other,))
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, Scene, TrafficAgent
+from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.recording import Recording, Track
 from augment.simulation.drive import Drive
 from augment.simulation.planning import Plan, Situation
@@ -22,7 +21,7 @@ from augment.simulation.states import (
     Y,
     to_objects,
 )
-from tests.scenes import EGO, scene, vehicle
+from tests.scenes import EGO, lanes, scene, vehicle
 
 BODY = EgoBody()
 LIMIT_MPS = 10.0
@@ -32,13 +31,8 @@ def street(
     length_m: float = 400.0, *, speed_mps: float = 8.0, limit_mps: float | None = LIMIT_MPS
 ) -> Scene:
     """Lane1 along y = 0 from x = -50 m on, Lane2 towards it along y = 3.5 m, nothing else."""
-    made = scene(ego=replace(EGO, speed_mps=speed_mps), areas=())
-    lines = [[(-50.0, 0.0), (length_m, 0.0)], [(length_m, 3.5), (-50.0, 3.5)]]
-    lanes = tuple(
-        Lane(id=f"Lane{n + 1}", centerline=Polyline(line), width_m=3.5, speed_limit_mps=limit_mps)
-        for n, line in enumerate(lines)
-    )
-    return replace(made, lanes=lanes)
+    both = lanes(0.0, oncoming_m=(3.5,), ends_m=(-50.0, length_m), speed_limit_mps=limit_mps)
+    return scene(ego=replace(EGO, speed_mps=speed_mps), areas=(), lanes=both)
 
 
 def states_along(

@@ -1,6 +1,5 @@
 """How near the pose tool and the control points of a prompt are to the centrelines themselves."""
 
-import json
 import math
 from pathlib import Path
 
@@ -9,17 +8,13 @@ import pytest
 from numpy.typing import NDArray
 
 from augment.prompts.vectors import control_points, curve_from, short_names
-from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.pose_tool import PoseTool
+from tests.fixtures.shelf import HARD_SCENES, SCENES, whole_scene
 from tests.formats.test_recorded_formats import FILES, reading
 
-FIXTURES = Path(__file__).parents[2] / "fixtures"
-AUTHORED = [
-    scene_from_document(json.loads(path.read_text(encoding="utf-8")))
-    for path in sorted(FIXTURES.glob("**/scenes/*.json"))[::4]
-]
+AUTHORED = [whole_scene(name) for name in [*HARD_SCENES, *SCENES][::4]]
 EVERY_M = 4.0
 
 

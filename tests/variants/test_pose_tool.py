@@ -18,7 +18,7 @@ from augment.scene.planned_mover import check_lane_path
 from augment.variants.pose_tool import PoseTool
 from augment.variants.retrieval import OBJECT_TYPES
 from tests.fixtures.shelf import whole_scene
-from tests.scenes import curve, junction, scene, vehicle
+from tests.scenes import curve, junction, lanes, scene, vehicle
 
 JUNCTION = PoseTool(junction())
 STREET = PoseTool(scene(agents=(vehicle("Agent2", 12.0, 3.9, math.pi),)))
@@ -229,9 +229,8 @@ def test_whatever_is_called_the_answer_is_json(arguments: object) -> None:
 
 def two_lanes() -> Scene:
     """Lane2 left of Lane1, the same way; Agent2 waits beside them."""
-    street = scene(agents=(vehicle("Agent2", 40.0, -6.0),))
-    left = replace(street.lanes[1], centerline=Polyline([(-50.0, 3.5), (100.0, 3.5)]))
-    return replace(street, lanes=(street.lanes[0], left))
+    both = lanes(0.0, 3.5, ends_m=(-50.0, 100.0))
+    return scene(lanes=both, agents=(vehicle("Agent2", 40.0, -6.0),))
 
 
 SETS_OUT = {"lane": "Lane2", "start": "Agent1", "distance_m": 30, "speed_mps": 4}
