@@ -200,63 +200,60 @@ def test_a_money_cap_needs_every_price() -> None:
     assert not GenerationJob.objects.exists()
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
+def test_a_cap_that_can_not_be_is_refused() -> None:
+    for given in (
         Caps(cap_usd=Decimal(0)),
         Caps(cap_usd=Decimal("NaN")),
         Caps(cap_usd=Decimal("-1")),
         Caps(cap_calls=0),
         Caps(cap_tokens=-5),
         Caps(cap_calls=10**12),
-    ],
-)
-def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
-    with pytest.raises(InvalidDocument, match="goes from 1"):
-        given.columns()
+    ):
+        with pytest.raises(InvalidDocument, match="goes from 1"):
+            given.columns()
 
 
-@pytest.mark.parametrize(
-    ("cap", "spent", "reserved", "room"),
-    [
-        # One more call needs 1,000 tokens, 1,000,000 nano-dollars and 1 call.
-        ({"tokens": 1000}, {}, {}, Room.TAKEN),
-        ({"tokens": 999}, {}, {}, Room.SPENT),
-        ({"tokens": 1500}, {"tokens": 500}, {}, Room.TAKEN),
-        ({"tokens": 1500}, {"tokens": 501}, {}, Room.SPENT),
-        ({"tokens": 1500}, {}, {"tokens": 500}, Room.TAKEN),
-        ({"tokens": 1500}, {}, {"tokens": 501}, Room.BUSY),
-        ({"tokens": 1500}, {"tokens": 500}, {"tokens": 1}, Room.BUSY),
-        ({"nano_usd": NANO}, {}, {}, Room.TAKEN),
-        ({"nano_usd": NANO - 1}, {}, {}, Room.SPENT),
-        ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO}, Room.TAKEN),
-        ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO + 1}, Room.BUSY),
-        ({"nano_usd": 3 * NANO}, {"nano_usd": 2 * NANO + 1}, {}, Room.SPENT),
-        ({"calls": 1}, {}, {}, Room.TAKEN),
-        ({"calls": 1}, {"calls": 1}, {}, Room.SPENT),
-        ({"calls": 1}, {}, {"calls": 1}, Room.BUSY),
-        ({"calls": 2}, {"calls": 1}, {}, Room.TAKEN),
-        # Of several caps the first that is reached counts.
-        ({"calls": 9, "tokens": 999}, {}, {}, Room.SPENT),
-        ({"calls": 1, "tokens": 9999}, {}, {"calls": 1}, Room.BUSY),
-        ({}, {"tokens": 10**12}, {}, Room.TAKEN),
-    ],
-)
-def test_a_cap_has_room_up_to_its_last_unit(
-    cap: dict[str, int], spent: dict[str, int], reserved: dict[str, int], room: Room
-) -> None:
+ROOMS: list[tuple[dict[str, int], dict[str, int], dict[str, int], Room]] = [
+    # One more call needs 1,000 tokens, 1,000,000 nano-dollars and 1 call.
+    ({"tokens": 1000}, {}, {}, Room.TAKEN),
+    ({"tokens": 999}, {}, {}, Room.SPENT),
+    ({"tokens": 1500}, {"tokens": 500}, {}, Room.TAKEN),
+    ({"tokens": 1500}, {"tokens": 501}, {}, Room.SPENT),
+    ({"tokens": 1500}, {}, {"tokens": 500}, Room.TAKEN),
+    ({"tokens": 1500}, {}, {"tokens": 501}, Room.BUSY),
+    ({"tokens": 1500}, {"tokens": 500}, {"tokens": 1}, Room.BUSY),
+    ({"nano_usd": NANO}, {}, {}, Room.TAKEN),
+    ({"nano_usd": NANO - 1}, {}, {}, Room.SPENT),
+    ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO}, Room.TAKEN),
+    ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO + 1}, Room.BUSY),
+    ({"nano_usd": 3 * NANO}, {"nano_usd": 2 * NANO + 1}, {}, Room.SPENT),
+    ({"calls": 1}, {}, {}, Room.TAKEN),
+    ({"calls": 1}, {"calls": 1}, {}, Room.SPENT),
+    ({"calls": 1}, {}, {"calls": 1}, Room.BUSY),
+    ({"calls": 2}, {"calls": 1}, {}, Room.TAKEN),
+    # Of several caps the first that is reached counts.
+    ({"calls": 9, "tokens": 999}, {}, {}, Room.SPENT),
+    ({"calls": 1, "tokens": 9999}, {}, {"calls": 1}, Room.BUSY),
+    ({}, {"tokens": 10**12}, {}, Room.TAKEN),
+]
+"""Caps, what is spent and what is reserved of them, and whether there is room for a call."""
+
+
+def test_a_cap_has_room_up_to_its_last_unit() -> None:
     job = llama_job()
-    columns = {f"cap_{name}": value for name, value in cap.items()}
-    columns |= {f"spent_{name}": value for name, value in spent.items()}
-    columns |= {f"reserved_{name}": value for name, value in reserved.items()}
-    GenerationJob.objects.update(**columns)
-    assert reserve(job) == room
-    after = GenerationJob.objects.get()
-    taken = int(room == Room.TAKEN)
-    assert after.reserved_tokens == reserved.get("tokens", 0) + 1000 * taken
-    assert after.reserved_calls == reserved.get("calls", 0) + taken
-    assert after.reserved_nano_usd == reserved.get("nano_usd", 0) + NANO * taken
-    assert (after.state == "stopped_at_cap") is (room == Room.SPENT)
+    units = ("calls", "tokens", "nano_usd")
+    for cap, spent, reserved, room in ROOMS:
+        columns: dict[str, object] = {f"cap_{unit}": cap.get(unit) for unit in units}
+        columns |= {f"spent_{unit}": spent.get(unit, 0) for unit in units}
+        columns |= {f"reserved_{unit}": reserved.get(unit, 0) for unit in units}
+        GenerationJob.objects.update(**columns, state=JOB.RUNNING)
+        assert reserve(job) == room
+        after = GenerationJob.objects.get()
+        taken = int(room == Room.TAKEN)
+        assert after.reserved_tokens == reserved.get("tokens", 0) + 1000 * taken
+        assert after.reserved_calls == reserved.get("calls", 0) + taken
+        assert after.reserved_nano_usd == reserved.get("nano_usd", 0) + NANO * taken
+        assert (after.state == "stopped_at_cap") is (room == Room.SPENT)
 
 
 @pytest.mark.parametrize(

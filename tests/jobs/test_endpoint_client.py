@@ -21,7 +21,7 @@ from tests.jobs.scripted import Scripted
 from tests.llm.json_server import serving
 from tests.variants.playing import MemoryTranscript
 
-pytestmark = pytest.mark.django_db(transaction=True)
+pytestmark = pytest.mark.django_db
 ASKED = Request(
     model="picky", messages=(Message(speaker=Speaker.USER, text="Hello"),), temperature=0.0, seed=7
 )

@@ -135,9 +135,8 @@ def test_of_what_moves_four_frames_are_shown_beside_the_still() -> None:
         assert np.ptp(columns) == pytest.approx(wide, abs=2)
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "became", "preference"),
-    [
+def test_a_preference_counts_where_it_survives_the_exchange() -> None:
+    for first, second, became, preference in (
         ("A", "B", Exchange.KEPT, 1),
         ("B", "A", Exchange.KEPT, -1),
         ("A", "A", Exchange.LOST, 0),
@@ -147,12 +146,8 @@ def test_of_what_moves_four_frames_are_shown_beside_the_still() -> None:
         ("equal", "equal", Exchange.EQUAL, 0),
         ("unreadable", "B", Exchange.UNREADABLE, 0),
         ("equal", "unreadable", Exchange.UNREADABLE, 0),
-    ],
-)
-def test_a_preference_counts_where_it_survives_the_exchange(
-    first: str, second: str, became: Exchange, preference: int
-) -> None:
-    assert (exchange(first, second), combine_answers(first, second)) == (became, preference)
+    ):
+        assert (exchange(first, second), combine_answers(first, second)) == (became, preference)
 
 
 @pytest.mark.parametrize("babble", ["Both are nice.", says("C"), '```json\n{"reason": ""}\n```'])
@@ -252,9 +247,8 @@ def test_the_stand_in_judges_by_what_it_is_sent(model: str, first: str, second: 
     assert (row.first, row.second) == (first, second)
 
 
-@pytest.mark.parametrize(
-    ("model", "family"),
-    [
+def test_a_family_is_the_vendor_or_the_first_word() -> None:
+    for model, family in (
         ("gpt-4o-2024-08-06", "openai"),
         ("o3-mini", "openai"),
         ("claude-3-5-sonnet", "anthropic"),
@@ -263,7 +257,5 @@ def test_the_stand_in_judges_by_what_it_is_sent(model: str, first: str, second: 
         ("llama3.1:70b", "llama"),
         ("Qwen/Qwen2-VL-7B", "qwen"),
         ("fake-good", "fake"),
-    ],
-)
-def test_a_family_is_the_vendor_or_the_first_word(model: str, family: str) -> None:
-    assert vendor_family(model) == family
+    ):
+        assert vendor_family(model) == family

@@ -93,11 +93,11 @@ REFUSED: dict[str, dict[str, object]] = {
 }
 
 
-@pytest.mark.parametrize("columns", REFUSED.values(), ids=REFUSED)
-def test_the_database_refuses_a_row_that_can_not_be(columns: dict[str, object]) -> None:
+def test_the_database_refuses_a_row_that_can_not_be() -> None:
     row = only_row(launch())
-    with pytest.raises(IntegrityError), transaction.atomic():
-        Augmentation.objects.filter(pk=row.pk).update(**columns)
+    for columns in REFUSED.values():
+        with pytest.raises(IntegrityError), transaction.atomic():
+            Augmentation.objects.filter(pk=row.pk).update(**columns)
 
 
 def test_the_database_refuses_a_second_attempt_of_one_number_and_a_second_row_of_a_cell() -> None:

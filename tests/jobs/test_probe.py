@@ -18,7 +18,7 @@ from augment.services.running.choosing import find_obstacle
 from tests.jobs.rows import add_model
 from tests.llm.json_server import JsonServer, serving
 
-pytestmark = pytest.mark.django_db(transaction=True)
+pytestmark = pytest.mark.django_db
 EVERYTHING = frozenset(
     {*("temperature", "tools", "images", "window", "usage", "seed"), *LengthName, *SchemaForm}
 )

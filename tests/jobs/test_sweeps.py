@@ -189,22 +189,17 @@ def test_a_value_is_kept_without_an_intent_that_asks_for_something_else_now(now:
     assert LoadedScenario(ended(sweep, at_2=0.4).hardest).intent is None
 
 
-@pytest.mark.parametrize(
-    ("changed", "error", "words"),
-    [
+def test_a_sweep_that_can_not_be_is_refused() -> None:
+    scenario = add_parked()
+    for changed, error, words in (
         ({"number": "add[7].y_m"}, UnknownName, r"add\[0\]\.y_m"),
         ({"planner": "nobody.Knows"}, UnknownName, "pdm-closed"),
         ({"high": -1.0}, InvalidDocument, "above low"),
         ({"number": "add[0].width_m", "low": 200.0, "high": 300.0}, Conflict, "No value"),
-    ],
-)
-def test_a_sweep_that_can_not_be_is_refused(
-    changed: dict[str, Any], error: type[Exception], words: str
-) -> None:
-    scenario = add_parked()
-    with pytest.raises(error, match=words):
-        plan_sweep(scenario=scenario, request=asked(**changed))
-    assert not Sweep.objects.exists()
+    ):
+        with pytest.raises(error, match=words):
+            plan_sweep(scenario=scenario, request=asked(**changed))
+        assert not Sweep.objects.exists()
 
 
 def test_a_family_becomes_scenarios_with_exact_numbers_named_after_the_first() -> None:

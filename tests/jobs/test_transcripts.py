@@ -188,7 +188,7 @@ def test_what_a_model_says_is_never_markup() -> None:
     assert "&lt;script&gt;alert(1)" in shown
 
 
-@pytest.mark.parametrize("digest", ["0" * 64, "0" * 63, "A" * 64, "secret_key"])
-def test_no_other_file_is_given_out(digest: str) -> None:
-    url = reverse("asked-image", args=[digest])
-    assert signed_in(people()["admin"]).get(url).status_code == 404
+def test_no_other_file_is_given_out() -> None:
+    admin = signed_in(people()["admin"])
+    for digest in ("0" * 64, "0" * 63, "A" * 64, "secret_key"):
+        assert admin.get(reverse("asked-image", args=[digest])).status_code == 404
