@@ -6,6 +6,7 @@ import re
 import time
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -89,40 +90,41 @@ def fault_of(
     return fault
 
 
-@pytest.mark.parametrize("value", WRONG, ids=str)
-@pytest.mark.parametrize("path", paths(WHOLE), ids=lambda path: ".".join(map(str, path)))
-def test_no_value_of_an_answer_is_silently_another(path: tuple[Any, ...], value: object) -> None:
+def test_no_value_of_an_answer_is_silently_another() -> None:
     """Whatever stands in a place is shown, remarked upon or a fault, unless it says nothing."""
-    reply = outcome(put(WHOLE, path, value))
-    says_nothing = is_empty(value) or path[-1] in ("type", "total_tokens")
-    says_nothing |= value == {"a": 1} and str(path[-1]).startswith(("usage", "prompt_tokens_d"))
-    if isinstance(reply, ModelFault):
-        assert reply.retryable
-    elif not (reply.remarks or says_nothing or reply.refusal is not None):
-        texts = (reply.text, reply.reasoning, reply.model, reply.finish_reason)
-        calls = [text for one in reply.tool_calls for text in (one.id, one.name, one.arguments)]
-        counts = (reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens)
-        written: set[object] = {json.dumps(value), "a" if value == [["a"]] else str(value)}
-        written |= {value} if isinstance(value, int) else set()
-        assert written & {*texts, *calls, *counts}, reply
+    for path, value in product(paths(WHOLE), WRONG):
+        reply = outcome(put(WHOLE, path, value))
+        says_nothing = is_empty(value) or path[-1] in ("type", "total_tokens")
+        says_nothing |= value == {"a": 1} and str(path[-1]).startswith(
+            ("usage", "prompt_tokens_d")
+        )
+        if isinstance(reply, ModelFault):
+            assert reply.retryable
+        elif not (reply.remarks or says_nothing or reply.refusal is not None):
+            texts = (reply.text, reply.reasoning, reply.model, reply.finish_reason)
+            calls = [
+                text for one in reply.tool_calls for text in (one.id, one.name, one.arguments)
+            ]
+            counts = (reply.prompt_tokens, reply.completion_tokens, reply.cached_tokens)
+            written: set[object] = {json.dumps(value), "a" if value == [["a"]] else str(value)}
+            written |= {value} if isinstance(value, int) else set()
+            assert written & {*texts, *calls, *counts}, (path, value, reply)
+    assert all(isinstance(outcome(value), ModelFault) for value in WRONG)
 
 
 ERROR = {"message": "No.", "type": "t", "param": "messages", "code": "c"}
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
+def test_whatever_an_error_body_is_it_is_shown() -> None:
+    bodies: tuple[Any, ...] = (
         *({"error": ERROR | {name: value}} for name in ERROR for value in WRONG),
         *({name: value} for name in ("error", "detail", "message", "errors") for value in WRONG),
         *WRONG,
-    ],
-    ids=str,
-)
-def test_whatever_an_error_body_is_it_is_shown(body: Any) -> None:
-    fault = fault_of(400, body, seed=7, temperature=0.5)
-    assert not isinstance(fault, ParameterRefused)
-    assert is_empty(body) or ": " in str(fault), fault
+    )
+    for body in bodies:
+        fault = fault_of(400, body, seed=7, temperature=0.5)
+        assert not isinstance(fault, ParameterRefused)
+        assert is_empty(body) or ": " in str(fault), (body, fault)
 
 
 @pytest.mark.parametrize("row", rows("reason"), ids=str)

@@ -154,6 +154,8 @@ def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
         (b'[{"error": {"message": "Bad value."}}]', "400 Bad", "json", False, "Bad value."),
         (b'{"choices": []}', "200 OK", "json", True, "without a choice"),
         (b'{"choices"', "200 OK", "json", True, "not valid JSON"),
+        (b"", "200 OK", "json", True, "an empty body"),
+        (b" \n", "200 OK", "json", True, "an empty body"),
         (b"<p>Sign in</p>", "200 OK", "html", False, "instead of JSON"),
         (b'data: {"id":"x"}\n\n', "200 OK", "event-stream", False, "a stream of events"),
         (b': hi\ndata: {"error":{"code":502,"message":"Up."}}', "200 OK", "x", True, "Up."),
@@ -166,6 +168,10 @@ def test_what_is_no_answer_says_why(
     said = said.replace("text/json", "application/json")
     broken = fault(lambda connection: connection.sendall(f"{said}\r\n\r\n".encode() + body))
     assert (broken.retryable, text in str(broken)) == (retryable, True), broken
+
+
+def test_an_answer_may_begin_with_a_byte_order_mark() -> None:
+    assert ask(whole(b"\xef\xbb\xbf" + BODY)).text == "Hi"
 
 
 @pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000, "[" * 90_000 + "]" * 90_000])
@@ -217,5 +223,6 @@ def test_no_redirect_is_followed_not_even_to_this_computer(status: str) -> None:
     with speaking(whole(BODY)) as other:
         say = whole(b"", f"Location: {other.url}/chat/completions", status=status)
         broken = fault(say, api_key="sk-planted-4f7a9c0d1e2b3a")
+    assert f"{status[:3]}: it leads to {other.url}" in str(broken)
     assert broken.status == int(status[:3])
     assert other.heard == []

@@ -10,16 +10,16 @@ from unittest.mock import Mock
 
 import pytest
 
-from augment.errors import ModelFault, NotSent, ParameterRefused
+from augment.errors import ModelFault, NotSent
 from augment.fake_llm.server import FakeServer
 from augment.llm import wire_transport
 from augment.llm.addresses import Resolve
-from augment.llm.messages import Reply, Request
+from augment.llm.messages import Request
 from augment.llm.openai_wire import OpenAIWire
 from tests.llm.json_server import GOOD, recorder
 from tests.llm.raw_server import speaking, whole
 from tests.llm.test_addresses import leading_to
-from tests.llm.test_hostile_servers import ASKED, BODY, ask, fault
+from tests.llm.test_hostile_servers import ASKED, BODY
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
@@ -32,12 +32,6 @@ def fault_of(url: str, model: str) -> ModelFault:
     with OpenAIWire(base_url=url, api_key=None) as client, pytest.raises(ModelFault) as raised:
         client.complete(request(model))
     return raised.value
-
-
-def answer(*says: Any) -> Reply:
-    """What comes of a status, a body and headers."""
-    with recorder(*says) as server, OpenAIWire(base_url=server.url, api_key=None) as client:
-        return client.complete(request("m"))
 
 
 @pytest.mark.parametrize(
@@ -64,36 +58,6 @@ def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again
     assert isinstance(broken, NotSent)
     assert broken.retryable
     assert "refused" in str(broken)
-
-
-@pytest.mark.parametrize("body", [[], "text", 7, None, {"choices": [None]}, {"choices": {}}])
-def test_any_other_json_is_a_fault(body: object) -> None:
-    with pytest.raises(ModelFault):
-        answer(200, body)
-
-
-@pytest.mark.parametrize(
-    ("body", "problem"),
-    [
-        (b"\xef\xbb\xbf" + BODY, ""),
-        (b"", "an empty body"),
-        (b" \n", "an empty body"),
-        (b'data: {"type": "error", "error": {"message": "Busy"}}\n\n', "an error: Busy"),
-    ],
-    ids=["byte order mark", "nothing", "blank", "error in a stream"],
-)
-def test_a_success_without_an_answer_may_be_asked_for_again(body: bytes, problem: str) -> None:
-    if problem:
-        broken = fault(whole(body))
-        assert (broken.retryable, problem in str(broken)) == (True, True)
-    else:
-        assert ask(whole(body)).text == "Hi"
-
-
-def test_a_redirect_is_not_followed_and_says_where_it_leads() -> None:
-    moved = {"location": "https://elsewhere.example/v1"}
-    with pytest.raises(ModelFault, match=r"301: it leads to https://elsewhere\.example/v1"):
-        answer(301, {}, moved)
 
 
 @pytest.mark.parametrize(
@@ -178,16 +142,6 @@ def test_the_certificate_of_an_endpoint_is_checked() -> None:
         checked_by = inner._client._transport._pool._ssl_context
     assert checked_by.verify_mode is ssl.CERT_REQUIRED
     assert checked_by.check_hostname
-
-
-@pytest.mark.parametrize("status", [400, 422])
-def test_a_parameter_that_is_not_taken_is_named(status: int) -> None:
-    said = {"error": {"message": "Unknown field max_completion_tokens."}}
-    with pytest.raises(ParameterRefused) as caught:
-        answer(status, said)
-    refused = caught.value
-    assert (refused.parameter, refused.status) == ("max_completion_tokens", status)
-    assert refused.retryable
 
 
 def named(port: int, names: Resolve, scheme: str = "http") -> OpenAIWire:

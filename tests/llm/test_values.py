@@ -133,9 +133,8 @@ def test_a_text_has_at_least_so_many_tokens(text: str, least: int) -> None:
     assert least_tokens(text) == least
 
 
-@pytest.mark.parametrize(
-    ("text", "counted", "known", "is_cut"),
-    [
+def test_a_cut_prompt_shows_in_the_endpoints_count_of_tokens() -> None:
+    for text, counted, known, is_cut in (
         # Far below what was sent: a cut prompt at a window alone.
         (LONG, (1200, 10, "stop"), None, False),
         (LONG, (4096, 10, "stop"), None, True),
@@ -153,14 +152,10 @@ def test_a_text_has_at_least_so_many_tokens(text: str, least: int) -> None:
         ("Hello", (3000, 1096, "length"), None, False),
         ("Hello", (4000, 95, "length"), None, False),
         ("Hello", (4000, None, "length"), None, False),
-    ],
-)
-def test_a_cut_prompt_shows_in_the_endpoints_count_of_tokens(
-    text: str, counted: tuple[int, int | None, str], known: int | None, is_cut: bool
-) -> None:
-    cut = find_cut(request(text, max_tokens=1000), reply(*counted), context_tokens=known)
-    assert (cut is not None) == is_cut
-    assert cut is None or not cut.retryable
+    ):
+        cut = find_cut(request(text, max_tokens=1000), reply(*counted), context_tokens=known)
+        assert (cut is not None) == is_cut
+        assert cut is None or not cut.retryable
 
 
 def fault(*, retryable: bool = True, retry_after_s: float | None = None) -> ModelFault:
