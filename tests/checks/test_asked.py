@@ -65,9 +65,8 @@ def faults(
     return {one.kind for one in found}
 
 
-@pytest.mark.parametrize(
-    ("intent", "added"),
-    [
+def test_what_is_as_asked_for_has_no_fault() -> None:
+    for intent, added in (
         (CAR, (vehicle("Agent2", 20.0, 1.2),)),
         (CAR, (vehicle("Agent2", 22.0, 0.6, math.radians(10.0)),)),
         (MIDDLE, (vehicle("Agent2", 18.0, 0.9),)),
@@ -82,12 +81,8 @@ def faults(
         (walk(20.0, wish.Side.LEFT, end=CENTRED), (pedestrian("Agent2", 20.0, 6.0, (20.0, 0.3)),)),
         (NARROWED, TAPER),
         *((CLOSED, (A_BAR,)), (CLOSED, (replace(A_BAR, heading_rad=math.pi),))),
-    ],
-)
-def test_what_is_as_asked_for_has_no_fault(
-    intent: wish.Intent, added: tuple[TrafficAgent, ...]
-) -> None:
-    assert faults(intent, *added) == set()
+    ):
+        assert faults(intent, *added) == set()
 
 
 @pytest.mark.parametrize(
@@ -291,9 +286,8 @@ FIRST_ACROSS = wish.CrashRequest(spot=SPOT, count=2, facing=wish.Facing.ACROSS)
 AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
 
 
-@pytest.mark.parametrize(
-    ("request_", "added", "kinds"),
-    [
+def test_how_crashed_cars_lie_to_each_other() -> None:
+    for request_, added, kinds in (
         (CHAIN, AS_SAID, []),
         (CHAIN, (AS_SAID[2], *AS_SAID[:2]), []),  # the order of adding means nothing
         (CHAIN, (*AS_SAID[:2], replace(AS_SAID[2], heading_rad=0.5)), ["asked_heading"]),
@@ -309,9 +303,5 @@ AS_SAID = cars((25.0, 0.0, 0.0), (29.6, 0.0, 25.0), (34.2, 0.0, -35.0))
         (FURTHER, cars((25.0, 0.0, 0.0), (29.6, 0.0, 80.0), (27.7, 4.2, 0.0)), []),
         (FIRST_ACROSS, cars((25.0, 0.0, -80.0), (28.7, 0.0, 0.0)), []),
         (FIRST_ACROSS, cars((25.0, 0.0, 0.0), (29.9, 0.0, 0.0)), ["asked_heading"]),
-    ],
-)
-def test_how_crashed_cars_lie_to_each_other(
-    request_: wish.CrashRequest, added: tuple[TrafficAgent, ...], kinds: list[str]
-) -> None:
-    assert faults(wish.Intent(requests=(request_,)), *added) == set(kinds)
+    ):
+        assert faults(wish.Intent(requests=(request_,)), *added) == set(kinds)

@@ -149,24 +149,18 @@ def test_whatever_is_done_about_a_wish_that_can_t_be_met_is_wrong() -> None:
     assert f"The wish can't be met, and {gone} is changed: There is no tram {{here}}." in found
 
 
-@pytest.mark.parametrize(
-    ("bus_m", "relation", "distance", "wanted"),
-    [
+def test_a_distance_from_another_object_is_added_to_that_ones() -> None:
+    for bus_m, relation, distance, wanted in (
         (20.0, wish.Relation.AHEAD, metres(6.0), (26.0, 26.0)),
         (20.0, wish.Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
         (20.0, wish.Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
         (20.0, wish.Relation.AHEAD, None, (20.0, math.inf)),
-    ],
-)
-def test_a_distance_from_another_object_is_added_to_that_ones(
-    bus_m: float,
-    relation: wish.Relation,
-    distance: wish.Length | None,
-    wanted: tuple[float, float],
-) -> None:
-    (bus,) = parked(bus_m).requests
-    named = wish.VehicleRequest(spot=bus.spot, name="bus")
-    walker = wish.WalkRequest(spot=wish.Spot(anchor="bus", relation=relation, distance=distance))
-    lanes = LanesAcross.of(Ground.of(scene()))
-    resolved = resolve_spots(wish.Intent(requests=(named, walker)), lanes)
-    assert resolved.requests[1].spot.span_m == wanted
+    ):
+        (bus,) = parked(bus_m).requests
+        named = wish.VehicleRequest(spot=bus.spot, name="bus")
+        walker = wish.WalkRequest(
+            spot=wish.Spot(anchor="bus", relation=relation, distance=distance)
+        )
+        lanes = LanesAcross.of(Ground.of(scene()))
+        resolved = resolve_spots(wish.Intent(requests=(named, walker)), lanes)
+        assert resolved.requests[1].spot.span_m == wanted

@@ -6,26 +6,21 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity
-from augment.scene.entities import AgentType, Area, AreaKind, Scene
+from augment.scene.entities import AgentType, Area, AreaKind
 from tests.checks.worlds import found_in, of_kind, severities
 from tests.scenes import curve, junction, pedestrian, scene, vehicle
 
 
-@pytest.mark.parametrize(
-    ("world", "x_m", "y_m", "ahead_m", "left_m"),
-    [
+def test_the_distance_along_the_lanes() -> None:
+    for world, x_m, y_m, ahead_m, left_m in (
         (scene(), 30.0, -1.0, 30.0, -1.0),
         (scene(), -12.0, 3.5, -12.0, 3.5),
         (junction(), 50.0, 0.0, 50.0, 0.0),
         (curve(), 10.0 + 40.0 * math.sin(0.5), 40.0 * (1.0 - math.cos(0.5)), 30.0, 0.0),
-    ],
-)
-def test_the_distance_along_the_lanes(
-    world: Scene, x_m: float, y_m: float, ahead_m: float, left_m: float
-) -> None:
-    (lane,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), FindingKind.LANE)
-    assert lane.measured["ahead_m"] == pytest.approx(ahead_m, abs=0.02)
-    assert lane.measured["left_m"] == pytest.approx(left_m, abs=0.02)
+    ):
+        (lane,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), FindingKind.LANE)
+        assert lane.measured["ahead_m"] == pytest.approx(ahead_m, abs=0.02)
+        assert lane.measured["left_m"] == pytest.approx(left_m, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -140,21 +140,16 @@ def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
 
 
 # The cycle of ten steps begins at step 2: red for four of them, green for six.
-@pytest.mark.parametrize(
-    ("direction", "step", "state"),
-    [
+def test_a_light_shows_its_cycle_to_the_ways_in_its_direction(tmp_path: Path) -> None:
+    for direction, step, state in (
         *(("all", 0, TrafficLight.GREEN), ("all", 2, TrafficLight.RED)),
         *(("straight", 2, TrafficLight.RED), ("leftStraight", 2, TrafficLight.RED)),
         ("left", 2, TrafficLight.NONE),
-    ],
-)
-def test_a_light_shows_its_cycle_to_the_ways_in_its_direction(
-    tmp_path: Path, direction: str, step: int, state: TrafficLight
-) -> None:
-    scene = read(tmp_path, newer(direction), "70", step).scene
-    (connector,) = scene.connectors
-    assert (connector.traffic_light, connector.turn_type) == (state, TurnType.STRAIGHT)
-    assert connector.from_lane == "Lane1"
+    ):
+        scene = read(tmp_path, newer(direction), "70", step).scene
+        (connector,) = scene.connectors
+        assert (connector.traffic_light, connector.turn_type) == (state, TurnType.STRAIGHT)
+        assert connector.from_lane == "Lane1"
 
 
 def test_sidewalks_are_areas_and_no_lanes(tmp_path: Path) -> None:
@@ -231,19 +226,14 @@ def test_one_bad_part_is_left_out_with_a_note(
     assert (len(scene.lanes), len(scene.connectors), len(scene.agents)) == left
 
 
-@pytest.mark.parametrize(
-    ("sign", "value", "limit_mps"),
-    [
+def test_a_limit_is_what_its_sign_and_unit_say(tmp_path: Path) -> None:
+    for sign, value, limit_mps in (
         *(("R2-1", "25mph", 11.176), ("274", "30 km/h", 8.333), ("274.1", "30kmh", 8.333)),
         *(("B14", "13.89", 13.89), ("C43", "13,89", 13.89), ("r301", "10 m/s", 10.0)),
         *(("R2-1", "-3", None), ("R2-1", "30 furlongs", None), ("306", "30", None)),
-    ],
-)
-def test_a_limit_is_what_its_sign_and_unit_say(
-    tmp_path: Path, sign: str, value: str, limit_mps: float | None
-) -> None:
-    text = newer().replace("R2-1", sign).replace("11.5", value)
-    assert read(tmp_path, text).scene.lanes[0].speed_limit_mps == limit_mps
+    ):
+        text = newer().replace("R2-1", sign).replace("11.5", value)
+        assert read(tmp_path, text).scene.lanes[0].speed_limit_mps == limit_mps
 
 
 @pytest.mark.parametrize(

@@ -128,23 +128,18 @@ def test_who_stood_for_so_long_goes_on_faster_than_then(tmp_path: Path) -> None:
     assert other.states[[39, 59, 69], 3] == pytest.approx([0.0, 6.0, 8.0])
 
 
-@pytest.mark.parametrize(
-    ("shape", "dimension", "value", "gone_m"),
-    [
+def test_a_speed_is_reached_by_its_dynamics(tmp_path: Path) -> None:
+    for shape, dimension, value, gone_m in (
         ("linear", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
         ("linear", "rate", 4, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
         ("linear", "distance", 16, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
         ("sinusoidal", "time", 2, 4.0 * 1.0 + 2.0 * 8.0 + 12.0 * 2.0),
         ("step", "time", 0, 4.0 * 1.0 + 12.0 * 4.0),
-    ],
-)
-def test_a_speed_is_reached_by_its_dynamics(
-    shape: str, dimension: str, value: float, gone_m: float, tmp_path: Path
-) -> None:
-    dynamics = STEP.replace("step", shape).replace('"time"', f'"{dimension}"')
-    action = speed(12, dynamics.replace('"0"', f'"{value}"'))
-    other = move_other(tmp_path, event(action, by_time(1)))
-    assert other.states[50, 0] - other.states[0, 0] == pytest.approx(gone_m, abs=0.05)
+    ):
+        dynamics = STEP.replace("step", shape).replace('"time"', f'"{dimension}"')
+        action = speed(12, dynamics.replace('"0"', f'"{value}"'))
+        other = move_other(tmp_path, event(action, by_time(1)))
+        assert other.states[50, 0] - other.states[0, 0] == pytest.approx(gone_m, abs=0.05)
 
 
 @pytest.mark.parametrize(

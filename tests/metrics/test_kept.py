@@ -31,23 +31,18 @@ def test_only_what_both_references_have_alike_is_to_be_kept() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("after", "distance_m"),
-    [
+def test_it_is_measured_from_ones_own_answer_whatever_the_reference_says() -> None:
+    own = [replace(one, id=f"own-{one.id}", y_m=one.y_m + 2.0) for one in REFERENCE.added]
+    for after, distance_m in (
         (replace(CONE, x_m=30.1), 0.1),  # as near as things that look the same
         (replace(CONE, x_m=30.5), 0.5),
         (replace(CONE, y_m=4.0), 3.0),
-    ],
-)
-def test_it_is_measured_from_ones_own_answer_whatever_the_reference_says(
-    after: TrafficAgent, distance_m: float
-) -> None:
-    own = [replace(one, id=f"own-{one.id}", y_m=one.y_m + 2.0) for one in REFERENCE.added]
-    moved = replace(after, id="new", y_m=after.y_m + 2.0)
-    first, _ = kept(placed(*own), placed(own[0], moved, own[2]))
-    assert first.id == "own-r2"
-    assert first.distance_m == pytest.approx(distance_m)
-    assert first.is_kept is (distance_m < 0.15)
+    ):
+        moved = replace(after, id="new", y_m=after.y_m + 2.0)
+        first, _ = kept(placed(*own), placed(own[0], moved, own[2]))
+        assert first.id == "own-r2"
+        assert first.distance_m == pytest.approx(distance_m)
+        assert first.is_kept is (distance_m < 0.15)
 
 
 def test_what_is_gone_turned_or_of_no_answer_at_all_was_not_kept() -> None:

@@ -1,15 +1,10 @@
 """Which rater agrees with experts: shares counted by hand, and intervals that hold."""
 
-from collections.abc import Callable
-from itertools import combinations
-
 import numpy as np
 import pytest
 
 from arena.rating.agreement import (
     AgreementLine,
-    LineRole,
-    NamedRater,
     PairVote,
     agreement_sentence,
     measure_agreement,
@@ -125,25 +120,3 @@ def test_intervals_hold_the_truth(effects: tuple[float, float]) -> None:
         found = two_way_share(hits, expert, scenario)
         held += found.lower <= truth <= found.upper
     assert 0.92 <= held / 300 <= 0.99
-
-
-def a_metric_that_agrees(share: float, rng: np.random.Generator) -> Callable[..., int]:
-    """What prefers the first of two with that chance; it does not know the votes."""
-    return lambda one, other: 1 if rng.random() < share else -1
-
-
-def test_a_metric_built_to_agree_on_80_percent_is_shown_so() -> None:
-    """Experts who always prefer the first of two codes, and a metric that does by 80 %."""
-    held = 0
-    for seed in range(100):
-        rng = np.random.default_rng(seed)
-        votes = [
-            said(f"judge-{rng.integers(6)}", f"place-{place}", one, other, 1)
-            for place in range(30)
-            for one, other in combinations([f"{place}-{n}" for n in range(4)], 2)
-        ]
-        metric = NamedRater(name="80", prefers=a_metric_that_agrees(0.8, rng))
-        line = line_of(measure_agreement(votes, [metric]), "80")
-        assert line.role is LineRole.RATER
-        held += line.share.lower <= 0.8 <= line.share.upper
-    assert 92 <= held <= 100

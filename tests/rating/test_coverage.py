@@ -54,22 +54,16 @@ def test_equals_are_hardly_ever_told_apart(world: World) -> None:
     assert study(world, studies=60, judge=True).false <= 0.05
 
 
-@pytest.mark.parametrize(
-    ("experts", "scenarios", "said"),
-    [
+def test_a_table_that_rests_on_few_experts_or_scenarios_says_so() -> None:
+    for experts, scenarios, said in (
         (4, 10, ["Only 4 experts: intervals that rest on fewer than 5 of them are rough."]),
         (5, 9, ["Only 9 scenarios: intervals that rest on fewer than 10 of them are rough."]),
         (5, 10, []),
-    ],
-)
-@pytest.mark.parametrize("unit", [Unit.VOTE, Unit.TWO_WAY])
-def test_a_table_that_rests_on_few_experts_or_scenarios_says_so(
-    unit: Unit, experts: int, scenarios: int, said: list[str]
-) -> None:
-    world = World(ratings=EQUAL, experts=experts, scenarios=scenarios, votes_per_expert=90)
-    votes = world.votes(np.random.default_rng(1))
-    board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=50)
-    assert list(board.warnings) == said
+    ):
+        world = World(ratings=EQUAL, experts=experts, scenarios=scenarios, votes_per_expert=90)
+        votes = world.votes(np.random.default_rng(1))
+        board = rate(votes, intervals=Intervals.CLOSED_FORM, rounds=50)
+        assert list(board.warnings) == said
 
 
 @pytest.mark.parametrize(("experts", "shown"), [(3, False), (4, False), (5, True)])

@@ -164,9 +164,8 @@ def test_bounds_that_touch_do_not_tell_two_apart() -> None:
     assert ranks([np.nextafter(5.0, 6.0), 2.0], [7.0, 5.0]).tolist() == [1, 2]
 
 
-@pytest.mark.parametrize(
-    ("lower", "upper", "expected"),
-    [
+def test_a_rank_needs_bounds_that_decide_it() -> None:
+    for lower, upper, expected in (
         ([10.0, -10.0], [20.0, 0.0], [1, 2]),
         ([10.0, -10.0], [np.nan, 0.0], [1, 2]),
         ([0.0, -10.0], [np.nan, 5.0], [0, 1]),  # a lower bound at the average is not above it
@@ -175,12 +174,8 @@ def test_bounds_that_touch_do_not_tell_two_apart() -> None:
         ([10.0, np.nan], [20.0, 10.0], [1, 0]),
         ([10.0, np.nan], [20.0, np.nan], [1, 0]),
         ([np.nan, np.nan], [np.nan, np.nan], [0, 0]),
-    ],
-)
-def test_a_rank_needs_bounds_that_decide_it(
-    lower: list[float], upper: list[float], expected: list[int]
-) -> None:
-    assert decide_ranks(np.array(lower), np.array(upper), average=0.0).tolist() == expected
+    ):
+        assert decide_ranks(np.array(lower), np.array(upper), average=0.0).tolist() == expected
 
 
 @pytest.mark.parametrize(

@@ -38,10 +38,9 @@ def test_a_published_worked_example_comes_out() -> None:
     assert strengths == pytest.approx([0.640, 1.043, 0.660, 2.270], abs=5e-4)
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("ties", [0.0, 0.5])
-def test_bradley_terry_agrees_with_choix(seed: int, ties: float) -> None:
-    votes = simulated([1090, 1040, 1000, 960, 910], 600, seed, ties=ties)
+def test_bradley_terry_agrees_with_choix(ties: float) -> None:
+    votes = simulated([1090, 1040, 1000, 960, 910], 600, 1, ties=ties)
     wins = []
     for first, second, score in zip(votes.first, votes.second, votes.score, strict=True):
         wins += [(first, second)] * int(2 * score) + [(second, first)] * int(2 - 2 * score)

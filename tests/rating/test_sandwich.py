@@ -101,9 +101,9 @@ def test_ratings_and_intervals_agree_with_arena_rank(name: str) -> None:
 STUDIES = 120
 
 
-@pytest.mark.parametrize(
-    ("shares", "left"),
-    [
+def test_what_the_fit_leaves_is_that_of_a_weighted_mean() -> None:
+    """The residuals w (u - w'u) of effects u with variance 1, over the variance of w'u."""
+    for shares, left in (
         ((1.0,), 0.0),
         ((0.5, 0.5), 0.5),  # even clusters: 1 - 1 / G
         ((0.25,) * 4, 0.75),
@@ -111,18 +111,13 @@ STUDIES = 120
         ((0.7, 0.3), 0.58 - 2.0 * 0.37 / 0.58 + 1.0),
         ((0.5, 0.2, 0.2, 0.1), None),
         ((0.9, 0.1), 0.5 * 0.18),  # 0.04 without the floor
-    ],
-)
-def test_what_the_fit_leaves_is_that_of_a_weighted_mean(
-    shares: tuple[float, ...], left: float | None
-) -> None:
-    """The residuals w (u - w'u) of effects u with variance 1, over the variance of w'u."""
-    share = np.array(shares)
-    residual = np.diag(share) @ (np.eye(len(share)) - np.outer(np.ones(len(share)), share))
-    exact = np.trace(residual @ residual.T) / (share @ share)
-    found = remaining_share(np.array([share @ share]), np.array([(share**3).sum()]))[0]
-    assert found == pytest.approx(exact if left is None else left)
-    assert found >= exact - 1e-12
+    ):
+        share = np.array(shares)
+        residual = np.diag(share) @ (np.eye(len(share)) - np.outer(np.ones(len(share)), share))
+        exact = np.trace(residual @ residual.T) / (share @ share)
+        found = remaining_share(np.array([share @ share]), np.array([(share**3).sum()]))[0]
+        assert found == pytest.approx(exact if left is None else left)
+        assert found >= exact - 1e-12
 
 
 @pytest.mark.slow

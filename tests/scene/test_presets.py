@@ -152,9 +152,8 @@ def test_a_parked_car_pulls_out_into_the_egos_lane() -> None:
     assert np.interp(40.0, there[:, 0], there[:, 1]) == pytest.approx(-1.5, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("preset", "agent", "why"),
-    [
+def test_a_refusal_says_what_is_missing() -> None:
+    for preset, agent, why in (
         (MotionPreset.CUT_IN, car(20.0, 0.0, speed_mps=5.0), "in the ego's lane already"),
         (MotionPreset.CUT_IN, car(20.0, 3.5, speed_mps=5.0), "in the same direction"),
         (MotionPreset.CUT_IN, car(-20.0, 3.5, speed_mps=5.0), "ahead of the ego"),
@@ -167,13 +166,9 @@ def test_a_parked_car_pulls_out_into_the_egos_lane() -> None:
         (MotionPreset.RED_LIGHT, car(20.0, 3.5, heading_rad=math.pi), "crosses the ego's"),
         (MotionPreset.PULL_OUT, car(20.0, 0.0), "beside the ego's lane"),
         (MotionPreset.PULL_OUT, car(20.0, -3.0, heading_rad=math.pi), "look along it"),
-    ],
-)
-def test_a_refusal_says_what_is_missing(
-    preset: MotionPreset, agent: entities.TrafficAgent, why: str
-) -> None:
-    with pytest.raises(CannotPlace, match=f"{preset.label}: .*{why}"):
-        with_preset(preset, scene(), agent)
+    ):
+        with pytest.raises(CannotPlace, match=f"{preset.label}: .*{why}"):
+            with_preset(preset, scene(), agent)
 
 
 def test_a_motion_that_nobody_could_read_again_is_refused_as_is_a_foreign_number() -> None:

@@ -14,16 +14,7 @@ from hypothesis import strategies as st
 
 from augment.errors import CannotDrive
 from augment.geometry.frames import Pose
-from augment.geometry.polyline import Polyline
-from augment.scene.entities import (
-    InterplanRules,
-    Lane,
-    Modification,
-    Point,
-    Scene,
-    SceneOptions,
-    TurnType,
-)
+from augment.scene.entities import InterplanRules, Modification, Scene, SceneOptions, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, find_expert, run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
@@ -35,7 +26,7 @@ from augment.simulation.states import X, Y
 from augment.simulation.traffic import DriveSetting
 from tests.properties import examples
 from tests.recorded import recorded
-from tests.scenes import junction, moved_scene, pedestrian, vehicle
+from tests.scenes import junction, lane, moved_scene, pedestrian, vehicle
 from tests.simulation.worlds import ConstantSpeed, recorded_street, street
 
 
@@ -45,11 +36,8 @@ def bend() -> Scene:
     rim = np.stack([60.0 * np.sin(angles), 60.0 * (1.0 - np.cos(angles))], axis=1)
     line = np.vstack([[[-30.0, 0.0]], rim])
     other = np.vstack([[[-30.0, 3.5]], rim * (56.5 / 60.0) + [0.0, 3.5]])[::-1]
-    lanes = (
-        Lane(id="Lane1", centerline=Polyline(line), width_m=3.5, speed_limit_mps=10.0),
-        Lane(id="Lane2", centerline=Polyline(other), width_m=3.5, speed_limit_mps=10.0),
-    )
-    return replace(street(), lanes=lanes)
+    both = (lane("Lane1", line, speed_limit_mps=10.0), lane("Lane2", other, speed_limit_mps=10.0))
+    return replace(street(), lanes=both)
 
 
 @examples(3)
@@ -166,22 +154,17 @@ def test_a_planner_that_exits_fails_the_drive_and_not_the_process(
         planner_named("planner_of_one.Mine", allowed=["planner_of_one.Mine"])
 
 
-@pytest.mark.parametrize(
-    ("goal", "goal_m", "route"),
-    [
+def test_a_drive_takes_the_way_to_the_goal_where_there_is_one() -> None:
+    for goal, goal_m, route in (
         (None, None, ("Lane1", "Connector1", "Lane2")),
         (TurnType.STRAIGHT, None, ("Lane1", "Connector1", "Lane2")),
         (TurnType.LEFT, None, ("Lane1", "Connector2", "Lane3")),
         (TurnType.LEFT, (27.0, 40.0), ("Lane1", "Connector2", "Lane3")),
         (TurnType.STRAIGHT, (27.0, 40.0), ("Lane1", "Connector2", "Lane3")),
         (TurnType.RIGHT, None, ("Lane1", "Connector1", "Lane2")),
-    ],
-)
-def test_a_drive_takes_the_way_to_the_goal_where_there_is_one(
-    goal: TurnType | None, goal_m: Point | None, route: tuple[str, ...]
-) -> None:
-    scene = replace(junction(), options=SceneOptions(goal=goal, goal_m=goal_m))
-    assert find_route(scene, LaneGraph(scene), None) == route
+    ):
+        scene = replace(junction(), options=SceneOptions(goal=goal, goal_m=goal_m))
+        assert find_route(scene, LaneGraph(scene), None) == route
 
 
 @pytest.mark.slow

@@ -216,19 +216,14 @@ def test_criticality_of_a_drive_towards_a_parked_car() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("other", "speed_mps", "needed_mps2"),
-    [
+def test_the_required_braking_is_that_of_who_is_in_the_way() -> None:
+    for other, speed_mps, needed_mps2 in (
         # 30 m from centre to centre less half of 5.176 m and of 4.8 m leaves 25.012 m.
         (vehicle("Agent2", 30.0, 0.0), 0.0, 8.0**2 / (2.0 * 25.012)),
         (vehicle("Agent2", 30.0, 0.0), 5.0, 3.0**2 / (2.0 * 25.012)),
         (vehicle("Agent2", 30.0, 0.0), 8.0, 0.0),
         (vehicle("Agent2", 30.0, 3.5), 0.0, 0.0),
         (vehicle("Agent2", -30.0, 0.0), 0.0, 0.0),
-    ],
-)
-def test_the_required_braking_is_that_of_who_is_in_the_way(
-    other: TrafficAgent, speed_mps: float, needed_mps2: float
-) -> None:
-    drive = driven(states_along([8.0, 8.0]), [replace(other, speed_mps=speed_mps)])
-    assert required_braking_mps2(drive)[0] == pytest.approx(needed_mps2, abs=1e-6)
+    ):
+        drive = driven(states_along([8.0, 8.0]), [replace(other, speed_mps=speed_mps)])
+        assert required_braking_mps2(drive)[0] == pytest.approx(needed_mps2, abs=1e-6)

@@ -1,7 +1,5 @@
 """Where a planner fails along a sweep, and the hardest value that somebody else solves."""
 
-import pytest
-
 from augment.simulation.threshold import Trial, TriedValue, find_edges, find_hardest, is_lawful
 
 
@@ -16,19 +14,14 @@ def tried(value: float, tested: str, **others: float) -> TriedValue:
     return TriedValue(value=value, trials=tuple((own if tested else []) + helped))
 
 
-@pytest.mark.parametrize(
-    ("outcomes", "edges"),
-    [
+def test_edges_lie_where_the_outcome_changes() -> None:
+    for outcomes, edges in (
         *(("--++", ((3.0, 2.0),)), ("++--", ((2.0, 3.0),)), ("+-+", ((1.0, 2.0), (3.0, 2.0)))),
         *(("++", ()), ("--", ()), ("", ())),
-    ],
-)
-def test_edges_lie_where_the_outcome_changes(
-    outcomes: str, edges: tuple[tuple[float, float], ...]
-) -> None:
-    values = [tried(float(n), outcome) for n, outcome in enumerate(outcomes, start=1)]
-    assert find_edges(values) == edges
-    assert find_edges(values[::-1]) == edges, "whatever their order"
+    ):
+        values = [tried(float(n), outcome) for n, outcome in enumerate(outcomes, start=1)]
+        assert find_edges(values) == edges
+        assert find_edges(values[::-1]) == edges, "whatever their order"
 
 
 def test_what_was_not_driven_is_no_edge() -> None:
@@ -53,18 +46,13 @@ def test_of_equally_hard_ones_the_furthest_from_what_the_planner_passes_is_kept(
     assert hardest.value == 3.0
 
 
-@pytest.mark.parametrize(
-    ("changed", "lawful"),
-    [
+def test_a_lawful_drive_hits_nobody_stays_on_the_road_and_gets_on() -> None:
+    parts = ("no_ego_at_fault_collisions", "drivable_area_compliance", "ego_is_making_progress")
+    for changed, lawful in (
         ({}, True),
         ({"driving_direction_compliance": 0.5}, True),
         ({"no_ego_at_fault_collisions": 0.5}, False),
         ({"drivable_area_compliance": 0.0}, False),
         ({"ego_is_making_progress": 0.0}, False),
-    ],
-)
-def test_a_lawful_drive_hits_nobody_stays_on_the_road_and_gets_on(
-    changed: dict[str, float], lawful: bool
-) -> None:
-    parts = ("no_ego_at_fault_collisions", "drivable_area_compliance", "ego_is_making_progress")
-    assert is_lawful(dict.fromkeys(parts, 1.0) | changed) is lawful
+    ):
+        assert is_lawful(dict.fromkeys(parts, 1.0) | changed) is lawful
