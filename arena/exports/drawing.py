@@ -80,9 +80,9 @@ def draw_once(
 
 
 def recolour(svg: bytes) -> bytes:
-    """Return a chart in the colours of the pages, light or dark as the page around it."""
+    """Return a chart in the colours of the pages, light or dark as the page that shows through."""
     tokens, _, _ = Path(str(finders.find("css/tokens.css"))).read_text().partition("\n}")
-    text = svg.decode()
+    text = svg.decode().replace('style="fill: #ffffff"', 'style="fill: none"')
     for colour, name in _PAGE_COLOURS.items():
         text = text.replace(colour, f"var(--{name})")
     style = f"<style>{tokens}\n}}{_DIM}</style>"

@@ -7,7 +7,7 @@ from arena.models import Report, Study, Vote
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
-from augment.services.scenarios.pictures import draw_picture, load_camera
+from augment.services.scenarios.pictures import draw_picture, load_camera, picture_view
 from augment.services.scenarios.scenes import LoadedScenario
 from tests.browser import booth as booths
 from tests.browser.booth import Booth, all_sent, let_bounce, press, ready
@@ -250,6 +250,10 @@ MARKED = """() => {
 }"""
 
 
+SCALE_PX = [8, 8, 60, 30]
+"""Where the drawn pictures have their own scale."""
+
+
 @pytest.fixture
 def drawn(bare_booth: Booth) -> Booth:
     """A booth with drawn pictures: every contestant has put a car in another place."""
@@ -261,7 +265,8 @@ def drawn(bare_booth: Booth) -> Booth:
         loaded = LoadedScenario(row.scenario)
         hang(row, draw_picture(loaded, Modification(added=(car,)), camera))
         unchanged = draw_picture(loaded, Modification(), camera)
-        row.scenario.matchups.update(original_image=unchanged)
+        view = picture_view(camera) | {"covered_px": [SCALE_PX]}
+        row.scenario.matchups.update(original_image=unchanged, view=view)
     bare_booth.study = study
     return bare_booth
 
@@ -282,6 +287,11 @@ def test_x_holds_b_in_the_place_of_a_and_v_marks_what_differs(drawn: Booth) -> N
     assert 0.5 < orange / blue < 2.0
     page.keyboard.press("v")
     expect(page.locator(".side canvas")).to_have_count(0)
+    page.locator(".side .panel").first.hover(position={"x": 2, "y": 2})
+    page.mouse.wheel(0, -50)  # the picture's own scale stays in sight
+    expect(page.locator(".side .scale-bar")).to_have_count(2)
+    expect(page.locator(".side .scale-bar").first).to_be_hidden()
+    page.keyboard.press("z")
     page.keyboard.press("z")
     expect(page.locator(".side .scale-bar").first).to_be_visible()
     press(page, "1")

@@ -162,8 +162,10 @@ def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone() -> None:
 
 
 def test_a_chart_on_a_page_has_the_colours_of_its_theme() -> None:
-    drawn = f'<svg width="9"><text style="fill: {INK}">A</text></svg>'.encode()
+    ground = '<path style="fill: #ffffff"/>'
+    drawn = f'<svg width="9">{ground}<text style="fill: {INK}">A</text></svg>'.encode()
     shown = recolour(drawn).decode()
     assert shown.startswith('<svg width="9"><style>')
+    assert '<path style="fill: none"/>' in shown
     assert "--ink: light-dark(" in shown
     assert '<text style="fill: var(--ink)">A</text></svg>' in shown
