@@ -1,5 +1,6 @@
 """From an empty database to a rated table in LaTeX by the client: the example of the docs."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,14 +9,25 @@ from typing import Any
 import pytest
 
 from augment.fake_llm.server import FakeServer, running
+from augment.scene.codec import scene_to_document
+from augment.scene.entities import Scene
+from augment.scene.intent import Body, Intent
 from client.arena_client import ApiError, Arena
-from tests.parked import known, write_street
+from tests.intents import parked
 from tests.processes import wait_until
+from tests.scenes import scene
 from tests.stack import Home
 
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 DOCS = Path(__file__).parents[2] / "docs" / "api.md"
+WISH = re.compile(r"A parked car stands (\d+) m ahead of the ego\.")
+
+
+def known(instruction: str) -> list[tuple[Scene, Intent]]:
+    """Return what the stand-in's models know of an instruction of the example."""
+    found = WISH.search(instruction)
+    return [(scene(), parked(float(found[1]), body=Body.VEHICLE))] if found else []
 
 
 @pytest.fixture
@@ -38,7 +50,9 @@ def test_the_example_of_the_docs_goes_from_nothing_to_a_table(
         monkeypatch.setenv("ARENA_URL", address)
         monkeypatch.setenv("FIRST_LINK", first_link(home))
         monkeypatch.setenv("MODEL_URL", model.url)
-        monkeypatch.setenv("SCENE_FILE", str(write_street(tmp_path)))
+        street = tmp_path / "street.json"
+        street.write_text(json.dumps(scene_to_document(scene())))
+        monkeypatch.setenv("SCENE_FILE", str(street))
         left: dict[str, Any] = {}
         exec(compile(example(), str(DOCS), "exec"), left)
         assert left["job"]["state"] == "finished"

@@ -61,10 +61,6 @@ class Hand:
         self.fields += 1
         self.page.fill(f"[name={name}]", text)
 
-    def choose(self, name: str, value: str) -> None:
-        self.fields += 1
-        self.page.select_option(f"[name={name}]", value)
-
     def send(self, file: Path) -> None:
         self.clicks += 1
         self.page.set_input_files("[name=file]", file)
@@ -84,11 +80,6 @@ class Hand:
         self.fill("password", PASSWORD)
         self.click("button.main")
         expect(self.page.get_by_role("heading", name="First steps")).to_be_visible()
-
-    def set_password(self) -> None:
-        self.fill("new_password1", PASSWORD)
-        self.fill("new_password2", PASSWORD)
-        self.click("button.main")
 
     def add_expert(self, username: str) -> str:
         """Return the link that signs them in."""

@@ -8,11 +8,12 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, FilePayload, Page, expect
 
 from augment.models import SceneUpload, UploadMoment
 from augment.services.scenarios.pictures import draw_scene
 from tests.browser.held import Held, hold
+from tests.entering import a_benchmark, entrant
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene
 from tests.web.cast import people, png, signed_in
@@ -245,3 +246,13 @@ def test_a_form_is_sent_once(browser: Browser) -> None:
             held.page.mouse.click(box["x"] + 5, box["y"] + 5)
             held.page.wait_for_timeout(BETWEEN_MS)
         assert len(held.posted) == 1
+
+
+def test_a_file_is_named_before_it_is_sent_as_an_answer(browser: Browser) -> None:
+    a_benchmark()
+    path = reverse("submission-new")
+    with hold(browser, path, signed_in(entrant()).get(path).content) as held:
+        file = FilePayload(name="answers.zip", mimeType="application/zip", buffer=b"PK")
+        held.page.set_input_files("[name=file]", file)
+        expect(held.page.locator("[data-chosen] output")).to_have_text("answers.zip, 1 kB")
+        assert held.posted == []
