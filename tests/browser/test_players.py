@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 from django.urls import reverse
-from playwright.sync_api import Page, Response, expect
+from playwright.sync_api import Page, expect
 
 from augment.models import Augmentation, Simulation
-from tests.browser.booth import Booth, press, ready
+from tests.browser.booth import Booth, press
 from tests.browser.test_voting_page import faults
 from tests.drives import driven, finished
 from tests.jobs import rows
@@ -17,8 +17,6 @@ from tests.web.cast import people
 pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
 
-MOST_BYTES = 300_000
-KEYS = {"1": "left", "2": "equal", "3": "right"}
 FILMS = "canvas.reel:not([hidden])"
 
 EGO_X = """() => [...document.querySelectorAll("canvas.reel")].map((canvas) => {
@@ -52,32 +50,6 @@ CUT = """() => [...document.querySelectorAll(".vote .button")].filter(
 def moving(bare_booth: Booth) -> Booth:
     bare_booth.study = a_moving_study(scenarios=3, votes=9)
     return bare_booth
-
-
-@pytest.mark.slow
-def test_thirty_moving_pairs_are_voted_on_by_keys(bare_booth: Booth) -> None:
-    booth = bare_booth
-    booth.study = a_moving_study(scenarios=10, votes=30)
-    page = booth.visit("eva", "/", {})
-    sizes: dict[str, int] = {}
-
-    def note(answer: Response) -> None:
-        if "/i/" in answer.url:
-            sizes[answer.url] = int(answer.headers["content-length"])
-
-    page.on("response", note)
-    page.goto(booth.path)
-    ready(page)
-    for number in range(30):
-        expect(page.locator(FILMS)).to_have_count(2)
-        if number < 29:
-            press(page, "123"[number % 3])
-    page.keyboard.press("3")
-    expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
-    assert booth.outcomes() == [KEYS["123"[n % 3]] for n in range(30)]
-    # Each pair has two pictures with films, what these play over, and the scene before.
-    assert len(sizes) == 30 * 6
-    assert sum(sizes.values()) / 30 <= MOST_BYTES
 
 
 def test_both_sides_move_in_step_by_keys_and_by_the_range(moving: Booth) -> None:

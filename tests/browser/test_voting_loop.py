@@ -87,10 +87,13 @@ def test_the_second_half_of_a_double_click_judges_nothing(booth: Booth) -> None:
 def test_the_next_four_pairs_are_there_before_they_are_needed(booth: Booth) -> None:
     page = booth.enter()
     booth.look_ahead(page)
+    told = page.locator("#saved")
     page.context.set_offline(True)
+    expect(told).to_have_text("Offline. Kept in this browser and sent later: 0.")
+    expect(page.locator("#said")).to_contain_text("Offline.")
     for _ in range(4):
         press(page, "1")
-    expect(page.locator("#saved")).to_have_text("Offline. Kept in this browser and sent later: 4.")
+    expect(told).to_have_text("Offline. Kept in this browser and sent later: 4.")
     page.context.set_offline(False)
     all_sent(page, 4)
 

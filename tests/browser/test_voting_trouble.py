@@ -231,17 +231,3 @@ def test_a_pair_whose_picture_does_not_show_takes_no_vote_until_it_does(booth: B
 def kept(page: Page) -> list[object]:
     found: list[object] = page.evaluate("Object.keys(localStorage)")
     return found
-
-
-def test_offline_is_said_as_soon_as_it_is_so_and_no_longer(booth: Booth) -> None:
-    page = booth.enter()
-    booth.look_ahead(page)
-    told = page.locator("#saved")
-    page.context.set_offline(True)
-    expect(told).to_have_text("Offline. Kept in this browser and sent later: 0.")
-    expect(page.locator("#said")).to_contain_text("Offline.")
-    press(page, "1")
-    expect(told).to_have_text("Offline. Kept in this browser and sent later: 1.")
-    page.context.set_offline(False)
-    all_sent(page, 1)
-    assert booth.outcomes() == ["left"]
