@@ -16,6 +16,7 @@ from urllib.parse import urldefrag, urljoin, urlsplit
 
 from django.http.response import HttpResponseBase
 from django.test import Client
+from django.urls import URLPattern, URLResolver, get_resolver
 
 from arena.models import Study
 from augment.models import Augmentation
@@ -59,6 +60,33 @@ class Answer:
 
 
 Seen = dict[str, Answer]
+PARTS = {
+    **{"form": "csv", "tab": "pairs", "side": "left", "kind": "augmentation"},
+    **{"name": "leaderboard", "part": "pairs", "digest": "0" * 64, "key": "0" * 16},
+}
+"""What stands for the parameters of an address that are no code, token or number."""
+
+
+def every_view(
+    entries: list[URLPattern | URLResolver] | None = None, before: str = "/"
+) -> Iterator[tuple[str, str]]:
+    """Yield the name and the address of each view of the product, with its parameters open."""
+    for entry in get_resolver().url_patterns if entries is None else entries:
+        here = before + str(entry.pattern)
+        if isinstance(entry, URLResolver):
+            yield from every_view(entry.url_patterns, here)
+        else:
+            yield entry.name or "", here
+
+
+def fill(address: str, code: str, token: str) -> str:
+    """Return an open address about the row with a code; a parameter that is new needs a part."""
+    parts = PARTS | {"token": token}
+
+    def value(found: re.Match[str]) -> str:
+        return {"uuid": code, "int": "0"}.get(found[1]) or parts[found[2]]
+
+    return re.sub(r"<(\w+):(\w+)>", value, address)
 
 
 def answer_of(response: HttpResponseBase) -> Answer:

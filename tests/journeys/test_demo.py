@@ -15,13 +15,18 @@ from tests.stack import SMALL_DEMO, Home
 
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(1000)]
 
+LONGEST_PX, MOST_CONTROLS = 2_500, 40
+
+CONTINUOUS = ("job", "job-grid")
+"""A table that goes on as one scrolls; each of its cells is a link."""
+
 
 def standings(home: Home) -> list[dict[str, str]]:
     with (home.folder / "var" / "demo" / "leaderboard.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 
 
-def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) -> None:
+def test_it_leaves_a_leaderboard_that_says_that_it_is_simulated(demo_home: Home) -> None:
     rows = standings(demo_home)
     assert len(rows) >= 3
     assert demo_home.rows("SELECT count(*) FROM arena_vote") == [(200,)]
@@ -44,6 +49,9 @@ def test_it_leaves_a_leaderboard_of_at_least_three_contestants(demo_home: Home) 
     document = json.loads((demo_home.folder / "var" / "demo" / "leaderboard.json").read_text())
     assert len(document["standings"]) == len(rows)
     assert r"\toprule" in (demo_home.folder / "var" / "demo" / "leaderboard.tex").read_text()
+    for ending in ("csv", "json", "tex", "svg"):
+        path = demo_home.folder / "var" / "demo" / f"leaderboard.{ending}"
+        assert "simulated" in path.read_text().lower(), path.name
 
 
 def test_its_open_study_has_twenty_pairs_and_soon_a_film(demo_home: Home) -> None:
@@ -55,12 +63,6 @@ def test_its_open_study_has_twenty_pairs_and_soon_a_film(demo_home: Home) -> Non
     rows = demo_home.rows(pairs)
     assert [position for position, _ in rows] == list(range(1, 21))
     assert "moving" in [which for _, which in rows[:3]]
-
-
-def test_every_file_says_that_it_is_simulated(demo_home: Home) -> None:
-    for ending in ("csv", "json", "tex", "svg"):
-        path = demo_home.folder / "var" / "demo" / f"leaderboard.{ending}"
-        assert "simulated" in path.read_text().lower(), path.name
 
 
 def test_a_second_run_uses_what_is_there(demo_home: Home, tmp_path: Path) -> None:
@@ -103,3 +105,24 @@ def test_ctrl_c_in_the_middle_ends_it_at_once(migrated: Path, tmp_path: Path) ->
     assert "The demo was stopped before it was done" in log.read_text()
     assert "Traceback" not in log.read_text()
     assert "Augmentations:" not in log.read_text()
+
+
+@pytest.mark.browser
+def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -> None:
+    home = demo_home.copy(tmp_path / "pages")
+    ended = subprocess.run(
+        [sys.executable, "-m", "tests.screenshots", str(home.folder), "--measure"],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert ended.returncode == 0, ended.stderr
+    sizes: dict[str, tuple[int, int]] = json.loads(ended.stdout.splitlines()[-1])
+    assert len(sizes) > 60
+    wrong = {
+        name: f"{high} px, {controls} controls"
+        for name, (high, controls) in sizes.items()
+        if high > LONGEST_PX or (controls > MOST_CONTROLS and name not in CONTINUOUS)
+    }
+    assert wrong == {}

@@ -1,16 +1,14 @@
 """An entrant who tries every address gets what is theirs, and no reference of the test split."""
 
 import io
-import re
 import zipfile
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from django.contrib.auth.models import User
 from django.http.response import HttpResponseBase
 from django.test import Client
-from django.urls import URLPattern, URLResolver, get_resolver, reverse
+from django.urls import reverse
 
 from arena.models import BenchmarkFile, Study
 from arena.scenarios.exports.benchmarks import BENCHMARK_FILES
@@ -22,6 +20,7 @@ from augment.services.running.entering import AcceptRequest, accept_submission
 from augment.services.scenarios.pictures import store
 from tests.api.tokens import program_of
 from tests.entering import a_benchmark, entrant, packed, read, sent
+from tests.journeys.blindness import every_view, fill
 from tests.scenes import cone
 from tests.study_rows import a_study, hang
 from tests.web.cast import people, png
@@ -73,16 +72,6 @@ def own(benchmark: Benchmark) -> Submission:
 _ONE = modification_to_document(Modification(added=(cone("Agent9", 21.0, 0.0),)))
 
 
-def views(entries: list[URLPattern | URLResolver], before: str = "") -> Iterator[tuple[str, str]]:
-    """The name and the address of each view, with its parameters open."""
-    for entry in entries:
-        here = before + str(entry.pattern)
-        if isinstance(entry, URLResolver):
-            yield from views(entry.url_patterns, here)
-        else:
-            yield entry.name or "", "/" + here
-
-
 def codes_of(study: Study) -> set[str]:
     """Codes of a row of each kind, and the token of a picture."""
     row = study.matchups.earliest("pk")
@@ -92,19 +81,6 @@ def codes_of(study: Study) -> set[str]:
     found += [scenario, scenario.base_scene]
     found += [*Submission.objects.all(), *Benchmark.objects.all(), row.expert.person]
     return {str(one.code) for one in found}
-
-
-def filled(address: str, code: str, study: Study) -> str:
-    token = study.matchups.earliest("pk").left_token
-    named = {"form": "csv", "tab": "pairs", "side": "left", "kind": "augmentation"}
-    named |= {"name": "leaderboard", "digest": "0" * 64, "key": "0" * 16, "token": token}
-
-    def value(found: re.Match[str]) -> str:
-        if found[1] == "uuid":
-            return code
-        return "0" if found[1] == "int" else named[found[2]]
-
-    return re.sub(r"<(\w+):(\w+)>", value, address)
 
 
 def told(answer: HttpResponseBase) -> bytes:
@@ -125,10 +101,10 @@ def test_every_address_answers_an_entrant_with_their_own_alone(
     assert own.uploaded_by is not None
     page, program = Client(), program_of(own.uploaded_by)
     page.force_login(own.uploaded_by)
-    answered = set()
-    for name, address in views(get_resolver().url_patterns):
+    answered, token = set(), study.matchups.earliest("pk").left_token
+    for name, address in every_view():
         for code in codes_of(study):
-            here = filled(address, code, study)
+            here = fill(address, code, token)
             asked = [page.get(here), program.get(here)]
             if name not in ("logout", "submission-withdraw"):
                 asked += [program.post(here)]

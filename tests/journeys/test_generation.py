@@ -195,13 +195,6 @@ def check_that_the_command_waits_and_reports(place: Machine, model: WaitingModel
     assert model.asked == 2, "answers come from the store, and without a key nobody is asked"
 
 
-def test_without_redis_the_command_says_what_to_do(place: Machine) -> None:
-    ended = place.manage("generate", *CHOSEN)
-    assert ended.returncode == 1
-    assert "start `manage.py serve` or set REDIS_URL" in ended.stderr
-    assert place.rows(BY_STATE) == []
-
-
 def test_a_job_goes_on_in_a_worker_that_reads_a_freezing_pickle(
     place: Machine, model: WaitingModel, tmp_path: Path
 ) -> None:
