@@ -5,14 +5,10 @@ from typing import Any
 
 import pytest
 
-from tests.management.votes import HEAD
+from tests.management.votes import write_votes
 
 
 @pytest.fixture
 def votes(tmp_path: Path) -> Any:
-    def written(*lines: str, head: str = HEAD, start: str = "", end: str = "\n") -> str:
-        path = tmp_path / "votes.csv"
-        path.write_bytes((start + end.join([head, *lines]) + end).encode())
-        return str(path)
-
-    return written
+    """Writes lines of votes into a file; returns its path as a command takes it."""
+    return lambda *lines, **how: str(write_votes(tmp_path, *lines, **how))

@@ -53,20 +53,15 @@ def reference(folder: Path, text: str) -> Path:
 CHANGE = json.dumps(modification_to_document(Modification(added=(cone("Agent2", 9.0, 0.0),))))
 
 
-def test_a_scenario_is_added_with_and_without_a_reference(tmp_path: Path) -> None:
+def test_a_scenario_is_added_with_a_reference_an_intent_or_neither(tmp_path: Path) -> None:
     assert run() == "Added scenario street-construction-zone-1 without a reference.\n"
     out = run(slug="cones", reference=reference(tmp_path, CHANGE))
     assert out == "Added scenario cones with a reference.\n"
     assert Scenario.objects.get(slug="cones").reference == json.loads(CHANGE)
-
-
-def test_a_scenario_is_added_with_its_intent(tmp_path: Path) -> None:
     wanted = intent_to_document(cones(9.0, 1, Shape.LINE))
-    file = tmp_path / "intent.json"
-    file.write_text(json.dumps(wanted))
-    out = run(slug="cones", intent=file)
-    assert out == "Added scenario cones without a reference, with its intent.\n"
-    row = Scenario.objects.get(slug="cones")
+    out = run(slug="asked", intent=reference(tmp_path, json.dumps(wanted)))
+    assert out == "Added scenario asked without a reference, with its intent.\n"
+    row = Scenario.objects.get(slug="asked")
     assert (row.intent, row.intent_origin) == (wanted, "entered")
 
 

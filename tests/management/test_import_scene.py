@@ -78,10 +78,3 @@ def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:
     file.write_text(json.dumps(document)[:-20])
     assert "scene.json: is not JSON" in refused("json", file, "--slug", "crossing")
     assert "is not there" in refused("json", tmp_path / "gone.json", "--slug", "crossing")
-
-
-def test_the_same_scene_is_not_stored_twice(tmp_path: Path) -> None:
-    log = write_log(tmp_path / "log")
-    run("av2", log, "--slug", "first")
-    assert "stored already, as 'first'" in refused("av2", log, "--slug", "second")
-    run("av2", log, "--slug", "second", "--frame", 1)

@@ -44,6 +44,21 @@ def test_online_elo_resamples_votes_and_says_what_its_interval_is_not(votes: Any
         run(file=file, resample="vote", intervals="bootstrap")
 
 
+def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
+    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample expert needs"):
+        run(file=votes(*PLAIN), resample="expert")
+    file = votes("a,b,tie,j,i", "a,b,tie,,i", head=WITH_CLUSTERS)
+    with pytest.raises(CsvNotRated, match=r"votes.csv: line 3: judge is empty\.\Z"):
+        run(file=file)
+    assert document(file, resample="vote", rounds=100)["votes"] == 2
+
+
+@pytest.mark.parametrize("options", [{"rounds": 99}, {"rounds": 100_001}, {"seed": -1}])
+def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
+    with pytest.raises(CsvNotRated, match=r"not .*\d\.\Z"):
+        run(file=votes(*PLAIN), **options)
+
+
 def test_the_same_seed_gives_the_same_text_and_the_order_of_lines_does_not_count(
     votes: Any,
 ) -> None:
@@ -144,4 +159,3 @@ def test_the_command_line_prints_the_table_or_one_sentence(votes: Any) -> None:
     assert (failed.returncode, failed.stdout) == (1, "")
     assert failed.stderr.count("\n") == 1
     assert "line 2: the winner 'draw' is none of model_a, model_b, tie" in failed.stderr
-    assert manage(votes(*PLAIN), "--method", "glicko").returncode == 2

@@ -1,6 +1,7 @@
 """Votes as they come in files from elsewhere, and what is printed of them."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 from arena.management.rate_csv import run
@@ -15,6 +16,14 @@ PLAIN = [
     *["c,a,model_a"] * 14,
 ]
 WITH_CLUSTERS = f"{HEAD},judge,item"
+
+
+def write_votes(
+    folder: Path, *lines: str, head: str = HEAD, start: str = "", end: str = "\n"
+) -> Path:
+    path = folder / "votes.csv"
+    path.write_bytes((start + end.join([head, *lines]) + end).encode())
+    return path
 
 
 def document(file: str, **options: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Votes from elsewhere: which files are taken, and what is said of the others."""
+"""Votes from elsewhere: which files are read as what, and what is said of the others."""
 
 import gzip
 import io
@@ -14,37 +14,48 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
-from arena.management.rate_csv import CsvNotRated, run
 from arena.rating import votes_file
-from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, document
+from arena.rating.votes_file import VotesFileUnreadable, read_table
+from tests.management.votes import HEAD, PLAIN, WITH_CLUSTERS, write_votes
+
+NAMES = HEAD.split(",")
+
+
+def columns_of(path: Path) -> list[list[str]]:
+    return [read_table(path).columns[name] for name in NAMES]
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> list[list[str]]:
+    """The columns of a file as simple as can be."""
+    return columns_of(write_votes(tmp_path, *PLAIN))
 
 
 def test_a_mark_quotes_other_columns_blank_lines_and_windows_ends_do_not_matter(
-    votes: Any,
+    tmp_path: Path, plain: list[list[str]]
 ) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
     same = [f'x,"{line.replace(",", chr(34) + "," + chr(34))}"' for line in PLAIN]
-    file = votes(*same, "", head=f"more,{HEAD}", start="﻿", end="\r\n")
-    assert document(file, rounds=100)["standings"] == plain
+    path = write_votes(tmp_path, *same, "", head=f"more,{HEAD}", start="\ufeff", end="\r\n")
+    assert columns_of(path) == plain
+    rows = [f"{line},x" for line in PLAIN]
+    assert columns_of(write_votes(tmp_path, *rows, head=f'{HEAD},"a long\nnote"')) == plain
 
 
 @pytest.mark.parametrize(
     ("separator", "encoding"), [(";", "utf-8"), ("\t", "utf-16"), ("|", "utf-8-sig")]
 )
 def test_separators_and_utf_16_are_recognised(
-    votes: Any, tmp_path: Path, separator: str, encoding: str
+    tmp_path: Path, plain: list[list[str]], separator: str, encoding: str
 ) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
     path = tmp_path / "other.csv"
     text = "\n".join([HEAD, *PLAIN]).replace(",", separator) + "\n"
     path.write_bytes(text.encode(encoding))
-    assert document(str(path), rounds=100)["standings"] == plain
+    assert columns_of(path) == plain
 
 
 @pytest.mark.parametrize("kind", ["jsonl", "array", "pretty", "parquet", "gz", "xlsx", "sep"])
-def test_other_forms_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
-    rows = [dict(zip(HEAD.split(","), line.split(","), strict=True)) for line in PLAIN]
+def test_other_forms_are_read(tmp_path: Path, plain: list[list[str]], kind: str) -> None:
+    rows = [dict(zip(NAMES, line.split(","), strict=True)) for line in PLAIN]
     path = tmp_path / "votes"
     text = "\n".join([HEAD.upper(), "", *PLAIN])
     if kind == "xlsx":
@@ -62,46 +73,36 @@ def test_other_forms_are_read(votes: Any, tmp_path: Path, kind: str) -> None:
         parquet.write_table(pyarrow.Table.from_pylist(rows), path)
     else:
         path.write_text("\n".join(json.dumps(row | {"more": 1}) for row in rows))
-    assert document(str(path), rounds=100)["standings"] == plain
+    assert columns_of(path) == plain
 
 
-def test_newer_words_for_both_bad_are_ties(votes: Any) -> None:
-    plain = document(votes(*PLAIN), rounds=100)["standings"]
+def test_newer_words_for_both_bad_are_ties(tmp_path: Path, plain: list[list[str]]) -> None:
     for word in ("both_bad", "bothbad"):
-        file = votes(*(line.replace("tie (bothbad)", word) for line in PLAIN))
-        assert document(file, rounds=100)["standings"] == plain
+        lines = (line.replace("tie (bothbad)", word) for line in PLAIN)
+        assert columns_of(write_votes(tmp_path, *lines)) == plain
 
 
 def test_what_other_columns_of_json_hold_and_are_called_counts_for_nothing(tmp_path: Path) -> None:
     vote = {"model_a": "a", "model_b": "b", "winner": "tie", "Turns": 1, "turns": 2}
     path = tmp_path / "votes.json"
     path.write_text(json.dumps([vote | {"words": {"Paris": 1, "paris": 2}}]))
-    assert document(str(path), rounds=100)["votes"] == 1
+    assert columns_of(path) == [["a"], ["b"], ["tie"]]
 
 
 def test_a_day_of_excel_or_parquet_is_named_as_in_csv(tmp_path: Path) -> None:
     day = {"model_a": datetime(2026, 3, 1), "model_b": datetime(2026, 3, 1, 9), "winner": "tie"}
     parquet.write_table(pyarrow.Table.from_pylist([day]), tmp_path / "votes")
-    lines = document(str(tmp_path / "votes"), rounds=100)["standings"]
-    assert {line["model"] for line in lines} == {"2026-03-01", "2026-03-01 09:00:00"}
+    assert columns_of(tmp_path / "votes") == [["2026-03-01"], ["2026-03-01 09:00:00"], ["tie"]]
 
 
 def test_votes_on_a_further_sheet_are_said_to_be_unread(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     for sheet in (book.active, book.create_sheet(), book.create_sheet("about")):
-        sheet.append(["note"] if sheet.title == "about" else HEAD.split(","))
+        sheet.append(["note"] if sheet.title == "about" else NAMES)
         sheet.append(["a", "b", "tie"])
     book.save(tmp_path / "votes")
-    notes = document(str(tmp_path / "votes"), rounds=100)["notes"]
-    assert "Only sheet 'Sheet' is read; 1 more have votes." in notes
-
-
-def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "votes.jsonl"
-    good = json.dumps({"model_a": "a", "model_b": "b", "winner": "tie"})
-    path.write_text(f"{good}\n{good}\nnothing\n")
-    with pytest.raises(CsvNotRated, match="line 3 column 1"):
-        run(file=str(path))
+    note = read_table(tmp_path / "votes").note
+    assert note == "Only sheet 'Sheet' is read; 1 more have votes."
 
 
 @pytest.mark.parametrize(
@@ -115,15 +116,14 @@ def test_a_wrong_line_of_json_is_named(tmp_path: Path) -> None:
         (["a,b,tie", "a,#REF!,tie"], "line 3: model_b is #REF!"),
         (["a,b,tie", " a ,a,tie"], "line 3: 'a' is compared with itself"),
         (["a,b,tie", "a,b,tie,,x"], "Row #3: Expected 3 columns, got 5"),
-        (["a,b,tie", "a,b"], "Row #3: Expected 3 columns, got 2"),
         (["a,b,tie", '"a,b,tie'], "Row #3: Expected 3 columns, got 1"),
     ],
 )
 def test_a_wrong_line_is_named_with_what_is_allowed(
-    votes: Any, lines: list[str], sentence: str
+    tmp_path: Path, lines: list[str], sentence: str
 ) -> None:
-    with pytest.raises(CsvNotRated, match=rf"{re.escape(sentence)}.*\.\Z"):
-        run(file=votes(*lines))
+    with pytest.raises(VotesFileUnreadable, match=re.escape(sentence)):
+        read_table(write_votes(tmp_path, *lines))
 
 
 @pytest.mark.parametrize(
@@ -133,15 +133,9 @@ def test_a_wrong_line_is_named_with_what_is_allowed(
         ("model_a,model_b,winner,winner", "line 1: the column 'winner' is there twice"),
     ],
 )
-def test_a_missing_or_double_column_is_named(votes: Any, head: str, sentence: str) -> None:
-    with pytest.raises(CsvNotRated, match=sentence):
-        run(file=votes("a,b,tie", head=head))
-
-
-def test_a_head_may_run_over_two_lines(votes: Any) -> None:
-    rows = [f"{line},x" for line in PLAIN]
-    plain = document(votes(*rows, head=f"{HEAD},more"), rounds=100)
-    assert document(votes(*rows, head=f'{HEAD},"a long\nnote"'), rounds=100) == plain
+def test_a_missing_or_double_column_is_named(tmp_path: Path, head: str, sentence: str) -> None:
+    with pytest.raises(VotesFileUnreadable, match=sentence):
+        read_table(write_votes(tmp_path, "a,b,tie", head=head))
 
 
 def _write_repeated(path: Path, rows: int, name: str) -> None:
@@ -149,7 +143,7 @@ def _write_repeated(path: Path, rows: int, name: str) -> None:
     places = pyarrow.array([0] * rows, pyarrow.int8())
     cells = [name, "b", "tie"]
     columns = [pyarrow.DictionaryArray.from_arrays(places, [cell]) for cell in cells]
-    parquet.write_table(pyarrow.table(columns, names=HEAD.split(",")), path)
+    parquet.write_table(pyarrow.table(columns, names=NAMES), path)
 
 
 def test_a_parquet_file_unpacks_within_bounds(
@@ -159,26 +153,11 @@ def test_a_parquet_file_unpacks_within_bounds(
     path = tmp_path / "votes.parquet"
     for rows, name in ((2**20, "a"), (1, "a" * 2**21)):
         _write_repeated(path, rows, name)
-        with pytest.raises(CsvNotRated, match="unpacks to more than 1 MB"):
-            run(file=str(path))
+        with pytest.raises(VotesFileUnreadable, match="unpacks to more than 1 MB"):
+            read_table(path)
     _write_repeated(path, 100_000, "a" * 2**19)
     # 52 GB as texts of their own; a dictionary stays one.
-    assert {*map(len, votes_file.read_table(path).columns["model_a"])} == {2**19}
-
-
-def test_a_column_that_is_resampled_must_be_there_and_filled(votes: Any) -> None:
-    with pytest.raises(CsvNotRated, match="no column 'judge', which --resample expert needs"):
-        run(file=votes(*PLAIN), resample="expert")
-    file = votes("a,b,tie,j,i", "a,b,tie,,i", head=WITH_CLUSTERS)
-    with pytest.raises(CsvNotRated, match="line 3: judge is empty"):
-        run(file=file)
-    assert document(file, resample="vote", rounds=100)["votes"] == 2
-
-
-@pytest.mark.parametrize("options", [{"rounds": 99}, {"rounds": 100_001}, {"seed": -1}])
-def test_options_out_of_range_are_errors(votes: Any, options: dict[str, Any]) -> None:
-    with pytest.raises(CsvNotRated, match=r"not .*\d\.\Z"):
-        run(file=votes(*PLAIN), **options)
+    assert {*map(len, read_table(path).columns["model_a"])} == {2**19}
 
 
 def _zipped(**entries: bytes) -> bytes:
@@ -191,6 +170,10 @@ def _zipped(**entries: bytes) -> bytes:
     return content.getvalue()
 
 
+def _vote(**changes: Any) -> dict[str, Any]:
+    return {"model_a": "a", "model_b": "b", "winner": "tie"} | changes
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
@@ -198,18 +181,13 @@ def _zipped(**entries: bytes) -> bytes:
         (HEAD.encode(), "there are no votes in it"),
         (b"[]", "there are no votes in it"),
         (f"{HEAD}\na,b,tie\na\0,b,tie".encode(), "line 3: there is a NUL character"),
-        (b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, 7]', "vote 2: an object"),
-        (b'[{"model_a": ["a"], "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no text"),
-        (b'[{"model_a": "\\u0000", "model_b": "b", "winner": "tie"}]', "vote 1: model_a is no te"),
+        (f"{json.dumps(_vote())}\nnothing\n".encode(), "line 2 column 1"),
+        (json.dumps([_vote(), 7]).encode(), "vote 2: an object"),
+        (json.dumps([_vote(model_a=["a"])]).encode(), "vote 1: model_a is no text"),
+        (json.dumps([_vote(model_a="\0")]).encode(), "vote 1: model_a is no te"),
         (b'{"votes": []}', "there is no column 'model_a'"),
-        (
-            b'[{"model_a": "a", "Model A": "c", "model_b": "b", "winner": "tie"}]',
-            "the column 'model_a' twice",
-        ),
-        (
-            b'[{"model_a": "a", "model_b": "b", "winner": "tie"}, {"x": 1}]',
-            "vote 2: model_a is emp",
-        ),
+        (json.dumps([{"Model A": "c"} | _vote()]).encode(), "the column 'model_a' twice"),
+        (json.dumps([_vote(), {"x": 1}]).encode(), "vote 2: model_a is emp"),
         (b"[" * 100_000, "it can't be read: "),
         (gzip.compress(b"x" * 3_000_000, mtime=0), "it unpacks to more than 1 MB"),
         (gzip.compress(HEAD.encode(), mtime=0)[:-9], "it can't be read: "),
@@ -226,23 +204,21 @@ def test_what_is_no_file_of_votes_is_a_sentence(
     monkeypatch.setattr(votes_file, "MOST_UNPACKED", 2**20)
     path = tmp_path / "votes"
     path.write_bytes(content)
-    with pytest.raises(CsvNotRated, match=re.escape(sentence)):
-        run(file=str(path))
+    with pytest.raises(VotesFileUnreadable, match=re.escape(sentence)):
+        read_table(path)
 
 
-def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(
-    votes: Any, tmp_path: Path
-) -> None:
+def test_names_that_look_the_same_are_the_same_and_latin_1_is_said(tmp_path: Path) -> None:
     names = ["R\u00f6ver 1", "Ro\u0308ver 1", " R\u00f6ver\u00a0 1", "R\u00f6\u200bver 1"]
-    same = document(votes(*(f"{name},b,tie" for name in names)), rounds=100)
-    assert [line["model"] for line in same["standings"]] == ["Röver 1", "b"]
+    same = read_table(write_votes(tmp_path, *(f"{name},b,tie" for name in names)))
+    assert {*same.columns["model_a"]} == {"Röver 1"}
     lines = [f"A,{alike},tie,j,i" for alike in ("\u0410", "\uff21", "a")]
     for line in [*lines, "a,b,tie,Anna,i\na,b,tie,anna,i", "a,b,tie,j,I1\na,b,tie,j,i1"]:
-        notes = document(votes(line, head=WITH_CLUSTERS))["notes"]
-        assert sum("look alike and count as two names" in note for note in notes) == 1, line
+        note = read_table(write_votes(tmp_path, line, head=WITH_CLUSTERS)).note
+        assert note.endswith("look alike and count as two names."), line
     path = tmp_path / "latin1.csv"
     mixed = [f"{HEAD}\nRöver,b,tie\n".encode(coding) for coding in ("latin-1", "utf-8")]
     path.write_bytes(mixed[0] + mixed[1].replace(HEAD.encode(), b""))
-    latin = document(str(path), rounds=100)
-    assert [line["model"] for line in latin["standings"]] == ["Röver", "b"]
-    assert votes_file.LATIN_1_NOTE in latin["notes"]
+    latin = read_table(path)
+    assert {*latin.columns["model_a"]} == {"Röver"}
+    assert latin.note == votes_file.LATIN_1_NOTE
