@@ -61,6 +61,20 @@ def test_units_with_one_judgement_do_not_count() -> None:
     assert found.percent.lower is None, "one scenario says nothing about the spread"
 
 
+def test_ac1_of_a_table_worked_out_by_hand() -> None:
+    """Gwet's chance comes from all units, also those that one expert judged alone.
+
+    Of losses, ties and wins these have 1/6, 1/3 and 1/2, so that it is 11/36 for three answers;
+    of the two units that are shared one agrees.
+    """
+    votes = judged(
+        *[("e", "s1", WIN), ("f", "s1", WIN), ("e", "s2", WIN), ("f", "s2", LOSS)],
+        ("e", "s3", TIE),
+    )
+    found = agreement(votes, rounds=100, seed=1)
+    assert found.ac1.value == pytest.approx((1 / 2 - 11 / 36) / (1 - 11 / 36))
+
+
 def test_what_one_judge_says_again_is_no_agreement_of_two() -> None:
     again = judged(("e", "s1", WIN), ("e", "s1", WIN), ("e", "s2", LOSS), ("e", "s2", TIE))
     assert agreement(again, rounds=100, seed=1).units == 0

@@ -1,9 +1,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
+import scipy.stats
 import statsmodels.api as sm
 
 from arena.rating.comparisons import Comparisons, count_wins, select_votes
@@ -49,6 +51,26 @@ def test_the_advantage_and_its_clustered_error_agree_with_statsmodels() -> None:
     groups = found.clusters
     error = theirs.bse[-1] * ELO_PER_LOGIT * np.sqrt(groups / (groups - 1))
     assert found.standard_error == pytest.approx(error, rel=1e-6)
+    scale, degrees = _bell_mccaffrey(theirs, np.eye(groups)[votes.expert])
+    half = scipy.stats.t.ppf(0.975, degrees) * theirs.bse[-1] * np.sqrt(scale) * ELO_PER_LOGIT
+    upper = theirs.params[-1] * ELO_PER_LOGIT + half
+    assert found.advantage.upper == pytest.approx(upper, rel=1e-5)
+
+
+def _bell_mccaffrey(found: Any, of_expert: np.ndarray) -> tuple[float, float]:
+    """By whole matrices of experts: the factor of the variance, and degrees of freedom."""
+    design, expected = found.model.exog, found.fittedvalues
+    certain = expected * (1.0 - expected)
+    back = design @ np.linalg.inv(design.T @ (design * certain[:, None]))[-1]
+    pulls = (found.model.endog - expected) * back
+    weights, squares = of_expert.T @ (certain * back), of_expert.T @ pulls**2
+    left = np.diag(weights) - np.outer(weights, weights)
+    by_votes = np.trace(left @ np.diag(squares / weights**2) @ left.T)
+    effect = ((of_expert.T @ pulls) ** 2).sum() - by_votes
+    variance = np.diag(max(effect / np.trace(left @ left.T), 0.0) + squares / weights**2)
+    form = left @ variance @ left.T
+    scale = weights @ variance @ weights / np.trace(form)
+    return scale, np.trace(form) ** 2 / np.trace(form @ form)
 
 
 TURNED = versus("a", "b", 3, 0, 1) + versus("b", "a", 3, 0, 1)

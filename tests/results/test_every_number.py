@@ -1,6 +1,6 @@
 """Every number of the results, computed again from the raw votes of one small study.
 
-What computes it here is another's package (statsmodels, krippendorff, scipy) or plain loops, never
+What computes it here is another's package (statsmodels, scipy) or plain loops, never
 our own ratings. Numbers that are drawn at random are held against what they estimate, within the
 error of the draws.
 """
@@ -30,8 +30,8 @@ def test_ratings_intervals_and_ranks(shown: Shown) -> None:
 
 
 def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
-    standings = [row for row in shown.rows("table") if len(row) == 5]
-    details = [row for row in shown.rows("table") if len(row) == 7]
+    standings = [row for row in shown.rows if len(row) == 5]
+    details = [row for row in shown.rows if len(row) == 7]
     for slug, line in shown.lines.items():
         own = [vote.score_of(slug) for vote in shown.main if slug in vote.names]
         counts = [own.count(points) for points in (1.0, 0.5, 0.0)]
@@ -49,11 +49,11 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
 def test_ties_and_what_is_left_out(shown: Shown) -> None:
     ties = np.mean([vote.score == 0.5 for vote in shown.main])
     assert shown.results.trust.tie_share == pytest.approx(ties)
-    assert f"{100 * ties:.0f} % of the votes are ties" in shown.said("table")
-    assert f"Counted {len(shown.main)} votes" in shown.said("table")
+    assert f"{100 * ties:.0f} % of the votes are ties" in shown.said
+    assert f"Counted {len(shown.main)} votes" in shown.said
     kinds = Counter(vote.kind for vote in shown.votes)
-    assert f"{kinds['check']} attention checks" in shown.said("table")
-    assert f"{kinds['repeat']} hidden repeats" in shown.said("table")
+    assert f"{kinds['check']} attention checks" in shown.said
+    assert f"{kinds['repeat']} hidden repeats" in shown.said
 
 
 def test_what_an_expert_less_changes(shown: Shown) -> None:
@@ -74,7 +74,7 @@ def test_what_an_expert_less_changes(shown: Shown) -> None:
         assert line.decided == len(hits)
     moves = [line.moves for line in shown.results.trust.raters if line.moves is not None]
     said = f"moves a contestant by at most {max(moves)} place"
-    assert (said in shown.said("table")) == (max(moves) > 0)
+    assert (said in shown.said) == (max(moves) > 0)
 
 
 # --- Pairs and types -------------------------------------------------------------------
