@@ -3,13 +3,12 @@
 from datetime import UTC, datetime
 from random import Random
 
-from arena.models import Board, BoardTable, Study
+from arena.models import Board, BoardTable, Matchup, Study
 from arena.results.exports.board_files import write_table
 from arena.results.services.batches import BatchRequest, open_batch
 from arena.results.services.boards import make_board, publish_table
-from arena.studies.services.opening import close_study
 from augment.models import Contestant, Scenario
-from tests.study_rows import a_study, contestant, picture, vote
+from tests.study_rows import a_study, contestant, picture, vote_all
 
 STRENGTH = {"ann": 3, "bob": 2, "cid": 1, "dot": 4, "eli": 2}
 
@@ -21,14 +20,14 @@ def day(number: int) -> datetime:
 def voted(study: Study, seed: int = 1) -> Study:
     """The study with a vote on every matchup, closed."""
     dice = Random(seed)
-    for matchup in study.matchups.order_by("expert__username", "position"):
+
+    def outcome(pair: Matchup) -> str:
         left, right = (
-            STRENGTH[side.contestant.slug] * dice.random()
-            for side in (matchup.left, matchup.right)
+            STRENGTH[side.contestant.slug] * dice.random() for side in (pair.left, pair.right)
         )
-        tie = abs(left - right) < 0.3
-        vote(matchup, "equal" if tie else "left" if left > right else "right")
-    return close_study(study=study)
+        return "equal" if abs(left - right) < 0.3 else "left" if left > right else "right"
+
+    return vote_all(study, outcome)
 
 
 def a_board() -> Board:

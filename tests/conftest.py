@@ -17,6 +17,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 import tests.properties  # noqa: F401
 from arena.management.commands.prepare import compile_catalogue
+from arena.models import Study
 from augment.fake_llm.server import FakeServer, running
 from augment.services.judging import compute_once
 from tests.append_only import empty_with_triggers
@@ -25,11 +26,12 @@ from tests.intents import known
 from tests.on_postgres import FILES
 from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
+from tests.study_rows import a_study
 
 GROUPS = {
     "tests/journeys/test_demo": "demo_home",
     "tests/browser/": "browser",
-    "tests/results/test_every_": "every_number",
+    "tests/results/test_every_number": "every_number",
 }
 """Files that share a fixture which takes long to make: they run in one process, in this order of
 what a test's address begins with."""
@@ -77,6 +79,12 @@ def server() -> Iterator[FakeServer]:
     """The stand-in, which knows the catalogue; its slow model takes longer than any test."""
     with running(slow_s=3600.0, known=known) as serving:
         yield serving
+
+
+@pytest.fixture
+def study() -> Study:
+    """An open study of three contestants, six scenarios and two experts."""
+    return a_study()
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ LOCKS = (
     *("jobs/test_budget", "jobs/test_call_limits", "jobs/test_cancelling", "jobs/test_cap"),
     *("jobs/test_leases", "jobs/test_workers", "services/test_append_only", "services/test_work"),
     *("votes/test_cast_vote", "votes/test_concurrency", "votes/test_handing_over"),
-    *("votes/test_long_writes", "votes/test_waiting"),
+    "votes/test_waiting",
 )
 """About locks, leases, budgets and triggers."""
 FILES = (

@@ -1,7 +1,7 @@
 """Rows for tests of studies: contestants with pictures of scenarios, and the people who vote."""
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypedDict
 
 from django.contrib.auth.models import User
@@ -9,6 +9,7 @@ from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
 from arena.people.services import create_person
+from arena.studies.services.opening import close_study
 from arena.voting.services.casting import Decision, cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
@@ -54,14 +55,22 @@ def picture(
     job: GenerationJob | None = None,
 ) -> Augmentation:
     """What a job, one of its own unless told otherwise, made of the scenario."""
-    done = state == Augmentation.State.DONE
-    return Augmentation.objects.create(
-        job=job or GenerationJob.objects.create(name="a job"),
-        scenario=scenario,
-        contestant=contestant,
-        state=state,
-        modification={} if done else None,
-        image=f"bev/{uuid.uuid4().hex}.png" if image is None else image,
+    row = _picture(job or GenerationJob.objects.create(name="a job"), scenario, contestant)
+    row.state = state
+    row.modification = {} if state == Augmentation.State.DONE else None
+    row.image = row.image if image is None else image
+    row.save()
+    return row
+
+
+def _picture(job: GenerationJob, place: Scenario, who: Contestant) -> Augmentation:
+    return Augmentation(
+        job=job,
+        scenario=place,
+        contestant=who,
+        state=Augmentation.State.DONE,
+        modification={},
+        image=f"bev/{uuid.uuid4().hex}.png",
         finished_at=timezone.now(),
     )
 
@@ -90,10 +99,8 @@ def cast_of(
     """Everybody and everything that a study needs; returns the names as open_study takes them."""
     places = [scenario(f"place-{number}") for number in range(scenarios)]
     job = GenerationJob.objects.create(name="a job")
-    for slug in contestants:
-        row = contestant(slug, kind)
-        for place in places:
-            picture(place, row, job=job)
+    rows = [contestant(slug, kind) for slug in contestants]
+    Augmentation.objects.bulk_create(_picture(job, place, row) for row in rows for place in places)
     for username in experts:
         expert(username, is_simulated=simulated_experts)
     return {
@@ -140,6 +147,20 @@ def shown_again(matchup: Matchup) -> Matchup:
         kind=Matchup.Kind.REPEAT,
         repeat_of=matchup,
     )
+
+
+def vote_all(study: Study, outcome: Callable[[Matchup], str] = lambda _: "left") -> Study:
+    """Return the study closed, with a vote on each of its pairs; all are stored at once."""
+    pairs = study.matchups.select_related("left__contestant", "right__contestant")
+    votes = []
+    for pair in pairs.order_by("expert__username", "position"):
+        side = outcome(pair)
+        vote = Vote(key=uuid.uuid4(), matchup=pair, expert_id=pair.expert_id, outcome=side)
+        vote.shown_left_id, vote.shown_right_id = pair.left_id, pair.right_id
+        vote.winner_id = {"left": pair.left_id, "right": pair.right_id}.get(side)
+        votes.append(vote)
+    Vote.objects.bulk_create(votes)
+    return close_study(study=study)
 
 
 def vote(matchup: Matchup, outcome: str = "left", **more: object) -> Vote:

@@ -16,9 +16,9 @@ from arena.models import Snapshot
 from arena.results.exports.writers import MANIFEST, bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
-from arena.studies.services.opening import close_study, product_version
+from arena.studies.services.opening import product_version
 from tests.full_study import Size, full_study
-from tests.study_rows import a_study, vote
+from tests.study_rows import a_study, vote_all
 
 pytestmark = pytest.mark.django_db
 
@@ -63,12 +63,10 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_nobody_named(snapshot: 
 
 @pytest.mark.usefixtures("no_charts")
 def test_experts_that_a_rating_is_of_are_named_by_pseudonym() -> None:
-    study = a_study(votes_per_expert=3)
-    for matchup in study.matchups.all():
-        vote(matchup)
+    study = vote_all(a_study(votes_per_expert=3))
     person = study.experts.order_by("pk")[0].person
     chosen = Filters(experts=(str(person.code),))
-    files = bundle_files(rate(study=close_study(study=study), rounds=10, filters=chosen))
+    files = bundle_files(rate(study=study, rounds=10, filters=chosen))
     assert json.loads(files[MANIFEST])["filters"]["experts"] == [person.pseudonym]
 
 

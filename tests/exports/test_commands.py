@@ -1,4 +1,3 @@
-import csv
 import io
 import json
 from pathlib import Path
@@ -7,9 +6,8 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from arena.models import Study
-from augment.models import Event
 from tests.exports.test_ratings import voted_study
-from tests.study_rows import a_study, cast_of
+from tests.study_rows import cast_of
 
 pytestmark = pytest.mark.django_db
 
@@ -47,17 +45,3 @@ def test_a_hyphen_is_standard_output() -> None:
     assert run("export", "leaderboard", "Round 1", "--out", "-").startswith("rank,model,elo,")
     with pytest.raises(CommandError, match="name a file"):
         run("export", "leaderboard", "Round 1", "--format", "png", "--out", "-")
-
-
-def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: Path) -> None:
-    a_study()
-    run("rate", "Round 1", "--early")
-    looks = Event.objects.filter(verb="look early")
-    assert looks.count() == 1
-    target = ("export", "leaderboard", "Round 1", "--out", tmp_path / "x.csv")
-    with pytest.raises(CommandError, match="still open"):
-        run(*target)
-    run(*target, "--early")
-    assert looks.count() == 2
-    with (tmp_path / "x.csv").open(newline="") as file:
-        assert {row["early"] for row in csv.DictReader(file)} == {"yes"}

@@ -23,25 +23,17 @@ from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
+from tests.board_rows import voted
 from tests.opening import open_study
 from tests.scenes import vehicle
-from tests.study_rows import a_study, cast_of, expert, matchups_of, vote
+from tests.study_rows import a_study, cast_of, expert, matchups_of, vote, vote_all
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
-STRENGTH = {"ann": 3, "bob": 2, "cid": 1}
-
 
 def voted_study() -> Study:
-    """Closed; the stronger wins two of three votes, every sixth is a tie."""
-    study = a_study(votes_per_expert=18)
-    for number, matchup in enumerate(study.matchups.order_by("expert", "position")):
-        left = STRENGTH[matchup.left.contestant.slug]
-        right = STRENGTH[matchup.right.contestant.slug]
-        better = ("left", "right") if left > right else ("right", "left")
-        vote(matchup, "equal" if number % 6 == 5 else better[number % 3 == 2])
-    return close_study(study=study)
+    return voted(a_study(votes_per_expert=18))
 
 
 def lines(snapshot: Snapshot) -> list[tuple[Any, ...]]:
@@ -169,10 +161,7 @@ def test_simulated_votes_need_a_study_that_allows_them() -> None:
 
 
 def planned() -> Snapshot:
-    study = a_study(votes_per_expert=3)
-    for matchup in study.matchups.all():
-        vote(matchup)
-    return plan_snapshot(study=close_study(study=study), rounds=10)
+    return plan_snapshot(study=vote_all(a_study(votes_per_expert=3)), rounds=10)
 
 
 def test_intervals_are_those_that_were_preregistered() -> None:

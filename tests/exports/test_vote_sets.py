@@ -30,8 +30,8 @@ from augment.errors import Conflict
 from augment.models import Event, Scenario
 from augment.scene.entities import ScenarioType
 from tests.append_only import rewriting
-from tests.full_study import Size, full_study
-from tests.study_rows import a_study, matchups_of, vote
+from tests.board_rows import voted
+from tests.study_rows import a_study, matchups_of, vote, vote_all
 
 pytestmark = pytest.mark.django_db
 
@@ -142,14 +142,8 @@ def _check_that_ties_stand_apart(rating: Snapshot, voted: int, ties: int) -> Non
 
 
 def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> None:
-    study = a_study(votes_per_expert=3)
-    for matchup in study.matchups.all():
-        vote(matchup)
-    snapshot = rate(
-        study=close_study(study=study),
-        rounds=10,
-        filters=Filters(types=(ScenarioType.NUDGE.value,)),
-    )
+    study = vote_all(a_study(votes_per_expert=3))
+    snapshot = rate(study=study, rounds=10, filters=Filters(types=(ScenarioType.NUDGE.value,)))
     assert snapshot.filters["types"] == [ScenarioType.NUDGE.value]
     person = matchups_of(study, "eva")[0].expert.person
     assert snapshot.results.judges[str(person.code)] == person.pseudonym
@@ -218,8 +212,7 @@ def test_a_snapshot_of_before_keeps_its_file_and_the_hash_of_it() -> None:
     assert tuple(table.column_names) == COLUMNS[:10]
 
 
-SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
-AUTHOR, OWN = "expert-1", "gpt-4o-otm"
+AUTHOR, OWN = "eva", "ann"
 
 
 def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
@@ -228,7 +221,7 @@ def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
 
 @pytest.mark.usefixtures("no_charts")
 def test_they_count_unless_a_rating_leaves_them_out_and_no_file_says_whose() -> None:
-    study = full_study(size=SIZE)
+    study = voted(a_study(votes_per_expert=18))
     plain = rate(study=study, rounds=50)
     author = User.objects.get(username=AUTHOR)
     mark_author(study=study, expert=author, contestant=OWN)

@@ -106,6 +106,7 @@ def test_a_table_says_that_it_is_simulated_and_an_early_look() -> None:
     for warning in (SIMULATED_TABLE, EARLY_LOOK):
         assert f"% {warning}" in marked
         assert warning not in plain
+    assert parsed(table(row("x"), is_early=True))[0]["early"] == "yes"
 
 
 def test_experts_do_not_read_that_votes_of_authors_are_left_out() -> None:

@@ -7,12 +7,6 @@ from django.contrib.auth.models import User
 from pytest_django import Settings
 
 from arena.models import Study
-from tests.study_rows import a_study
-
-
-@pytest.fixture
-def study() -> Study:
-    return a_study()
 
 
 @pytest.fixture
