@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from arena.errors import StudyStillOpen
-from arena.models import Board, BoardTable, Matchup, Study, Vote
+from arena.models import Board, Matchup, Study, Vote
 from arena.rating.board_table import table_from_document
 from arena.results.exports.board_files import board_folder
-from arena.results.services.boards import make_board, publish_table
+from arena.results.services.boards import make_board
 from arena.results.services.ratings import rate_now
 from arena.studies.queries import list_finished, scenario_sources
 from arena.studies.services.opening import cancel_study
@@ -45,6 +45,11 @@ def test_over_three_dates_old_tables_stay_byte_for_byte(board: Board) -> None:
         }
         before = after
     assert board_folder(board) == before
+    assert [table.made_at for table in board.tables.order_by("number")] == [
+        day(n) for n in (1, 2, 3)
+    ]
+    said = Event.objects.filter(object_kind="board").order_by("pk")
+    assert [event.verb for event in said] == ["make", "publish", *["open batch", "publish"] * 2]
     document = board.tables.get(number=3).document
     assert {line.slug: line.since for line in document.lines} == {
         "ann": "2026-01-01",
@@ -218,10 +223,3 @@ def test_other_questions_are_not_pooled(board: Board) -> None:
     Study.objects.filter(pk=batch.pk).update(questions=["realism"])
     with pytest.raises(Conflict, match="asks something else"):
         published(board, 2)
-
-
-def test_the_log_says_what_was_published(board: Board) -> None:
-    publish_table(board, write=lambda table: {"json": ""}, now=day(1))
-    assert BoardTable.objects.get().made_at == day(1)
-    said = Event.objects.filter(object_kind="board").order_by("pk")
-    assert [event.verb for event in said] == ["make", "publish"]

@@ -50,18 +50,24 @@ def study() -> Study:
     return a_study(votes_per_expert=3)
 
 
-def test_a_newcomer_gets_an_account_and_the_quota(study: Study) -> None:
+def test_a_newcomer_gets_an_account_and_the_quota_and_is_done_with_it(study: Study) -> None:
     voter = join(link(study), "w-1")
     mine = study.matchups.filter(expert=voter.expert)
     assert mine.count() == 6
     assert list(mine.order_by("position").values_list("position", flat=True)) == [1, 2, 3, 4, 5, 6]
     assert voter.expert in study.experts.all()
     assert not voter.expert.has_usable_password()
+    assert not list_voters(study).get().is_done
+    answer(study, voter, 6)
+    assert list_voters(study).get().is_done, "every pair has an answer: the code is told"
+    assert state_of(voter.enrolment)["done"] == 1
 
 
-def test_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
+def test_one_id_has_one_place_and_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
     enrolment = link(study)
-    join(enrolment, "w-1")
+    join(enrolment, " w-1 ")
+    with pytest.raises(Conflict, match="takes part already"):
+        join(enrolment, "W-1")
     join(enrolment, "w-2")
     before = study.matchups.count()
     with pytest.raises(EnrolmentOver, match="Every place"):
@@ -70,18 +76,11 @@ def test_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
     assert state_of(enrolment)["free"] == 0
 
 
-def test_one_id_has_one_place(study: Study) -> None:
+def test_what_is_closed_takes_nobody_on(study: Study) -> None:
+    with pytest.raises(EnrolmentOver):
+        join(link(study, is_open=False), "w-1")
     enrolment = link(study)
-    join(enrolment, " w-1 ")
-    with pytest.raises(Conflict, match="takes part already"):
-        join(enrolment, "W-1")
-
-
-@pytest.mark.parametrize("way", ["link", "study"])
-def test_what_is_closed_takes_nobody_on(study: Study, way: str) -> None:
-    enrolment = link(study, is_open=way != "link")
-    if way == "study":
-        close_study(study=study)
+    close_study(study=study)
     with pytest.raises(EnrolmentOver):
         join(enrolment, "w-1")
 
@@ -94,22 +93,14 @@ def test_who_read_an_older_text_reads_the_new_one_first(study: Study) -> None:
     assert join(enrolment, "w-1").consent_sha256 == enrolment.consent_sha256
 
 
-def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
-    voter = join(link(study), "w-1")
-    assert not list_voters(study).get().is_done
-    answer(study, voter, 6)
-    assert list_voters(study).get().is_done
-    assert state_of(voter.enrolment)["done"] == 1
-
-
-@pytest.mark.parametrize(("hours", "places"), [(23.9, 0), (24.1, 1)])
-def test_who_is_silent_for_too_long_makes_room(study: Study, hours: float, places: int) -> None:
+def test_who_is_silent_for_too_long_makes_room(study: Study) -> None:
     enrolment = link(study, places=1)
     voter = join(enrolment, "w-1")
-    age(voter, hours=hours)
-    assert drop_silent(enrolment=enrolment) == places
-    assert state_of(enrolment)["free"] == places
-    assert study.matchups.filter(expert=voter.expert).count() == (0 if places else 6)
+    for hours, places, pairs in ((23.9, 0, 6), (24.1, 1, 0)):
+        age(voter, hours=hours)
+        assert drop_silent(enrolment=enrolment) == places
+        assert state_of(enrolment)["free"] == places
+        assert study.matchups.filter(expert=voter.expert).count() == pairs
 
 
 def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: Study) -> None:

@@ -52,8 +52,8 @@ def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> Non
     assert event.after == {"name": "Round 1", "matchups": 18, "seed": 7}
 
 
-def test_the_stored_rules_give_the_stored_plan_again() -> None:
-    study = Study.objects.get(pk=a_study().pk)
+def test_the_stored_rules_give_the_stored_plan_again_also_those_of_before(study: Study) -> None:
+    study.refresh_from_db()
     planned = plan(frozen_rules(study))
     stored = study.matchups.order_by("expert__username", "position").values_list(
         "expert__username",
@@ -66,6 +66,9 @@ def test_the_stored_rules_give_the_stored_plan_again() -> None:
         (m.expert, m.position, m.scenario, m.left, m.right) for m in planned.matchups
     ]
     assert study.rules["scenario_gap_kept"] == 5
+    old = ("entries", "experts", "votes_per_expert", "seed", "scenario_gap")
+    study.rules = {name: study.rules[name] for name in old}
+    assert (frozen_rules(study).repeat_share, frozen_rules(study).checks) == (0.0, ())
 
 
 @pytest.mark.parametrize("state", [Augmentation.State.DONE, Augmentation.State.UNREADABLE])
@@ -216,13 +219,6 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
         assert shown == {"reference", "check"}
     assert not study.contestants.filter(kind="check").exists()
     assert study.matchups.exclude(kind="check").filter(left__contestant__kind="check").count() == 0
-
-
-def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
-    study = a_study()
-    old = ("entries", "experts", "votes_per_expert", "seed", "scenario_gap")
-    study.rules = {name: study.rules[name] for name in old}
-    assert (frozen_rules(study).repeat_share, frozen_rules(study).checks) == (0.0, ())
 
 
 def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:

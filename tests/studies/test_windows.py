@@ -150,7 +150,7 @@ def test_a_scenario_is_played_where_all_of_its_pictures_were_driven_in_one_way()
         assert (found is not None) == (matchup.scenario.slug in {"place-0", "place-3"})
 
 
-def test_who_made_a_picture_can_not_be_told_from_a_single_byte_of_its_drive() -> None:
+def test_a_pair_is_played_blind_to_its_expert_and_to_admins_alone() -> None:
     cast = cast_of()
     drive_pictures(pictures())
     study = played(cast)
@@ -162,6 +162,9 @@ def test_who_made_a_picture_can_not_be_told_from_a_single_byte_of_its_drive() ->
         said = json.dumps(found)
         for word in ("ann", "bob", "cid", "pdm", "Agent", "0.43", "scores", "plans", "events"):
             assert word not in said, word
+    for user, code in [(User.objects.get(username="finn"), matchup.code), (eva(), uuid.uuid4())]:
+        with pytest.raises(NotYours):
+            drives_of_pair(user=user, code=code)
 
 
 def test_ids_and_their_order_are_gone() -> None:
@@ -171,16 +174,6 @@ def test_ids_and_their_order_are_gone() -> None:
     first = plain | {"objects": [one, two], "plans": [{"scores": [0.5]}], "braking": [0]}
     second = plain | {"objects": [two | {"id": "b"}, one | {"id": "a"}], "plans": [], "events": []}
     assert json.dumps(blind_trace(first)) == json.dumps(blind_trace(second))
-
-
-def test_a_pair_is_played_to_its_expert_and_to_admins_alone() -> None:
-    cast = cast_of()
-    drive_pictures(pictures())
-    mine = matchups_of(played(cast), "eva")[0]
-    assert drives_of_pair(user=eva(), code=mine.code)
-    for user, code in [(User.objects.get(username="finn"), mine.code), (eva(), uuid.uuid4())]:
-        with pytest.raises(NotYours):
-            drives_of_pair(user=user, code=code)
 
 
 def test_without_the_rule_nothing_is_played_and_no_vote_can_say_so() -> None:

@@ -17,7 +17,8 @@ from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import own_votes, tallies, upcoming, voting_progress
 from augment.errors import Conflict, UnknownName
 from tests.api.asking import signed_in
-from tests.study_rows import a_study, matchups_of, shown_again, vote
+from tests.opening import open_study
+from tests.study_rows import a_study, cast_of, matchups_of, shown_again, vote
 
 pytestmark = pytest.mark.django_db
 
@@ -131,13 +132,12 @@ def test_checks_are_judged_by_the_primary_question_alone() -> None:
     assert found.left_out == {"check": 2}
 
 
-@pytest.mark.parametrize("asked", [[], ["instruction"] * 2, ["beauty"], ["realism", "beauty"]])
-def test_only_known_questions_each_once_can_be_asked(asked: list[str]) -> None:
-    if not asked:
-        assert a_study(questions=asked).questions == ["instruction"]
-        return
-    with pytest.raises(Conflict, match="primary one first"):
-        a_study(questions=asked)
+def test_only_known_questions_each_once_can_be_asked() -> None:
+    rules = {"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast_of()}
+    for asked in (["instruction"] * 2, ["beauty"], ["realism", "beauty"]):
+        with pytest.raises(Conflict, match="primary one first"):
+            open_study(**rules, questions=asked)
+    assert open_study(**rules, questions=[]).questions == ["instruction"]
 
 
 def test_one_vote_takes_as_many_queries_as_with_one_question() -> None:
