@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 import schemathesis
-from django.contrib.auth.models import User
 from django.core.signals import request_finished, request_started
 from django.core.wsgi import get_wsgi_application
 from django.db import close_old_connections, transaction
@@ -20,25 +19,12 @@ from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi import checks
 
-from arena.models import Snapshot
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
-from augment.models import (
-    Endpoint,
-    EndpointModel,
-    Probe,
-    SceneUpload,
-    Submission,
-    Sweep,
-    UploadMoment,
-)
-from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
-from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.known_models import model_at
+from augment.models import EndpointModel, Probe
 from tests.api.tokens import secret_of
-from tests.entering import entrant, read, sent
 from tests.study_rows import matchups_of, vote
-from tests.web.addresses import address
+from tests.web.addresses import code_of
 from tests.web.cast import World, people, world
 
 pytestmark = [pytest.mark.django_db, pytest.mark.slow]
@@ -50,8 +36,8 @@ CHECKS: list[Any] = [
     checks.content_type_conformance,
     checks.response_schema_conformance,
 ]
-ROLES = ("anonymous", "entrant", "expert", "researcher", "admin")
-OF_ENTRANTS = {"sendSubmission", "getSubmission", "keepPreferences"}
+ROLES = ("expert", "researcher", "admin")
+"""Strangers get nothing (test_resources.py), entrants their own (journeys/test_entering.py)."""
 OF_EXPERTS = {"listStudies", "listMatchups", "getShownPicture"}
 OF_EXPERTS |= {"keepPreferences", "report", "vote"}
 EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
@@ -82,69 +68,38 @@ def here() -> World:
     found = world()
     for matchup in matchups_of(found.study, "eva")[:4]:
         vote(matchup, "left")
-    site = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:9/v1"))
-    Probe.objects.create(model=model_at(endpoint=site, model="m"))
-    upload = SceneUpload.objects.create(name="log.zip", size_bytes=1, state="failed")
-    UploadMoment.objects.create(upload=upload)
-    whole = make_benchmark(BenchmarkRequest(slug="set", title="Set", scenarios=["all"]))
-    read(sent(whole, entrant()))
-    address("sweep", found)  # makes one
+    rate(study=found.study, rounds=20, early=True)
+    Probe.objects.create(model=EndpointModel.objects.get(code=str(code_of("models", found))))
     return found
-
-
-def codes(here: World) -> dict[str, object]:
-    """By the first word of an address, the code of a row that is there."""
-    return {
-        "jobs": here.job.code,
-        "studies": here.study.code,
-        "snapshots": Snapshot.objects.get().code,
-        "uploads": SceneUpload.objects.get().code,
-        "moments": UploadMoment.objects.get().code,
-        "endpoints": Endpoint.objects.get(label="here").code,
-        "models": EndpointModel.objects.get().code,
-        "submissions": Submission.objects.get().code,
-        "scenarios": here.augmentation.scenario.code,
-        "augmentations": here.augmentation.code,
-        "sweeps": Sweep.objects.get().code,
-    }
-
-
-def account(role: str, here: World) -> User | None:
-    if role == "anonymous":
-        return None
-    if role == "entrant":
-        return Submission.objects.get().uploaded_by
-    return here.expert if role == "expert" else people()[role]
 
 
 def ask_all(role: str, here: World) -> Seen:
     """Ask for every operation in a role; by its name, the statuses that came."""
-    user = account(role, here)
-    reader = user if role in ("researcher", "admin") else people()["researcher"]
-    assert reader is not None
-    headers = {} if user is None else {"Authorization": f"Bearer {secret_of(user)}"}
-    rate(study=here.study, rounds=20, early=True)
-    if role in ("researcher", "admin"):
-        assert user is not None
+    accounts = people()
+    user = here.expert if role == "expert" else accounts[role]
+    reader = accounts["researcher"] if role == "expert" else user
+    headers = {"Authorization": f"Bearer {secret_of(user)}"}
+    if role != "expert":
         open_early(study=here.study, actor=user)
     document = schemathesis.openapi.from_wsgi(
         "/api/v1/openapi.json",
         app=get_wsgi_application(),
         headers={"Authorization": f"Bearer {secret_of(reader)}"},
     )
-    known, token = codes(here), here.study.matchups.filter(expert=here.expert)[0].left_token
     seen: Seen = defaultdict(set)
     for result in document.get_all_operations():
         operation: Any = result.ok()  # type: ignore[union-attr] # raises where it is none
         name = operation.definition.raw["operationId"]
-        seen[name] |= ask(operation, headers, known, token)
+        seen[name] |= ask(operation, headers, here)
     return seen
 
 
-def ask(operation: Any, headers: dict[str, str], known: dict[str, object], token: str) -> set[int]:
+def ask(operation: Any, headers: dict[str, str], here: World) -> set[int]:
     """Some requests to one operation, half of them about rows that are there."""
     statuses: set[int] = set()
     word = operation.path.removeprefix("/api/v1/").partition("/")[0]
+    code = str(code_of(word, here))
+    token = here.study.matchups.filter(expert=here.expert)[0].left_token
     right, wrong = (operation.as_strategy(mode) for mode in GenerationMode)
 
     @settings(
@@ -158,7 +113,7 @@ def ask(operation: Any, headers: dict[str, str], known: dict[str, object], token
     @given(case=st.one_of(right, wrong), is_there=st.sampled_from([True, True, False]))
     def send(case: Any, is_there: bool) -> None:
         if is_there and "code" in (case.path_parameters or {}):
-            case.path_parameters["code"] = str(known[word])
+            case.path_parameters["code"] = code
         if is_there and "name" in (case.path_parameters or {}):
             case.path_parameters["name"], case.path_parameters["form"] = EXPORTS[word]
         if is_there and "token" in (case.path_parameters or {}):
@@ -177,12 +132,7 @@ def ask(operation: Any, headers: dict[str, str], known: dict[str, object], token
 def test_every_answer_is_one_that_the_document_knows(role: str, here: World) -> None:
     seen = ask_all(role, here)
     fine = {name for name, statuses in seen.items() if any(status < 300 for status in statuses)}
-    if role == "anonymous":
-        assert fine == set()
-        assert all(statuses <= {401, 400, 404, 410, 415, 422} for statuses in seen.values()), seen
-    elif role == "entrant":
-        assert "getSubmission" in fine <= OF_ENTRANTS, seen
-    elif role == "expert":
+    if role == "expert":
         assert fine <= OF_EXPERTS, seen
     else:
         assert fine >= READ_BY_STAFF, seen

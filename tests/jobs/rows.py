@@ -38,6 +38,30 @@ def add_scenario(slug: str, *, scene: Scene | None = None, **columns: Any) -> Sc
     return Scenario.objects.create(slug=slug, base_scene=base, **columns)
 
 
+def add_many_scenarios(number: int) -> list[Scenario]:
+    """Scenarios of one scene, every other of another type."""
+    base = add_scenario("street-000").base_scene
+    types = (ScenarioType.CONSTRUCTION_ZONE, ScenarioType.JAYWALKER)
+    Scenario.objects.bulk_create(
+        Scenario(
+            slug=f"street-{place:03}",
+            type=types[place % 2],
+            instruction=f"Place {place} cones.",
+            base_scene=base,
+        )
+        for place in range(1, number)
+    )
+    return list(Scenario.objects.order_by("pk"))
+
+
+def add_many_contestants(number: int) -> list[Contestant]:
+    Contestant.objects.bulk_create(
+        Contestant(slug=f"who-{place:03}", name=f"Who {place:03}", kind=Contestant.Kind.RULE)
+        for place in range(number)
+    )
+    return list(Contestant.objects.order_by("pk"))
+
+
 def add_kind(slug: str, kind: str = Contestant.Kind.REFERENCE) -> Contestant:
     return Contestant.objects.create(slug=slug, name=slug, kind=kind)
 

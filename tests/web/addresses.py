@@ -50,12 +50,12 @@ def address(name: str, here: World) -> str:
         "token": shown.left_token,
     }
     if "<uuid:code>" in route:
-        given["code"] = _code(name, route.partition("/")[0], here)
+        given["code"] = code_of(route.partition("/")[0], here, name)
     return reverse(name, kwargs={part: given[part] for part in given if f":{part}>" in route})
 
 
-def _code(name: str, word: str, here: World) -> object:
-    """Return the code of a row of the kind that an address begins with."""
+def code_of(word: str, here: World, name: str = "") -> object:
+    """Return the code of a row of the kind that an address begins with, of a page by its name."""
     row, scenario = here.augmentation, here.augmentation.scenario
     match word:
         case "studies" if name.startswith("study-draft"):
@@ -89,6 +89,7 @@ def _code(name: str, word: str, here: World) -> object:
     rows: dict[str, Any] = {
         "people": here.expert.person,
         "jobs": here.job,
+        "snapshots": here.study.snapshots.first(),
         "label": here.job,
         "studies": here.study,
         "contestants": row.contestant,
@@ -97,7 +98,8 @@ def _code(name: str, word: str, here: World) -> object:
         "scenarios": scenario,
         "scenes": scenario.base_scene,
     }
-    return rows[word].code if word in rows else STRANGER
+    found = rows.get(word)
+    return found.code if found else STRANGER
 
 
 def _driven(word: str, scenario: Scenario) -> Simulation | Sweep:

@@ -84,9 +84,9 @@ def signed_in(user: User) -> Client:
     return client
 
 
-def status(user: User, url: str) -> int:
+def look(client: Client, url: str) -> int:
     """What a GET answers; a picture is read to its end, which closes its file."""
-    answer = signed_in(user).get(url)
+    answer = client.get(url)
     if answer.streaming:
         b"".join(answer)
     return answer.status_code

@@ -11,14 +11,14 @@ from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Authorship, EarlyLook, Snapshot, Study
+from arena.models import Authorship, Snapshot, Study
 from arena.people.links import mark_author
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Event
 from tests import study_rows
-from tests.full_study import Size, full_study
-from tests.study_rows import a_study, matchups_of, vote
+from tests.board_rows import voted
+from tests.study_rows import matchups_of, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -62,66 +62,11 @@ def test_acts_are_filtered() -> None:
 
 # --- Early looks -------------------------------------------------------------------------------
 
-TABS = ("table", "pairs", "types", "raters", "displacement", "cost", "log")
-GATED = ("results", *TABS)
-"""What answers with the question whether to look early."""
 
-
-def _pages(study: Study, rating: Snapshot) -> dict[str, str]:
-    """Every address that tells of the results of a study."""
-    code = study.code
-    return {
-        "results": reverse("results", args=[code]),
-        **{tab: reverse("results-tab", args=[code, tab]) for tab in TABS},
-        "votes": reverse("results-votes", args=[code]),
-        **{
-            f"{name}.{form}": reverse("results-export", args=[code, name, form])
-            for name, form in (
-                *(("leaderboard", form) for form in ("csv", "json", "latex", "parquet")),
-                *(("all", "zip"), ("votes", "csv"), ("pairs", "svg")),
-            )
-        },
-        "api rating": reverse("api-snapshot", args=[rating.code]),
-        "api file": reverse("api-snapshot-file", args=[rating.code, "leaderboard", "csv"]),
-    }
-
-
-def _rated_while_open() -> tuple[Study, dict[str, str]]:
-    study = study_rows.a_study()
-    for number, one in enumerate(study.matchups.order_by("pk")):
-        study_rows.vote(one, ("left", "equal", "right")[number % 3])
-    snapshot = rate(study=study, early=True)
-    return study, _pages(study, snapshot)
-
-
-@pytest.mark.slow
-def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
-    study, pages = _rated_while_open()
-    accounts = people()
-    for role in ("admin", "researcher"):
-        client = signed_in(accounts[role])
-        for name, address in pages.items():
-            answer = client.get(address)
-            shown = answer.content.decode(errors="replace")
-            if answer.status_code == 200:  # the gate, which asks whether to look early
-                assert name in GATED, (role, name)
-                assert 'class="standings"' not in shown, (role, name)
-            else:
-                assert answer.status_code in (403, 409), (role, name)
-    assert not EarlyLook.objects.exists()
-    researcher = signed_in(accounts["researcher"])
-    researcher.post(reverse("results-open", args=[study.code]))
-    look = Event.objects.get(verb="look early")
-    assert (look.actor, look.object_code) == (accounts["researcher"], str(study.code))
-    assert {name: researcher.get(address).status_code for name, address in pages.items()} == (
-        dict.fromkeys(pages, 200)
-    )
-    admin = signed_in(accounts["admin"])
-    assert admin.get(pages["leaderboard.csv"]).status_code == 403
-
-
-def test_a_command_shows_them_only_on_purpose_and_that_is_logged(tmp_path: Path) -> None:
-    _rated_while_open()
+def test_a_command_shows_them_only_on_purpose_and_that_is_logged(
+    tmp_path: Path, study: Study
+) -> None:
+    rate(study=study, early=True)
     looks = Event.objects.filter(verb="look early").order_by("pk")
     logged: list[object] = []
     to_file = ("--out", str(tmp_path / "file.csv"))
@@ -138,15 +83,8 @@ def test_a_command_shows_them_only_on_purpose_and_that_is_logged(tmp_path: Path)
         assert [look.after for look in looks.all()] == logged
 
 
-SIZE = Size(scenarios=8, experts=4, votes_per_expert=90)
 FRESH = re.compile(r'name="(csrfmiddlewaretoken|key)" value="[^"]+"|\?rating=[0-9a-f-]+')
 """What is another one on every page."""
-HEADING = "With and without votes of authors on their own contestants"
-
-
-@pytest.fixture
-def study() -> Study:
-    return a_study()
 
 
 def page(client: Client, study: Study, name: str = "study", tab: str = "") -> str:
@@ -188,13 +126,13 @@ def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
 # --- Results -----------------------------------------------------------------------------------
 
 
-def test_staff_read_who_is_an_author(researcher: Client) -> None:
-    study = full_study(size=SIZE)
-    mark(study, "expert-1", "gpt-4o-otm")
+def test_staff_read_who_is_an_author(researcher: Client, study: Study) -> None:
+    mark(study, "eva", "ann")
+    study = voted(study)
     rated(study)
     raters = page(researcher, study, "results-tab", "raters")
     assert raters.count(">Author</span>") == 1
-    assert "expert-1" not in raters
+    assert "eva" not in raters
     assert "marked an author" in page(researcher, study, "results-tab", "log")
 
 
@@ -218,9 +156,9 @@ def test_while_voting_an_expert_sees_the_same_pages_as_without_a_mark(study: Stu
     assert seen() == before
 
 
-def test_after_closing_an_expert_reads_the_same_table_as_without_a_mark() -> None:
-    study = full_study(size=SIZE)
-    expert = signed_in(User.objects.get(username="expert-1"))
+def test_after_closing_an_expert_reads_the_same_table_as_without_a_mark(study: Study) -> None:
+    study = voted(study)
+    expert = signed_in(User.objects.get(username="eva"))
     tabs = ("table", "pairs", "types")
 
     def seen() -> list[str]:
@@ -228,6 +166,6 @@ def test_after_closing_an_expert_reads_the_same_table_as_without_a_mark() -> Non
 
     rated(study)
     before = seen()
-    mark(study, "expert-1", "gpt-4o-otm")
+    mark(study, "eva", "ann")
     rated(study)
     assert seen() == before

@@ -21,9 +21,7 @@ from augment.models import (
     Event,
     GenerationJob,
     Probe,
-    Scenario,
 )
-from augment.scene.entities import ScenarioType
 from augment.services.endpoints import contestants, known_endpoints, probing
 from augment.services.endpoints.contestants import ContestantRequest
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
@@ -81,9 +79,8 @@ ENTERED = {
 
 def test_the_paper_set_is_loaded_by_a_button(admin: Client, accounts: dict[str, User]) -> None:
     assert "Load the paper set" in admin.get(reverse("scenarios")).content.decode()
-    for says in ("50 added", "50 unchanged"):
-        answer = admin.post(reverse("catalogue-load"), {"set": "paper"}, follow=True)
-        assert says in answer.content.decode()
+    answer = admin.post(reverse("catalogue-load"), {"set": "paper"}, follow=True)
+    assert "50 added" in answer.content.decode()
     assert set(Event.objects.values_list("actor", flat=True)) == {accounts["admin"].pk, None}
     assert Contestant.objects.filter(slug="reference").exists()
 
@@ -156,16 +153,11 @@ def test_what_no_endpoint_can_be_is_refused_at_its_field(keeper: Client) -> None
         ("base_url", "http://169.254.169.254/v1", "no model is served from there"),
         ("base_url", "https://me:secret@x.example/v1", "Keys and passwords don&#x27;t belong"),
         ("key_variable", "DJANGO_SECRET_KEY", "may not be sent to an endpoint"),
-        ("key_variable", "OPENAI_API_KEY", "OPENAI_API_KEY is not bound to 127.0.0.1:9"),
         ("key_variable", "sk-abc", "The name of an environment variable is needed, not the key"),
         ("max_concurrency", "0", "greater than or equal to 1"),
-        ("requests_per_minute", "0", "greater than or equal to 1"),
     ):
         assert words in post(keeper, "endpoint-new", GIVEN | {field: value}), (field, value)
     assert not Endpoint.objects.exists()
-
-
-def test_a_key_goes_to_no_other_server(keeper: Client) -> None:
     post(keeper, "endpoint-new", GIVEN)
     row = Endpoint.objects.get()
     moved = GIVEN | {"base_url": "https://models.example.org/v1"}
@@ -267,28 +259,14 @@ def list_of(client: Client, name: str, query: str = "") -> str:
 
 def add_many() -> None:
     """So many of everything, and a row of each job."""
-    base = rows.add_scenario("street-000").base_scene
+    (street, *_), (who, *_) = rows.add_many_scenarios(MANY), rows.add_many_contestants(MANY)
     BaseScene.objects.update(slug="recorded")
-    Scenario.objects.bulk_create(
-        Scenario(
-            slug=f"street-{number:03}",
-            type=ScenarioType.JAYWALKER if number % 2 else ScenarioType.CONSTRUCTION_ZONE,
-            instruction=f"Place {number} cones.",
-            base_scene=base,
-        )
-        for number in range(1, MANY)
-    )
-    Contestant.objects.bulk_create(
-        Contestant(slug=f"who-{number:03}", name=f"Who {number:03}", kind="rule")
-        for number in range(MANY)
-    )
     jobs = GenerationJob.objects.bulk_create(
         GenerationJob(name=f"Job {number:03}", state="finished") for number in range(MANY)
     )
     Study.objects.bulk_create(
         Study(name=f"Study {number:03}", votes_per_expert=1, seed=1) for number in range(MANY)
     )
-    street, who = Scenario.objects.first(), Contestant.objects.first()
     Augmentation.objects.bulk_create(
         Augmentation(job=job, scenario=street, contestant=who, state="failed", reason="broke")
         for job in jobs

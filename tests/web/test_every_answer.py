@@ -17,7 +17,7 @@ from pytest_django import DjangoAssertNumQueries
 from arena.api.access import make_api_token
 from arena.config.faults import answer_broken
 from arena.config.middleware import FaultMiddleware
-from arena.models import Person, Snapshot
+from arena.models import Person, Snapshot, Study
 from arena.people.links import invite
 from arena.people.services import create_person
 from arena.results.queries.votes import Filters
@@ -32,7 +32,7 @@ from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest
 from tests import study_rows
 from tests.jobs import rows
-from tests.study_rows import a_study, vote
+from tests.study_rows import vote_all
 from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
@@ -167,11 +167,8 @@ def test_the_switch_is_kept_with_the_person_and_leads_back() -> None:
     assert "Nothing to do right now" in client.get("/", **GERMAN).content.decode()  # type: ignore[arg-type]
 
 
-def test_files_are_the_same_in_every_language(researcher: Client) -> None:
-    study = a_study()
-    for matchup in study.matchups.all():
-        vote(matchup)
-    rate(study=close_study(study=study), rounds=20)
+def test_files_are_the_same_in_every_language(researcher: Client, study: Study) -> None:
+    rate(study=vote_all(study), rounds=20)
     for form in ("csv", "json", "latex"):
         address = reverse("results-export", args=[study.code, "leaderboard", form])
         english, german = (
@@ -181,8 +178,7 @@ def test_files_are_the_same_in_every_language(researcher: Client) -> None:
         assert english
 
 
-def test_voting_is_german() -> None:
-    study = a_study()
+def test_voting_is_german(study: Study) -> None:
     client = signed_in(study.experts.get(username="eva"))
     for name in ("vote", "vote-skipped"):
         answer = client.get(reverse(name, args=[study.code]), **GERMAN)  # type: ignore[arg-type]
@@ -226,7 +222,10 @@ def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed()
     def use_demo(name: str) -> str:
         return admin.post(reverse("first-step", args=[name]), follow=True).content.decode()
 
-    offered = "Use the demo’s"
+    offered, bar = "Use the demo’s", admin.get(reverse("jobs")).content.decode()
+    assert "0 of 6 steps," in bar
+    first = reverse("endpoint-new")
+    assert f'<a href="{first}">next: say where language models answer</a>' in bar
     assert admin.get("/").content.decode().count(offered) == 6
     assert use_demo("contestants").count(offered) == 4, "with the stand-in that they ask"
     assert use_demo("scenarios").count(offered) == 3
@@ -234,36 +233,20 @@ def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed()
     assert "No job is finished yet" in use_demo("study")
     close_study(study=study_rows.a_study())
     assert offered not in admin.get("/").content.decode()
+    assert "next:" not in admin.get(reverse("jobs")).content.decode(), "nor does a bar elsewhere"
 
 
-def test_a_bar_says_what_comes_next_until_a_study_is_closed() -> None:
-    admin = signed_in(create_person(username="ada", password=None, role="admin"))
-
-    def shown() -> str:
-        return " ".join(admin.get(reverse("jobs")).content.decode().split())
-
-    first = reverse("endpoint-new")
-    assert "0 of 6 steps," in shown()
-    assert f'<a href="{first}">next: say where language models answer</a>' in shown()
-    close_study(study=study_rows.a_study())
-    assert "next:" not in shown()
-
-
-def test_the_theme_is_kept_with_the_person_and_leads_back() -> None:
+def test_the_theme_is_kept_with_the_person_and_leads_back_but_never_elsewhere() -> None:
     expert = people()["expert"]
     client = signed_in(expert)
+    for address in ("https://elsewhere.example/", "//elsewhere", "-1", "jobs"):
+        answer = client.post(reverse("theme"), {"theme": "pink", "next": address})
+        assert answer.headers["Location"] == "/", address
+    assert Person.objects.get(user=expert).preferences == {}
     answer = client.post(reverse("theme"), {"theme": "dark", "next": "/?here"})
     assert answer.headers["Location"] == "/?here"
     assert Person.objects.get(user=expert).preferences == {"theme": "dark"}
     assert 'data-theme="dark"' in home(expert)
-
-
-def test_a_made_up_theme_or_a_foreign_address_changes_nothing(accounts: dict[str, User]) -> None:
-    expert = signed_in(accounts["expert"])
-    for address in ("https://elsewhere.example/", "//elsewhere", "-1", "jobs"):
-        answer = expert.post(reverse("theme"), {"theme": "pink", "next": address})
-        assert answer.headers["Location"] == "/", address
-    assert Person.objects.get(user=accounts["expert"]).preferences == {}
 
 
 def test_a_voter_is_refused_in_the_language_of_the_request() -> None:
@@ -276,8 +259,7 @@ def test_a_voter_is_refused_in_the_language_of_the_request() -> None:
     assert str(english.value) == "A token works for 1, 7, 30, 90, 365 days, not 2."
 
 
-def test_nothing_that_is_stored_is_german() -> None:
-    study = study_rows.a_study()
+def test_nothing_that_is_stored_is_german(study: Study) -> None:
     job = rows.launch()
     with override("de"):
         capped = jobs.launch(

@@ -10,16 +10,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.templatetags.marks import usd
-from augment.models import (
-    Augmentation,
-    Contestant,
-    Endpoint,
-    EndpointModel,
-    GenerationJob,
-    Scenario,
-    Worker,
-)
-from augment.scene.entities import ScenarioType
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, GenerationJob, Worker
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.entering import AcceptRequest, accept_submission
@@ -193,24 +184,10 @@ Questions = Callable[[int], object]
 
 def large_job(*, scenarios: int, contestants: int, samples: int = 1) -> GenerationJob:
     """A job that is over, with a row for every cell."""
-    base = rows.add_scenario("street-000").base_scene
-    Scenario.objects.bulk_create(
-        Scenario(
-            slug=f"street-{number:03}",
-            type=ScenarioType.CONSTRUCTION_ZONE,
-            instruction=f"Place {number} cones.",
-            base_scene=base,
-        )
-        for number in range(1, scenarios)
-    )
-    Contestant.objects.bulk_create(
-        Contestant(slug=f"who-{number:02}", name=f"Who {number:02}", kind=Contestant.Kind.RULE)
-        for number in range(contestants)
-    )
+    where, who = rows.add_many_scenarios(scenarios), rows.add_many_contestants(contestants)
     job = GenerationJob.objects.create(
         name="Large", samples=samples, state=GenerationJob.State.FINISHED
     )
-    where, who = list(Scenario.objects.all()), list(Contestant.objects.all())
     Augmentation.objects.bulk_create(
         (
             Augmentation(

@@ -14,7 +14,6 @@ from arena.jobs.services import open_labelling
 from arena.models import FaultLabel, LabellingRound, Matchup, Study, Vote
 from arena.results.queries.judges import judge_preferences, list_judged_pairs, list_models
 from arena.results.services.ratings import rate_now
-from arena.studies.services.opening import close_study
 from augment import tasks
 from augment.fake_llm.server import running
 from augment.models import (
@@ -45,9 +44,9 @@ def study() -> Study:
     made = study_rows.a_study(votes_per_expert=6, scenarios=2)
     for number, row in enumerate(Augmentation.objects.order_by("pk")):
         study_rows.hang(row, store(png(number) + bytes(number)))
-    for matchup in made.matchups.all():
-        study_rows.vote(matchup, "left" if matchup.left_id > matchup.right_id else "right")
-    return close_study(study=made)
+    return study_rows.vote_all(
+        made, lambda pair: "left" if pair.left_id > pair.right_id else "right"
+    )
 
 
 @pytest.fixture

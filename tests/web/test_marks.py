@@ -85,13 +85,8 @@ def contrast(one: str, other: str) -> float:
 
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
-@pytest.mark.parametrize(("text", "ground"), PAIRS)
-def test_text_has_a_contrast_of_four_and_a_half(text: str, ground: str, theme: int) -> None:
+def test_text_has_a_contrast_of_four_and_a_half_and_borders_of_fields_of_three(theme: int) -> None:
     known = colours(theme)
-    assert contrast(known[text], known[ground]) >= 4.5
-
-
-@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
-def test_borders_of_fields_have_a_contrast_of_three(theme: int) -> None:
-    known = colours(theme)
+    faint = [pair for pair in PAIRS if contrast(*map(known.__getitem__, pair)) < 4.5]
+    assert faint == []
     assert contrast(known["line-strong"], known["surface"]) >= 3.0

@@ -127,13 +127,6 @@ def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, researcher: Client)
     assert researcher.get(address).status_code == 404
 
 
-def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, researcher: Client) -> None:
-    rate(study=study, rounds=10)
-    number = number_of(listed(researcher, study, mark="all"))
-    Snapshot.objects.update(last_vote=Vote.objects.latest("pk").pk - 1)
-    assert number_of(listed(researcher, study, mark="all")) == number - 1
-
-
 def test_an_open_study_keeps_its_votes_until_an_early_look(researcher: Client) -> None:
     study = mixed_study(close=False)
     rate(study=study, rounds=10, early=True)

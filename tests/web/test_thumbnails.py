@@ -58,15 +58,12 @@ def test_a_thumbnail_is_made_once(picture: bytes) -> None:
     assert shrink(name, 800) == ""
 
 
-def test_thumbnails_lie_in_the_bucket_with_the_pictures(picture: bytes, there: Bucket) -> None:
+def test_thumbnails_lie_in_a_bucket_whose_old_charts_are_found_by_one_request(
+    picture: bytes, there: Bucket, monkeypatch: pytest.MonkeyPatch
+) -> None:
     small = shrink(store(picture), 400)
     assert read(small) == shrink_png(picture, 400)
     assert f"arena/{small}" in there.names()
-
-
-def test_old_charts_of_a_bucket_are_found_by_one_request(
-    there: Bucket, monkeypatch: pytest.MonkeyPatch
-) -> None:
     asked: list[str] = []
     ask: Any = BaseClient._make_api_call
 
@@ -76,12 +73,11 @@ def test_old_charts_of_a_bucket_are_found_by_one_request(
 
     for number in range(3):
         compute_once("svg", bytes, number)
-    store(png())
     monkeypatch.setattr(BaseClient, "_make_api_call", note)
     delete_computed(before=timezone.now() - timedelta(days=1))
     delete_computed(before=timezone.now() + timedelta(days=1))
     assert asked == [*2 * ["ListObjects"], *3 * ["DeleteObject"]]
-    assert [name.split("/")[1] for name in there.names()] == ["bev"]
+    assert [name.split("/")[1] for name in there.names()] == ["bev", "thumbnails"]
 
 
 @pytest.mark.django_db

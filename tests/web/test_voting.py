@@ -49,10 +49,17 @@ from tests.study_rows import (
     picture,
     scenario,
 )
-from tests.web.ballots import following, page
-from tests.web.cast import World, names_of_contestants, people, png, signed_in, status, world
+from tests.web.cast import World, look, names_of_contestants, people, png, signed_in, world
 
 pytestmark = pytest.mark.django_db
+
+
+def page(here: World) -> str:
+    return ballot(here.study)
+
+
+def ballot(study: Study) -> str:
+    return reverse("vote", args=[study.code])
 
 
 def test_the_page_is_never_cached_and_offers_both_miss_where_the_study_asks_for_it() -> None:
@@ -101,7 +108,7 @@ def test_neither_page_nor_headers_tell_who_made_what() -> None:
 
 def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
     here = world()
-    shown = following(here)
+    shown = here.study.matchups.filter(expert=here.expert, votes=None).earliest("position")
     url = reverse("matchup-image", args=[shown.left_token])
     answer = signed_in(here.expert).get(url)
     assert b"".join(answer).startswith(b"\x89PNG")
@@ -112,7 +119,7 @@ def test_a_picture_goes_out_bare_and_to_its_expert_alone() -> None:
     other = study_rows.matchups_of(here.study, "finn")[0]
     theirs = reverse("matchup-image", args=[other.right_token])
     assert signed_in(here.expert).get(theirs).status_code == 404
-    assert status(people()["admin"], theirs) == 200
+    assert look(signed_in(people()["admin"]), theirs) == 200
     assert signed_in(here.expert).get(reverse("matchup-image", args=["x"])).status_code == 404
 
 
@@ -280,10 +287,6 @@ def a_replayed_study(**cast: object) -> Study:
     return open_study(name="Round 1", votes_per_expert=9, seed=7, allow_replay=True, **made)
 
 
-def ballot(study: Study) -> str:
-    return reverse("vote", args=[study.code])
-
-
 def loaded(shown: str) -> set[str]:
     return set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
 
@@ -309,7 +312,7 @@ def test_the_answer_says_nothing_of_where_it_comes_from() -> None:
     assert signed_in(User.objects.get(username="finn")).get(address).status_code == 404
 
 
-def opened(*, outside: int = 6, **options: object) -> Study:
+def opened(*, outside: int = 6) -> Study:
     """Six scenarios in the study and some outside of it, all with something to practise on."""
     cast = cast_of()
     for number in range(outside):
@@ -322,7 +325,7 @@ def opened(*, outside: int = 6, **options: object) -> Study:
     draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
     for number, row in enumerate(Augmentation.objects.all()):
         Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
-    study = open_study(**{"name": "Round 1", "votes_per_expert": 9, "seed": 7, **cast, **options})
+    study = open_study(name="Round 1", votes_per_expert=9, seed=7, **cast)
     accept(token=invite(study=study, expert=the_eva()).token)
     return study
 
@@ -333,10 +336,6 @@ def the_eva() -> User:
 
 def practice(study: Study) -> str:
     return reverse("vote-practice", args=[study.code])
-
-
-def pairs_page(study: Study) -> str:
-    return reverse("vote", args=[study.code])
 
 
 def answer(client: Client, study: Study, pair: PracticePair, *, well: bool) -> str:
@@ -350,7 +349,7 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
     study = opened()
     assert study.practice
     client = signed_in(the_eva())
-    assert client.get(pairs_page(study)).headers["Location"] == practice(study)
+    assert client.get(ballot(study)).headers["Location"] == practice(study)
     pairs = practice_pairs(study, the_eva())
     assert len(pairs) == 5
     for number, pair in enumerate(pairs, start=1):
@@ -364,7 +363,7 @@ def test_five_pairs_with_feedback_come_before_the_first_pair_and_none_is_a_vote(
         assert f"{good} carries out the instruction, {broken} does not." in told
     assert "Start voting" in told
     assert "Right." in answer(client, study, pairs[0], well=False), "the first answer stays"
-    assert client.get(pairs_page(study)).status_code == 200
+    assert client.get(ballot(study)).status_code == 200
     assert not Vote.objects.exists()
     assert voting_progress(study=study, expert=the_eva()).voted == 0
 
@@ -375,6 +374,10 @@ def test_only_who_came_by_a_link_practises_where_the_rules_say_so() -> None:
     assert [is_due(study, one) for one in (the_eva(), finn)] == [True, False]
     del study.rules["practice_for"]  # as studies that were opened before
     assert is_due(study, finn)
+    rules = {"name": "Round 2", "votes_per_expert": 9, "seed": 7, "experts": ["eva", "finn"]}
+    shown = {"contestants": ["ann", "bob", "cid"], "scenarios": [f"place-{n}" for n in range(6)]}
+    assert open_study(**rules, **shown).practice
+    assert not open_study(**rules | {"name": "Round 3"}, **shown, practice=False).practice
 
 
 def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_too_few() -> None:
@@ -386,7 +389,3 @@ def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_t
 
 def test_a_study_with_nothing_to_practise_on_has_no_practice() -> None:
     assert not open_study(name="Round 0", votes_per_expert=9, **cast_of()).practice
-
-
-def test_a_study_has_no_practice_where_that_is_said() -> None:
-    assert not opened(practice=False).practice
