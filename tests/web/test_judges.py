@@ -23,6 +23,7 @@ from augment.models import (
     EndpointModel,
     GenerationJob,
     JudgeRun,
+    PairJudgement,
     Scenario,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
@@ -173,6 +174,22 @@ def test_preferences_come_with_and_without_the_judges_own_family(
     assert "ann" not in {codes[code].contestant.slug for pair in without for code in pair}
     shown = page(signed_in(people()["researcher"]), study)
     assert "without its own family: Ann" in shown
+
+
+def test_a_run_that_was_cut_short_hides_no_answer_of_an_earlier_one(
+    study: Study, endpoint: Endpoint
+) -> None:
+    call_command("judge_study", study.name, endpoint="stand-in", model="fake-good")
+    old = PairJudgement.objects.earliest("pk")
+    short = JudgeRun.objects.create(endpoint=endpoint, model="fake-good", state="cancelled")
+    same = {"left_image": "a.png", "right_image": "b.png", "first": "A", "second": "A"}
+    row = PairJudgement.objects.create(
+        run=short, left=old.right, right=old.left, state=PairJudgement.State.DONE, **same
+    )
+    study.judges.add(short)
+    ((_, found),) = judge_preferences(study, "instruction").items()
+    assert len(found) == 6
+    assert found[str(row.left.code), str(row.right.code)] == 0
 
 
 def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:

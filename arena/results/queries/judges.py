@@ -93,17 +93,21 @@ def judge_lines(study: Study) -> list[JudgeLine]:
 
 
 def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
-    """Return each judge's preferences by its name; of equal runs the newest that has answers.
+    """Return each judge's preferences by its name; of a pair the newest answer.
 
+    A run that was cut short hides no answer of an earlier one.
     Where contestants ask a model of the judge's own family, it comes once more without them.
     """
     preferences: dict[str, Preferences] = {}
+    answered: dict[str, dict[frozenset[int], PairJudgement]] = {}
     runs = study.judges.filter(question=question).select_related("endpoint")
     for run in runs.order_by("-pk"):
-        name, rows = judge_name(run), list_answered_pairs(run)
-        if name in preferences or not rows:
+        by_pair = answered.setdefault(judge_name(run), {})
+        for row in list_answered_pairs(run):
+            by_pair.setdefault(frozenset((row.left_id, row.right_id)), row)
+        if not by_pair:
             continue
-        own = set(_own_family(study, run))
+        name, rows, own = judge_name(run), [*by_pair.values()], {*_own_family(study, run)}
         preferences[name] = _preferences(rows)
         strangers = [
             row
