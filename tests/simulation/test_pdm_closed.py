@@ -31,8 +31,8 @@ from augment.simulation.pdm_closed import (
 from augment.simulation.planners import planner_named
 from augment.simulation.planning import PLANNER_IDM, Idm, Plan, Situation, foresee
 from augment.simulation.road import Road
-from augment.simulation.states import FloatArray, Objects, start_state, to_objects
-from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting
+from augment.simulation.states import FloatArray, Objects, join_objects, start_state, to_objects
+from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers
 from tests.fixtures.shelf import entry, shown_scene
 from tests.house.source import ROOT
 from tests.scenes import cone, pedestrian, vehicle
@@ -225,6 +225,19 @@ def test_a_free_road_pulls_with_all_that_is_left() -> None:
     for speed, pull in [(0.0, 1.0), (5.0, 1.0 - 0.5**4), (10.0, 0.0)]:
         found = TRAFFIC_IDM.clip(np.array(speed), np.array(10.0), free, np.array(0.0))
         assert found == pytest.approx(pull)
+
+
+def test_traffic_keeps_the_steady_gap_and_its_sweep() -> None:
+    # 4.6.5: the gap is measured from the sweep's end, so it grows by the swept way. The follower's
+    # limit is 10 m/s, and it begins where it would settle behind a leader that holds 5 m/s.
+    drivers = LaneDrivers([vehicle("Agent2", 0.0, 0.0, speed_mps=5.0)], Road(street()))
+    leader_m = wanted_m = 4.8 + steady_gap_m(TRAFFIC_IDM, 5.0) + 1.5 * 5.0
+    for _ in range(40):
+        leader = to_objects([vehicle("Agent3", leader_m, 0.0, speed_mps=5.0)])
+        drivers.step(np.zeros(5), join_objects([drivers.objects(), leader]))
+        leader_m += 0.5
+    gap_m = leader_m - drivers.objects().boxes[0, 0]
+    assert gap_m == pytest.approx(wanted_m, abs=0.1)
 
 
 SLUG = "nudge-mill-junction"
