@@ -36,16 +36,13 @@ def test_bins_are_of_the_straight_line_up_to_72_m(x_m: float, y_m: float, number
     assert code_of(x_m, y_m).distance_bin == number
 
 
-@pytest.mark.parametrize(
-    ("degrees", "direction"),
-    [
+def test_directions_are_to_45_degrees() -> None:
+    for degrees, direction in (
         *((44, Direction.SAME), (-44, Direction.SAME), (46, Direction.ACROSS_TO_LEFT)),
         *((-134, Direction.ACROSS_TO_RIGHT), (136, Direction.OPPOSITE)),
         (-179, Direction.OPPOSITE),
-    ],
-)
-def test_directions_are_to_45_degrees(degrees: float, direction: Direction) -> None:
-    assert code_of(10.0, 0.0, math.radians(degrees)).direction is direction
+    ):
+        assert code_of(10.0, 0.0, math.radians(degrees)).direction is direction
 
 
 @given(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0), st.floats(-3.1, 3.1), st.floats(0.0, 19.0))

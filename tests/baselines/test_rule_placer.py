@@ -100,9 +100,8 @@ def test_the_papers_offset_is_drawn_from_its_range_by_the_seed() -> None:
     assert all(added(scene(), PAPER, seed=seed)[0].x_m == 21.4 for seed in range(5))
 
 
-@pytest.mark.parametrize(
-    ("lateral", "y_m"),
-    [
+def test_sides_are_the_egos_and_the_kerb_is_that_of_the_map() -> None:
+    for lateral, y_m in (
         (towards(LEFT_EDGE, how=Nearness.SLIGHTLY), 0.75),
         (towards(RIGHT_EDGE, how=Nearness.SLIGHTLY), -0.75),
         (towards(RIGHT_EDGE), -0.75),
@@ -111,11 +110,9 @@ def test_the_papers_offset_is_drawn_from_its_range_by_the_seed() -> None:
         (towards(LateralTarget.KERB, how=Nearness.AT_EDGE), -0.65),
         (towards(LateralTarget.CENTRE_LINE, how=Nearness.SLIGHTLY), 0.75),
         (towards(LateralTarget.KERB, how=Nearness.HALF_OUT), -1.75),
-    ],
-)
-def test_sides_are_the_egos_and_the_kerb_is_that_of_the_map(lateral: Lateral, y_m: float) -> None:
-    (car,) = added(scene(), parked(lateral=lateral))
-    assert (car.x_m, car.y_m) == (21.4, y_m)
+    ):
+        (car,) = added(scene(), parked(lateral=lateral))
+        assert (car.x_m, car.y_m) == (21.4, y_m)
 
 
 def test_where_people_drive_on_the_left_the_kerb_is_on_the_left() -> None:
@@ -147,9 +144,8 @@ def on_shoulder(target: LateralTarget) -> Lateral:
     return Lateral(target=target, nearness=Nearness.HALF_OUT, on_shoulder=True)
 
 
-@pytest.mark.parametrize(
-    ("shown", "intent", "reason"),
-    [
+def test_what_has_no_room_on_the_map_is_refused() -> None:
+    for shown, intent, reason in (
         (scene(), parked(160.0), "The lanes end 100 m ahead of the ego"),
         (scene(), parked(-60.0), "The lanes end 50 m behind the ego"),
         (scene(), parked(lane=LaneChoice.LEFT), "no lane on the left"),
@@ -160,12 +156,10 @@ def on_shoulder(target: LateralTarget) -> Lateral:
         (scene(lanes=()), parked(), "stands on no lane"),
         (scene(), cones(90.0, 30, Shape.TAPER), "The lanes end"),
         (scene(), cones(20.0, 5, Shape.TAPER, spacing=metres(0.2)), "stand in each other"),
-    ],
-)
-def test_what_has_no_room_on_the_map_is_refused(shown: Scene, intent: Intent, reason: str) -> None:
-    if shown.lanes == ():
-        shown = replace(shown, ego=replace(shown.ego, lane_id=None))
-    assert reason in refusal(shown, intent)
+    ):
+        if shown.lanes == ():
+            shown = replace(shown, ego=replace(shown.ego, lane_id=None))
+        assert reason in refusal(shown, intent)
 
 
 def opened(intent: Intent, **parts: object) -> Intent:
@@ -173,19 +167,16 @@ def opened(intent: Intent, **parts: object) -> Intent:
     return Intent(requests=(replace(request, **parts),))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("intent", "what"),
-    [
+def test_what_an_intent_leaves_open_is_never_guessed() -> None:
+    for intent, what in (
         (opened(parked(), spot=Spot(lane=LaneChoice.OWN)), "the distance"),
         (opened(parked(), speed_mps=None), "whether they stand or how fast they drive"),
         (opened(parked(), count=None), "the count"),
         (walk(18.0, None), "the side that they come from"),
         (opened(cones(20.0, 5, Shape.RING), shape=None), "the shape"),
         (opened(crash(20.0, 2), count=None), "the count"),
-    ],
-)
-def test_what_an_intent_leaves_open_is_never_guessed(intent: Intent, what: str) -> None:
-    assert f"leaves open {what}" in refusal(scene(), intent)
+    ):
+        assert f"leaves open {what}" in refusal(scene(), intent)
 
 
 def test_a_distance_from_another_object_runs_from_where_that_one_is() -> None:

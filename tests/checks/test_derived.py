@@ -260,19 +260,16 @@ def test_what_stands_on_a_branch_is_counted_along_the_way_to_it() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("walk_to_m", "lead"),
-    [
+def test_only_who_walks_crosses() -> None:
+    for walk_to_m, lead in (
         ((12.0, -4.0), "Let somebody cross the road"),
         ((12.0, 9.0), "Change the scene"),  # away from the road
         (None, "Change the scene"),
-    ],
-)
-def test_only_who_walks_crosses(walk_to_m: tuple[float, float] | None, lead: str) -> None:
-    person = vehicle("Added1", 12.0, 4.0, type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)
-    change = Modification(added=(person,))
-    sentence, _ = describe_change(ScenarioType.JAYWALKER, change, scene())
-    assert sentence.startswith(lead)
+    ):
+        person = vehicle("Added1", 12.0, 4.0, type=AgentType.PEDESTRIAN, walk_to_m=walk_to_m)
+        change = Modification(added=(person,))
+        sentence, _ = describe_change(ScenarioType.JAYWALKER, change, scene())
+        assert sentence.startswith(lead)
 
 
 def test_a_drawing_without_a_lane_for_the_ego_has_words_alone() -> None:

@@ -31,9 +31,9 @@ def faults(intent: wish.Intent, modification: Modification) -> list[str]:
 PARKED_LEFT = wish.Pick(kind=wish.Sight.PARKED, side=wish.Side.LEFT)
 
 
-@pytest.mark.parametrize(
-    ("pick", "along_m"),
-    [
+def test_the_nearest_that_fits_is_the_first() -> None:
+    lanes = lanes_of("terrace-row")
+    for pick, along_m in (
         (PARKED_LEFT, [1.0]),
         (replace(PARKED_LEFT, ordinal=3), [14.2]),
         (replace(PARKED_LEFT, ordinal=5), []),
@@ -44,12 +44,9 @@ PARKED_LEFT = wish.Pick(kind=wish.Sight.PARKED, side=wish.Side.LEFT)
         (wish.Pick(kind=wish.Sight.BICYCLE, lane=wish.LaneChoice.ONCOMING), [72.0]),
         (wish.Pick(kind=wish.Sight.BICYCLE, lane=wish.LaneChoice.OWN), []),
         (wish.Pick(kind=wish.Sight.BUS), []),
-    ],
-)
-def test_the_nearest_that_fits_is_the_first(pick: wish.Pick, along_m: list[float]) -> None:
-    lanes = lanes_of("terrace-row")
-    found = [lanes.route.locate_agent(one).ahead_m for one in find_picked(lanes, pick)]
-    assert found == pytest.approx(along_m, abs=0.05)
+    ):
+        found = [lanes.route.locate_agent(one).ahead_m for one in find_picked(lanes, pick)]
+        assert found == pytest.approx(along_m, abs=0.05)
 
 
 def test_a_junction_begins_where_the_ego_s_lane_ends() -> None:

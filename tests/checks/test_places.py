@@ -37,9 +37,8 @@ def test_an_ego_off_every_lane_measures_no_distance() -> None:
     assert not of_kind(found_in(scene(ego=lost), vehicle("Agent2", 30, 0)), FindingKind.LANE)
 
 
-@pytest.mark.parametrize(
-    ("y_m", "name", "severity"),
-    [
+def test_the_lane_an_agent_names() -> None:
+    for y_m, name, severity in (
         (0.0, "Lane1", None),
         (0.0, None, None),
         (0.0, "Lane9", Severity.WRONG),
@@ -47,12 +46,10 @@ def test_an_ego_off_every_lane_measures_no_distance() -> None:
         (1.2, "Lane2", Severity.DOUBTFUL),
         (2.2, "Lane1", None),
         (2.3, "Lane1", Severity.DOUBTFUL),
-    ],
-)
-def test_the_lane_an_agent_names(y_m: float, name: str | None, severity: Severity | None) -> None:
-    car = vehicle("Agent2", 30.0, y_m, lane_id=name)
-    found = of_kind(found_in(scene(), car), FindingKind.LANE_NAMED)
-    assert [one.severity for one in found] == ([severity] if severity else [])
+    ):
+        car = vehicle("Agent2", 30.0, y_m, lane_id=name)
+        found = of_kind(found_in(scene(), car), FindingKind.LANE_NAMED)
+        assert [one.severity for one in found] == ([severity] if severity else [])
 
 
 def test_a_map_without_lanes_has_no_facts_about_lanes() -> None:
@@ -60,19 +57,16 @@ def test_a_map_without_lanes_has_no_facts_about_lanes() -> None:
     assert found == ()
 
 
-@pytest.mark.parametrize(
-    ("turn_deg", "speed_mps", "severity"),
-    [
+def test_the_turn_against_the_lane() -> None:
+    for turn_deg, speed_mps, severity in (
         *((0.0, 8.0, Severity.FACT), (-29.0, 8.0, Severity.FACT), (31.0, 0.0, Severity.DOUBTFUL)),
         *((-100.0, 8.0, Severity.DOUBTFUL), (180.0, 0.0, Severity.DOUBTFUL)),
         (180.0, 8.0, Severity.WRONG),
-    ],
-)
-def test_the_turn_against_the_lane(turn_deg: float, speed_mps: float, severity: Severity) -> None:
-    car = vehicle("Agent2", 30, 0, math.radians(turn_deg), speed_mps=speed_mps)
-    (heading,) = of_kind(found_in(scene(), car), FindingKind.HEADING)
-    assert heading.severity is severity
-    assert abs(heading.measured["turn_deg"]) == pytest.approx(abs(turn_deg))
+    ):
+        car = vehicle("Agent2", 30, 0, math.radians(turn_deg), speed_mps=speed_mps)
+        (heading,) = of_kind(found_in(scene(), car), FindingKind.HEADING)
+        assert heading.severity is severity
+        assert abs(heading.measured["turn_deg"]) == pytest.approx(abs(turn_deg))
 
 
 def test_a_heading_is_read_against_the_bend_and_not_the_ego() -> None:
@@ -103,22 +97,19 @@ def test_what_is_not_steered_has_no_heading_against_a_lane() -> None:
     assert not of_kind(found_in(scene(), worker), FindingKind.HEADING)
 
 
-@pytest.mark.parametrize(
-    ("turned_rad", "walk_m", "severity"),
-    [
+def test_a_pedestrian_faces_its_walk() -> None:
+    for turned_rad, walk_m, severity in (
         (0.3, 10.0, Severity.FACT),
         (-1.0, 10.0, Severity.DOUBTFUL),
         (math.pi, 10.0, Severity.WRONG),
         (math.pi, 1.0, Severity.FACT),  # a worker's single step
         (math.pi, 0.0, Severity.FACT),
-    ],
-)
-def test_a_pedestrian_faces_its_walk(turned_rad: float, walk_m: float, severity: Severity) -> None:
-    walker = pedestrian("Agent2", 20.0, -3.0, (20.0, walk_m - 3.0))
-    turned = replace(walker, heading_rad=math.pi / 2.0 + turned_rad)
-    (heading,) = of_kind(found_in(scene(), turned), FindingKind.WALK_HEADING)
-    assert heading.severity is severity
-    assert heading.measured["walk_m"] == pytest.approx(walk_m)
+    ):
+        walker = pedestrian("Agent2", 20.0, -3.0, (20.0, walk_m - 3.0))
+        turned = replace(walker, heading_rad=math.pi / 2.0 + turned_rad)
+        (heading,) = of_kind(found_in(scene(), turned), FindingKind.WALK_HEADING)
+        assert heading.severity is severity
+        assert heading.measured["walk_m"] == pytest.approx(walk_m)
 
 
 def test_bicycles_stand_at_any_angle() -> None:

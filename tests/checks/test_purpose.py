@@ -1,7 +1,6 @@
 """Purposes measured in small worlds: the numbers in the comments are worked out by hand."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,9 +27,8 @@ WALKER = pedestrian("Walker", 30.0, 1.5)
 """(0.791 + 2.297) / 2 = 1.544 m: just in the ego's way. Its corner is at (30.45, 1.1045)."""
 
 
-@pytest.mark.parametrize(
-    ("added", "seen_m"),
-    [
+def test_sight() -> None:
+    for added, seen_m in (
         # The line from (x, 0) to the corner is above 0.2 m at 22.4 m up to x = 20.62 m; at 8 m/s
         # the ego is past that after 2.6 s, at 20.8 m, hypot(9.2, 1.5) m away.
         ((SCREEN, WALKER), {"Walker": 9.3215}),
@@ -40,15 +38,12 @@ WALKER = pedestrian("Walker", 30.0, 1.5)
         ((cone("Cone", 29.0, 1.2), WALKER), {}),  # nobody hides behind a cone
         # Nobody stands there for 15 s, or 120 m: the ego sees nothing before it has passed.
         ((replace(SCREEN, x_m=140.0), replace(WALKER, x_m=150.0)), {}),
-    ],
-)
-def test_sight(added: Sequence[TrafficAgent], seen_m: dict[str, float]) -> None:
-    assert measure_sight(changed(*added)) == pytest.approx(seen_m, abs=1e-3)
+    ):
+        assert measure_sight(changed(*added)) == pytest.approx(seen_m, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("added", "passage_m"),
-    [
+def test_passage() -> None:
+    for added, passage_m in (
         ((), 7.0),  # two lanes of 3.5 m
         ((vehicle("A", 30.0, 0.0),), 4.25),  # 5.25 - 1
         ((vehicle("A", 30.0, 0.0), vehicle("B", 30.0, 3.5)), 1.5),  # 2.5 - 1
@@ -59,10 +54,8 @@ def test_sight(added: Sequence[TrafficAgent], seen_m: dict[str, float]) -> None:
         ((cone("A", 30.0, 1.0), cone("B", 30.0, 3.0)), 2.5),  # 0.75 + 1.75
         ((vehicle("A", 30.0, 0.0, speed_mps=5.0),), 7.0),  # it drives
         ((vehicle("A", 30.0, 1.75, width_m=7.0),), 0.0),
-    ],
-)
-def test_passage(added: Sequence[TrafficAgent], passage_m: float) -> None:
-    assert measure_passage(changed(*added)) == pytest.approx(passage_m, abs=0.02)
+    ):
+        assert measure_passage(changed(*added)) == pytest.approx(passage_m, abs=0.02)
 
 
 def test_off_the_map_nothing_is_measured() -> None:

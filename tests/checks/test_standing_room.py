@@ -32,20 +32,17 @@ def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
     assert Surface(areas=(flat,)).is_empty
 
 
-@pytest.mark.parametrize(
-    ("gap_m", "severity"),
-    [
+def test_two_stopped_cars_may_touch() -> None:
+    for gap_m, severity in (
         *((0.1, None), (-0.015, None), (-0.24, Severity.FACT)),
         *((-0.72, Severity.DOUBTFUL), (-2.0, Severity.WRONG)),
-    ],
-)
-def test_two_stopped_cars_may_touch(gap_m: float, severity: Severity | None) -> None:
-    cars = vehicle("Agent2", 30.0, 0.0), vehicle("Agent3", 34.8 + gap_m, 0.0)
-    found = of_kind(found_in(scene(), *cars), FindingKind.OVERLAP)
-    assert [one.severity for one in found] == ([severity] if severity else [])
-    if found:
-        assert found[0].agents == ("Agent2", "Agent3")
-        assert found[0].measured["share_of_smaller"] == pytest.approx(-gap_m / 4.8)
+    ):
+        cars = vehicle("Agent2", 30.0, 0.0), vehicle("Agent3", 34.8 + gap_m, 0.0)
+        found = of_kind(found_in(scene(), *cars), FindingKind.OVERLAP)
+        assert [one.severity for one in found] == ([severity] if severity else [])
+        if found:
+            assert found[0].agents == ("Agent2", "Agent3")
+            assert found[0].measured["share_of_smaller"] == pytest.approx(-gap_m / 4.8)
 
 
 def test_a_moving_car_touches_nobody() -> None:
@@ -76,36 +73,30 @@ def test_what_was_recorded_is_in_the_way_too() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("agent", "severity", "words"),
-    [
+def test_sizes() -> None:
+    for agent, severity, words in (
         (BUS, None, ""),
         (replace(BUS, length_m=2.079, width_m=7.456), Severity.WRONG, "wider than long"),
         (replace(BUS, length_m=24.0), Severity.DOUBTFUL, "unusual for a bus"),
         (pedestrian("Agent2", 30, 0, length_m=4.8), Severity.WRONG, "for a pedestrian"),
         (cone("Agent2", 30, 0, width_m=1.2), Severity.DOUBTFUL, "for a traffic cone"),
-    ],
-)
-def test_sizes(agent: TrafficAgent, severity: Severity | None, words: str) -> None:
-    found = of_kind(found_in(scene(), agent), FindingKind.SIZE)
-    assert [one.severity for one in found] == ([severity] if severity else [])
-    assert all(words in one.sentence() for one in found)
+    ):
+        found = of_kind(found_in(scene(), agent), FindingKind.SIZE)
+        assert [one.severity for one in found] == ([severity] if severity else [])
+        assert all(words in one.sentence() for one in found)
 
 
-@pytest.mark.parametrize(
-    ("agent", "speed_mps", "severity"),
-    [
+def test_speeds() -> None:
+    for agent, speed_mps, severity in (
         (BUS, 13.0, None),
         (BUS, 20.0, None),  # the limit is 13.9 m/s
         (BUS, 22.0, Severity.DOUBTFUL),
         (BUS, 60.0, Severity.WRONG),
         (pedestrian("Agent2", 30, 0), 5.0, Severity.DOUBTFUL),
         (cone("Agent2", 30, 0), 1.0, Severity.WRONG),
-    ],
-)
-def test_speeds(agent: TrafficAgent, speed_mps: float, severity: Severity | None) -> None:
-    found = of_kind(found_in(scene(), replace(agent, speed_mps=speed_mps)), FindingKind.SPEED)
-    assert [one.severity for one in found] == ([severity] if severity else [])
+    ):
+        found = of_kind(found_in(scene(), replace(agent, speed_mps=speed_mps)), FindingKind.SPEED)
+        assert [one.severity for one in found] == ([severity] if severity else [])
 
 
 def test_nothing_is_held_against_a_well_parked_car() -> None:
@@ -163,9 +154,8 @@ WALKER = pedestrian("Agent2", 30.0, -4.0, (30.0, 6.0))
 PARKED = vehicle("Agent3", 31.0, -1.0)
 
 
-@pytest.mark.parametrize(
-    ("other", "inside_m"),
-    [
+def test_no_walk_leads_through_what_stands() -> None:
+    for other, inside_m in (
         (PARKED, 2.0),
         (vehicle("Agent3", 32.3, -1.0), 2.0),
         (vehicle("Agent3", 32.5, -1.0), None),  # he walks past its bumper
@@ -178,15 +168,13 @@ PARKED = vehicle("Agent3", 31.0, -1.0)
         (pedestrian("Agent3", 30.0, 2.0), None),
         (vehicle("Agent3", 30.0, 8.0), None),  # beyond where he stops
         (vehicle("Agent3", 30.0, -6.0), None),  # behind him
-    ],
-)
-def test_no_walk_leads_through_what_stands(other: TrafficAgent, inside_m: float | None) -> None:
-    found = of_kind(found_in(scene(agents=(other,)), WALKER), FindingKind.WALK_BLOCKED)
-    assert [one.severity for one in found] == [Severity.DOUBTFUL] * (inside_m is not None)
-    for one in found:
-        assert one.agents == ("Agent2", "Agent3")
-        assert one.measured["inside_m"] == pytest.approx(inside_m, abs=0.001)
-        assert one.sentence() == f"The walk of Agent2 leads {inside_m:.1f} m through Agent3."
+    ):
+        found = of_kind(found_in(scene(agents=(other,)), WALKER), FindingKind.WALK_BLOCKED)
+        assert [one.severity for one in found] == [Severity.DOUBTFUL] * (inside_m is not None)
+        for one in found:
+            assert one.agents == ("Agent2", "Agent3")
+            assert one.measured["inside_m"] == pytest.approx(inside_m, abs=0.001)
+            assert one.sentence() == f"The walk of Agent2 leads {inside_m:.1f} m through Agent3."
 
 
 def test_a_blocked_walk_is_a_fault_of_logic_unless_it_follows_from_a_heading() -> None:

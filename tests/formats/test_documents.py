@@ -23,9 +23,9 @@ from tests.fixtures.shelf import whole_scene
 from tests.formats.interplan_files import entries_of
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
+def test_broken_json_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "scene.json"
+    for text, sentence in (
         (b"", "is not JSON"),
         (b"\xff\xfe\x00", "is not JSON"),
         (b'{"a": 1, "b": 2, "a": 3}', "named twice in one object: 'a'"),
@@ -33,13 +33,10 @@ from tests.formats.interplan_files import entries_of
         (b"[" * 100_000, "is nested too deeply"),
         (b'{"a": ' + b"9" * 5000 + b"}", "is not JSON"),
         (b'{"a": "\\u0000"}', "NUL"),
-    ],
-)
-def test_broken_json_is_named(tmp_path: Path, text: bytes, sentence: str) -> None:
-    file = tmp_path / "scene.json"
-    file.write_bytes(text)
-    with pytest.raises(InvalidDocument, match=rf"scene\.json: .*{sentence}"):
-        read_json(file, what="scene")
+    ):
+        file.write_bytes(text)
+        with pytest.raises(InvalidDocument, match=rf"scene\.json: .*{sentence}"):
+            read_json(file, what="scene")
 
 
 def test_many_doubled_names_are_found_in_one_pass(tmp_path: Path) -> None:
@@ -132,17 +129,14 @@ def test_no_text_breaks_the_reader(text: str) -> None:
         return
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
+def test_plain_values_are_read_and_nothing_is_made_a_date() -> None:
+    for text, value in (
         ("a: 2020-01-01", {"a": "2020-01-01"}),
         ("a: {<<: 1}", {"a": {"<<": 1}}),
         ("a: 1.5e-3", {"a": 0.0015}),
         ("a: [1, -2.5, null, true, text]", {"a": [1, -2.5, None, True, "text"]}),
-    ],
-)
-def test_plain_values_are_read_and_nothing_is_made_a_date(text: str, value: object) -> None:
-    assert read_yaml(text, what="file") == value
+    ):
+        assert read_yaml(text, what="file") == value
 
 
 def test_depth_has_a_last_value_that_is_read() -> None:

@@ -81,9 +81,8 @@ def test_one_that_is_no_vehicle_costs_no_other(odd: object) -> None:
     assert "left out: vehicles (1); first vehicles[1]" in notes[1]
 
 
-@pytest.mark.parametrize(
-    ("document", "reason"),
-    [
+def test_what_is_no_generated_scene_is_refused() -> None:
+    for document, reason in (
         ({}, "expected LCTGen's `agent` or `tracks`"),
         ([], "expected LCTGen's `agent` or `tracks`"),
         ({"agent": [[1.0, 2.0]]}, "the ego, .* needs 7 numbers a row"),
@@ -92,11 +91,9 @@ def test_one_that_is_no_vehicle_costs_no_other(odd: object) -> None:
         ({"tracks": {0: {"state": STATE[:0]}}}, "is the ego, and is not there at t0"),
         ({"tracks": {0: {}}}, r"is the ego, .*vehicles\[0\]\.state: needs an array"),
         ({"tracks": {0: "car"}}, r"is the ego, .*vehicles\[0\]: needs an array"),
-    ],
-)
-def test_what_is_no_generated_scene_is_refused(document: object, reason: str) -> None:
-    with pytest.raises(InvalidDocument, match=reason):
-        read_vehicles(document)
+    ):
+        with pytest.raises(InvalidDocument, match=reason):
+            read_vehicles(document)
 
 
 def test_arrays_of_objects_are_not_read(tmp_path: Path) -> None:

@@ -108,9 +108,8 @@ def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
     assert any("signal 206" in note for note in reading.notes)
 
 
-@pytest.mark.parametrize(
-    ("parts", "says"),
-    [
+def test_a_construct_of_a_lane_is_read(tmp_path: Path) -> None:
+    for parts, says in (
         ({"type": '<type s="0"><speed max="50" unit="km/h"/></type>'}, "speed_limit_mps=13.889"),
         ({"type": '<type s="0"><speed max="30" unit="mph"/></type>'}, "speed_limit_mps=13.411"),
         ({"width": f'{WIDTH}<speed sOffset="0" max="7" unit="m/s"/>'}, "speed_limit_mps=7.0"),
@@ -127,28 +126,23 @@ def test_a_light_before_a_junction_governs_its_ways(tmp_path: Path) -> None:
         ({"offset": '<laneOffset s="80" a="0" b="0" c="0.01" d="0"/>'}, "y_m=-1.75"),
         ({"shape": '<poly3 a="0" b="0" c="0.001" d="0"/>'}, "y_m=0.7"),
         ({"more": 'rule="LHT"'}, "heading_rad=3.14"),
-    ],
-)
-def test_a_construct_of_a_lane_is_read(parts: dict[str, str], says: str, tmp_path: Path) -> None:
-    reading = read_text(tmp_path, by_hand(**parts))
-    assert says in f"{reading.scene.lanes[0]}{reading.scene.origin}"
-    assert not any("offset was left out" in note for note in reading.notes)
+    ):
+        reading = read_text(tmp_path, by_hand(**parts))
+        assert says in f"{reading.scene.lanes[0]}{reading.scene.origin}"
+        assert not any("offset was left out" in note for note in reading.notes)
 
 
-@pytest.mark.parametrize(
-    ("kind", "area"),
-    [
+def test_a_lane_that_nobody_drives_is_an_area(tmp_path: Path) -> None:
+    for kind, area in (
         *(("sidewalk", AreaKind.WALKWAY), ("shoulder", AreaKind.DRIVABLE)),
         ("parking", AreaKind.CARPARK),
-    ],
-)
-def test_a_lane_that_nobody_drives_is_an_area(kind: str, area: AreaKind, tmp_path: Path) -> None:
-    outer = f'<lane id="-2" type="{kind}">{WIDTH}</lane>'
-    (only,) = read_text(tmp_path, by_hand(outer=outer)).scene.areas
-    assert only.kind is area
-    # From 50 m behind the ego to 50 m ahead, right of its lane, whose middle it is on.
-    low, high = np.min(only.boundary_m, axis=0), np.max(only.boundary_m, axis=0)
-    assert [*low, *high] == pytest.approx([-50.0, -5.25, 50.0, -1.75], abs=1e-3)
+    ):
+        outer = f'<lane id="-2" type="{kind}">{WIDTH}</lane>'
+        (only,) = read_text(tmp_path, by_hand(outer=outer)).scene.areas
+        assert only.kind is area
+        # From 50 m behind the ego to 50 m ahead, right of its lane, whose middle it is on.
+        low, high = np.min(only.boundary_m, axis=0), np.max(only.boundary_m, axis=0)
+        assert [*low, *high] == pytest.approx([-50.0, -5.25, 50.0, -1.75], abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -227,9 +221,8 @@ def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: P
     assert any(note in said for said in read_text(tmp_path, by_hand(**parts)).notes)
 
 
-@pytest.mark.parametrize(
-    ("text", "item", "says"),
-    [
+def test_a_fault_names_its_place(tmp_path: Path) -> None:
+    for text, item, says in (
         (by_hand(), "@1,-2,5", "road 1.lane: unknown '-2'; known: 1, -1"),
         (by_hand(), "@2,-1,5", "road: unknown '2'; known: 1"),
         (by_hand(), "@1,-1,500", "road 1.s: expected a finite number from -0.01 to 100.01"),
@@ -243,11 +236,9 @@ def test_what_is_left_out_is_noted(parts: dict[str, str], note: str, tmp_path: P
         (by_hand().replace('Major="1"', 'Major="2"'), None, "version '2.7' is not read"),
         ("<OpenDRIVE/>", None, "version ''"),
         ("<!DOCTYPE a><OpenDRIVE/>", None, "declares a document type"),
-    ],
-)
-def test_a_fault_names_its_place(text: str, item: str | None, says: str, tmp_path: Path) -> None:
-    with pytest.raises(InvalidDocument, match=re.escape(says)):
-        read_text(tmp_path, text, item)
+    ):
+        with pytest.raises(InvalidDocument, match=re.escape(says)):
+            read_text(tmp_path, text, item)
 
 
 def test_left_hand_traffic_is_that_of_the_rule(tmp_path: Path) -> None:

@@ -47,33 +47,27 @@ from tests.formats.test_openscenario_writer import scene_of_motions
 from tests.scenes import vehicle
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
+def test_an_expression_has_the_value_of_the_standard() -> None:
+    for text, value in (
         *(("plain", "plain"), ("$v", "7.5"), ("${$v * 2 + 1}", "16"), ("${-$v % 2}", "-1.5")),
         ("${round(pow($v, 2)) + max(1, 2)}", "58"),
         *(("${$on and $v > 7}", "true"), ("${not $on}", "false")),
         *(("${sqrt(16) / 8}", "0.5"), ("${round(2.5) + round(-0.5)}", "2")),
-    ],
-)
-def test_an_expression_has_the_value_of_the_standard(text: str, value: str) -> None:
-    assert resolve_text(text, {"v": "7.5", "on": "true"}, "here") == value
+    ):
+        assert resolve_text(text, {"v": "7.5", "on": "true"}, "here") == value
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
+def test_an_expression_without_a_value_is_refused() -> None:
+    for text, says in (
         ("$w", "unknown parameter 'w'; known here: v"),
         *(("${$v", "needs ${...}"), ("${1 / 0}", "has no value")),
         *(("${9 ** 9 ** 9 ** 9}", "has no value"), ("${__import__('os')}", "has no value")),
         ("${$v.real}", "more than numbers"),
         ("${" + "(" * 300 + "1" + ")" * 300 + "}", "at most 500 characters"),
         ("${'a' * 10}", "more than numbers"),
-    ],
-)
-def test_an_expression_without_a_value_is_refused(text: str, says: str) -> None:
-    with pytest.raises(InvalidDocument, match=re.escape(says)):
-        resolve_text(text, {"v": "7.5"}, "here")
+    ):
+        with pytest.raises(InvalidDocument, match=re.escape(says)):
+            resolve_text(text, {"v": "7.5"}, "here")
 
 
 def test_parameters_hold_in_what_declares_them(tmp_path: Path) -> None:
@@ -141,19 +135,16 @@ def test_an_entry_of_a_catalog_may_name_another(tmp_path: Path) -> None:
 THING = f'<MiscObject miscObjectCategory="{{}}">{BOX}</MiscObject>'
 
 
-@pytest.mark.parametrize(
-    ("body", "kind"),
-    [
+def test_a_category_is_a_class_of_ours(tmp_path: Path) -> None:
+    for body, kind in (
         (CAR, AgentType.VEHICLE),
         (CAR.replace('"car">', '"motorbike">'), AgentType.BICYCLE),
         (f'<Pedestrian pedestrianCategory="pedestrian">{BOX}</Pedestrian>', AgentType.PEDESTRIAN),
         (THING.format("barrier"), AgentType.BARRIER),
         (THING.format("obstacle"), AgentType.GENERIC_OBJECT),
-    ],
-)
-def test_a_category_is_a_class_of_ours(body: str, kind: AgentType, tmp_path: Path) -> None:
-    (agent,) = read(write(tmp_path, scenario(other=body))).scene.agents
-    assert agent.type is kind
+    ):
+        (agent,) = read(write(tmp_path, scenario(other=body))).scene.agents
+        assert agent.type is kind
 
 
 RELATIVE = (
@@ -250,9 +241,11 @@ def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path
     assert any(note in text for text in notes), notes
 
 
-@pytest.mark.parametrize(
-    ("made", "says"),
-    [
+def test_a_scenario_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    (tmp_path / "out.xodr").write_text("<OpenDRIVE/>")
+    for made, says in (
         (scenario(logic="Town03"), "the map 'Town03' is not beside the scenario"),
         (scenario(logic="../out.xodr"), "the map '../out.xodr' is not beside"),
         (scenario(logic="/etc/passwd"), "is not beside"),
@@ -263,14 +256,9 @@ def test_what_is_left_out_is_noted_with_its_place(made: str, note: str, tmp_path
         (scenario(logic="$map"), "LogicFile.filepath: unknown parameter 'map'"),
         (catalog(""), "has no Storyboard"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><OpenSCENARIO>&b;</OpenSCENARIO>", "a document type"),
-    ],
-)
-def test_a_scenario_that_can_not_be_read_is_refused(made: str, says: str, tmp_path: Path) -> None:
-    folder = tmp_path / "inner"
-    folder.mkdir()
-    (tmp_path / "out.xodr").write_text("<OpenDRIVE/>")
-    with pytest.raises(InvalidDocument, match=re.escape(says)):
-        read(write(folder, made))
+    ):
+        with pytest.raises(InvalidDocument, match=re.escape(says)):
+            read(write(folder, made))
 
 
 def test_the_ego_is_who_is_asked_for(tmp_path: Path) -> None:

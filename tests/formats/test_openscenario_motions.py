@@ -289,25 +289,20 @@ ON_THE_WAY = by_entity('<TraveledDistanceCondition value="34.9"/>', "Ego")
 RUNNING = AFTER.replace("completeState", "runningState").replace('"0"', '"1"')
 
 
-@pytest.mark.parametrize(
-    ("act", "own", "began_s"),
-    [
+def test_an_event_begins_once_both_its_act_and_its_own_conditions_hold(tmp_path: Path) -> None:
+    text = scenario(event(speed(9), by_time(2)), other_does=(speed(8),))
+    for act, own, began_s in (
         *((by_time(6), AFTER, 6.0), (AFTER, by_time(6), 6.0), (AFTER, "", 2.0), ("", AFTER, 2.0)),
         (ON_THE_WAY, by_time(2), 3.5),
         (ON_THE_WAY, RUNNING.replace('"acts"', '"a2"'), 4.5),
-    ],
-)
-def test_an_event_begins_once_both_its_act_and_its_own_conditions_hold(
-    act: str, own: str, began_s: float, tmp_path: Path
-) -> None:
-    text = scenario(event(speed(9), by_time(2)), other_does=(speed(8),))
-    later = LATER.format(event(speed(12), own, name="then"), act)
-    reading = read(write(tmp_path, text.replace("</Story>", later)))
-    (other,) = moves(reading).others
-    faster = other.states[:, 3] > 11.0
-    assert faster.argmax() == pytest.approx(10 * began_s + 1, abs=1)
-    is_told = any("begins so long after" in note for note in reading.notes)
-    assert is_told == (began_s > 2.0)
+    ):
+        later = LATER.format(event(speed(12), own, name="then"), act)
+        reading = read(write(tmp_path, text.replace("</Story>", later)))
+        (other,) = moves(reading).others
+        faster = other.states[:, 3] > 11.0
+        assert faster.argmax() == pytest.approx(10 * began_s + 1, abs=1)
+        is_told = any("begins so long after" in note for note in reading.notes)
+        assert is_told == (began_s > 2.0)
 
 
 def test_an_odd_trajectory_costs_its_event_alone_and_is_noted_once(tmp_path: Path) -> None:

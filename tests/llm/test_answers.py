@@ -184,15 +184,12 @@ def test_an_answer_of_its_own_is_withheld_by_nobody(reason: str) -> None:
     assert not read(answer({"content": "Hi"}, reason, content_filter_results=quiet)).is_withheld
 
 
-@pytest.mark.parametrize(
-    "reason",
-    [
+def test_a_limit_has_several_names() -> None:
+    for reason in (
         *("length", "MAX_TOKENS", "model_length", "max_output_tokens"),
         *("contextLengthReached", "TOO_LONG", "model_context_window_exceeded"),
-    ],
-)
-def test_a_limit_has_several_names(reason: str) -> None:
-    assert read(answer({"content": "Hi"}, reason)).is_cut_off
+    ):
+        assert read(answer({"content": "Hi"}, reason)).is_cut_off
 
 
 @pytest.mark.parametrize("row", [*rows("refusal"), *rows("fault")], ids=str)
@@ -256,19 +253,16 @@ def test_cached_tokens_are_the_prompts_and_a_small_count_is_a_remark(row: dict[s
     assert (counts, len(reply.remarks)) == (row["counts"], row["remarks"]), reply.remarks
 
 
-@pytest.mark.parametrize(
-    ("written", "count"),
-    [
+def test_a_count_of_tokens_that_can_not_be_is_unknown() -> None:
+    for written, count in (
         *(("7", 7), ("7.0", 7), ('"7"', 7), (str(MOST_TOKENS), MOST_TOKENS)),
         *((written, None) for written in ("0", "7.5", "-1", "true", '"7.5"', "null", "[7]")),
         *((written, None) for written in (str(MOST_TOKENS + 1), "9" * 400)),
         *((written, None) for written in ("1e300", "1e999", "NaN")),
-    ],
-)
-def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int | None) -> None:
-    usage = dict.fromkeys(("prompt_tokens", "completion_tokens"), json.loads(written))
-    reply = read(answer({"content": "Hi"}) | {"usage": usage})
-    assert (reply.text, reply.prompt_tokens, reply.completion_tokens) == ("Hi", count, count)
+    ):
+        usage = dict.fromkeys(("prompt_tokens", "completion_tokens"), json.loads(written))
+        reply = read(answer({"content": "Hi"}) | {"usage": usage})
+        assert (reply.text, reply.prompt_tokens, reply.completion_tokens) == ("Hi", count, count)
 
 
 @pytest.mark.parametrize("row", [*rows("unknown parameter"), *rows("refused value")], ids=str)
@@ -282,9 +276,8 @@ def test_a_parameter_is_dropped_where_it_is_unknown_alone(row: dict[str, Any]) -
 DATE = "Wed, 21 Oct 2015 07:28:00 GMT"
 
 
-@pytest.mark.parametrize(
-    ("headers", "wait_s"),
-    [
+def test_the_wait_asked_for_has_three_forms() -> None:
+    for headers, wait_s in (
         ({"retry-after-ms": "800", "retry-after": "1"}, 0.8),
         ({"retry-after": "45"}, 45.0),
         ({"retry-after": "1m30s"}, 90.0),
@@ -309,14 +302,12 @@ DATE = "Wed, 21 Oct 2015 07:28:00 GMT"
                 "Wed, 21 Oct 2015 07:28:00 -0000": 0.0,
             }.items()
         ),
-    ],
-)
-def test_the_wait_asked_for_has_three_forms(headers: dict[str, str], wait_s: float | None) -> None:
-    details = [{"retryDelay": headers.pop("body", "")}]
-    body = {"details": details, "message": headers.pop("sentence", "")}
-    fault = fault_of(429, body, headers)
-    assert fault.retry_after_s == wait_s
-    assert ("can't be read" in str(fault)) == (wait_s is None)
+    ):
+        details = [{"retryDelay": headers.pop("body", "")}]
+        body = {"details": details, "message": headers.pop("sentence", "")}
+        fault = fault_of(429, body, headers)
+        assert fault.retry_after_s == wait_s
+        assert ("can't be read" in str(fault)) == (wait_s is None)
 
 
 @pytest.mark.parametrize("wait", [{"retry_after": 20}, {"estimated_time": 20.0}], ids=str)

@@ -140,9 +140,8 @@ WALKER = pedestrian("New2", 10.0, -4.0, (10.0, 4.0))
 BRAKING = PlannedMotion(speeds=((0.0, 8.0), (2.0, 0.0)), start=NearEgo(within_m=15.0))
 
 
-@pytest.mark.parametrize(
-    ("changed", "alike"),
-    [
+def test_two_motions_against_the_tolerance() -> None:
+    for changed, alike in (
         (BRAKING, True),
         (replace(BRAKING, start=NearEgo(within_m=15.15)), True),
         (replace(BRAKING, start=NearEgo(within_m=15.16)), False),
@@ -152,17 +151,14 @@ BRAKING = PlannedMotion(speeds=((0.0, 8.0), (2.0, 0.0)), start=NearEgo(within_m=
         (replace(BRAKING, start=AtTime(after_s=15.0)), False),
         (replace(BRAKING, path=LanePath(lane_ids=("Lane1",))), False),
         (None, False),
-    ],
-)
-def test_two_motions_against_the_tolerance(changed: PlannedMotion | None, alike: bool) -> None:
-    one, other = replace(CAR, motion=BRAKING), replace(CAR, motion=changed)
-    assert look_alike(one, other) is alike
-    assert look_alike(other, one) is alike
+    ):
+        one, other = replace(CAR, motion=BRAKING), replace(CAR, motion=changed)
+        assert look_alike(one, other) is alike
+        assert look_alike(other, one) is alike
 
 
-@pytest.mark.parametrize(
-    ("changed", "alike"),
-    [
+def test_one_object_against_the_tolerance() -> None:
+    for changed, alike in (
         (CAR, True),
         (replace(CAR, id="New9"), True),
         (replace(CAR, x_m=20.1), True),
@@ -174,12 +170,10 @@ def test_two_motions_against_the_tolerance(changed: PlannedMotion | None, alike:
         (replace(CAR, length_m=5.1), False),
         (replace(CAR, speed_mps=0.2), False),
         (replace(CAR, type=AgentType.BUS), False),
-    ],
-)
-def test_one_object_against_the_tolerance(changed: object, alike: bool) -> None:
-    one, other = Modification(added=(CAR,)), Modification(added=(changed,))  # type: ignore[arg-type]
-    assert are_alike(one, other) is alike
-    assert are_alike(other, one) is alike
+    ):
+        one, other = Modification(added=(CAR,)), Modification(added=(changed,))
+        assert are_alike(one, other) is alike
+        assert are_alike(other, one) is alike
 
 
 def test_every_object_is_matched_once() -> None:

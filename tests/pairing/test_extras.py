@@ -61,16 +61,13 @@ def small(**rules: object) -> PlanRules:
     return PlanRules(**{**given, **rules})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("rules", "sentence"),
-    [
+def test_rules_that_can_not_be_met_are_refused() -> None:
+    for rules, sentence in (
         ({"repeat_share": 0.6}, "share of repeats goes from 0 to 50%, not 60.0%"),
         ({"check_share": -0.1}, "share of attention checks"),
-    ],
-)
-def test_rules_that_can_not_be_met_are_refused(rules: dict[str, object], sentence: str) -> None:
-    with pytest.raises(NothingToPlan, match=sentence):
-        plan(small(**rules))
+    ):
+        with pytest.raises(NothingToPlan, match=sentence):
+            plan(small(**rules))
 
 
 def test_few_scenarios_keep_repeats_as_far_away_as_they_can() -> None:

@@ -107,16 +107,13 @@ def test_experts_with_scenarios_and_pairs_of_their_own_share_some(
     assert max(of_pairs.values()) - min(of_pairs.values()) <= 2
 
 
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
+def test_what_can_not_be_is_refused_with_numbers() -> None:
+    for wrong, said in (
         ({"overlap_share": 0.81}, "from 0 to 80%, not 81.0%"),
         ({"overlap_share": 0.1, "experts": ("e1",)}, "there must be two"),
-    ],
-)
-def test_what_can_not_be_is_refused_with_numbers(wrong: dict[str, object], said: str) -> None:
-    with pytest.raises(NothingToPlan, match=said):
-        plan(replace(twelve_by_forty(0.0), **wrong))  # type: ignore[arg-type]
+    ):
+        with pytest.raises(NothingToPlan, match=said):
+            plan(replace(twelve_by_forty(0.0), **wrong))
 
 
 def test_what_one_expert_alone_judges_can_not_be_brought_together() -> None:

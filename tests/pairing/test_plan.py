@@ -155,18 +155,15 @@ def test_too_few_units_are_refused_with_both_numbers() -> None:
         plan(rules(3, 2, 1, 6, same=frozenset({(0, 1), (1, 1)})))
 
 
-@pytest.mark.parametrize(
-    ("changes", "sentence"),
-    [
+def test_rules_that_make_no_sense_are_refused() -> None:
+    for changes, sentence in (
         ({"votes": 0}, "Votes per expert must be 1 or more, not 0"),
         ({"experts": 0}, "at least one expert"),
         ({"contestants": 1}, "two contestants with pictures, not 1"),
         ({"seed": -1}, "seed must be 0 or more"),
-    ],
-)
-def test_rules_that_make_no_sense_are_refused(changes: dict[str, int], sentence: str) -> None:
-    with pytest.raises(NothingToPlan, match=sentence):
-        plan(rules(**changes))  # type: ignore[arg-type]
+    ):
+        with pytest.raises(NothingToPlan, match=sentence):
+            plan(rules(**changes))  # type: ignore[arg-type]
 
 
 def test_a_repeat_may_come_exactly_at_the_distance_that_is_asked_for() -> None:

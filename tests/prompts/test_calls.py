@@ -15,9 +15,8 @@ ONE = '{"call": "pose_on_lane", "arguments": {"lane": "Lane1"}}'
 READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
+def test_a_call_is_a_line_or_a_block_of_its_own() -> None:
+    for answer in (
         ONE,
         f"I look it up:\n\n  {ONE}  \n\nThen I wait.",
         f"`{ONE}`",
@@ -25,10 +24,8 @@ READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})
         f"```json\n{ONE}\n```",
         "```json\n" + json.dumps(json.loads(ONE), indent=2) + "\n```",
         f"<think>{ONE}\n{ONE}\n</think>\n{ONE}",
-    ],
-)
-def test_a_call_is_a_line_or_a_block_of_its_own(answer: str) -> None:
-    assert calls_in(answer) == (READ,)
+    ):
+        assert calls_in(answer) == (READ,)
 
 
 D = '{"lane": "Lane1", "start": "Agent1", "distance_m": 21.4}'
@@ -100,9 +97,8 @@ def test_a_call_that_can_not_be_understood_says_what_is_wrong(answer: str, probl
     assert not call.mended
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
+def test_what_only_looks_like_a_call_is_none() -> None:
+    for answer in (
         "",
         "x" * 300_000,
         '{"add": [], "move": [], "remove": []}',
@@ -110,10 +106,8 @@ def test_a_call_that_can_not_be_understood_says_what_is_wrong(answer: str, probl
         'Modification Dict: {"Action": "add", "Modified_Agent": "Agent2"}',
         "The pose (x=1, y=2) is purpose(ful).",
         "I compute pose(s) by hand.",
-    ],
-)
-def test_what_only_looks_like_a_call_is_none(answer: str) -> None:
-    assert calls_in(answer) == ()
+    ):
+        assert calls_in(answer) == ()
 
 
 @pytest.mark.parametrize("written", FORMS.values(), ids=FORMS)

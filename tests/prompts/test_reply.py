@@ -70,9 +70,8 @@ def at(name: str) -> dict[str, object]:
     return {"kind": "place", "agent_id": name, "x_m": 1.0, "y_m": 2.0}
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_the_last_block_with_the_keys_counts() -> None:
+    for text in (
         block(agent()),
         f"```\n{block(agent())}\n```",
         f"```JSON\r\n{block(agent())}\r\n```",
@@ -88,10 +87,8 @@ def at(name: str) -> dict[str, object]:
         f'```json\n{{"remove": []}}\n```\n```json\n{{"add": [{json.dumps(agent())}]}}\n```',
         GOOD + '\n```json\n{"Action": "add"}\n```',
         f"```python\nx = 19.0 + 2.4\n```\nModified Vectors:\n```json {block(agent())} ```",
-    ],
-)
-def test_the_last_block_with_the_keys_counts(text: str) -> None:
-    assert read_reply(text, scene()).modification.added == (PARKED,)
+    ):
+        assert read_reply(text, scene()).modification.added == (PARKED,)
 
 
 @pytest.mark.parametrize(
@@ -119,9 +116,8 @@ def test_mending_leaves_strings_alone() -> None:
         read_reply(block(agent(lane="a//b,}")) + ",", replace(street, lanes=(odd,)))
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
+def test_what_can_not_be_read_is_refused_with_its_reason() -> None:
+    for text, problem in (
         ("I would put it 21.4 m ahead.", "no fenced JSON block"),
         (GOOD[:-30], "the JSON block breaks"),
         (GOOD.replace("21.4", "19.0 + 2.4"), "the JSON block breaks"),
@@ -153,10 +149,8 @@ def test_mending_leaves_strings_alone() -> None:
         (block(*[agent(id=f"Agent{n}") for n in range(8, 73)]), "add: List should have at most"),
         ('{"add": ' + "[" * 100_000, "nested too deeply"),
         ('{"add": "' + "x" * 200_000 + '"}', "longer than 200000 characters"),
-    ],
-)
-def test_what_can_not_be_read_is_refused_with_its_reason(text: str, problem: str) -> None:
-    assert problem in "\n".join(problems(text))
+    ):
+        assert problem in "\n".join(problems(text))
 
 
 def test_a_broken_final_block_is_not_replaced_by_an_earlier_draft() -> None:
@@ -271,19 +265,16 @@ def test_sections_are_kept_and_the_block_counts() -> None:
     assert review.ratings.mean == pytest.approx(14 / 3)
 
 
-@pytest.mark.parametrize(
-    ("said", "read"),
-    [
+def test_a_viewers_lines_are_read_by_their_numbers() -> None:
+    for said, read in (
         ("1. In Lane1.\n2. cannot see", {1: "In Lane1.", 2: "cannot see"}),
         ("**1.** Lane1\n 2) no\n3: yes", {1: "Lane1", 2: "no", 3: "yes"}),
         ("1. first\n1. second\n9. far", {1: "first"}),
         ("<think>1. wrong</think>\n1. right", {1: "right"}),
         ("1. In which lane?\n   - Lane1\n2\\. no", {1: "In which lane? - Lane1", 2: "no"}),
         ("(1) yes, at\n1.5 m\n2.\nno", {1: "yes, at 1.5 m", 2: "no"}),
-    ],
-)
-def test_a_viewers_lines_are_read_by_their_numbers(said: str, read: dict[int, str]) -> None:
-    assert read_sight(said, 3) == read
+    ):
+        assert read_sight(said, 3) == read
 
 
 def test_a_judges_word_is_understood_in_other_spellings_and_guessed_in_none() -> None:

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pytest
-
 from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.reliability import Evidence
@@ -32,9 +30,8 @@ SURE = evidence(9.0, 9.0)
 """Attention 100 % with an error of a third."""
 
 
-@pytest.mark.parametrize(
-    ("more", "standing", "reason"),
-    [
+def test_judgements_change_at_thresholds() -> None:
+    for more, standing, reason in (
         ({}, "can't tell yet", "too few attention checks (0) and hidden repeats (0) to tell"),
         ({"repeats": (5, 2)}, "can't tell yet", "alike; too few attention checks (0) to tell"),
         ({"checks": (5, 4), "ties": 1.0}, "reliable", "passed 4 of 5 attention checks"),
@@ -57,8 +54,6 @@ SURE = evidence(9.0, 9.0)
         ({"evidence": SURE, "left": Estimate(value=0.76)}, "reliable", ""),
         ({"evidence": SURE, "left": Estimate(value=0.23)}, "look here", "votes for the right"),
         ({"evidence": SURE, "left": Estimate(value=0.69), "votes": 999}, "reliable", ""),
-    ],
-)
-def test_judgements_change_at_thresholds(more: dict[str, Any], standing: str, reason: str) -> None:
-    found, why = judged(**more)
-    assert (found, reason in why) == (standing, True), why
+    ):
+        found, why = judged(**more)
+        assert (found, reason in why) == (standing, True), why

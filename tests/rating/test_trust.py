@@ -76,21 +76,18 @@ def _bell_mccaffrey(found: Any, of_expert: np.ndarray) -> tuple[float, float]:
 TURNED = versus("a", "b", 3, 0, 1) + versus("b", "a", 3, 0, 1)
 
 
-@pytest.mark.parametrize(
-    ("votes", "reason"),
-    [
+def test_a_side_without_an_interval_says_why() -> None:
+    for votes, reason in (
         (versus("a", "b", 3, 0, 0) + versus("b", "a", 3, 0, 0), ONE_SIDED),
         (versus("a", "b", 3, 0, 0) + versus("b", "a", 0, 0, 3), UNDETERMINED),
         (TURNED, ONE_EXPERT),
         ([replace(one, expert=who) for one in TURNED for who in "ef"], ALIKE),
         ([replace(one, expert=who) for one, who in zip(TURNED, "efgefgef", strict=True)], ""),
-    ],
-)
-def test_a_side_without_an_interval_says_why(votes: list[Comparison], reason: str) -> None:
-    found = side_bias(named(votes))
-    assert found.reason == reason
-    assert (found.advantage.lower is None) == bool(reason)
-    assert (found.advantage.value is None) == (reason in (ONE_SIDED, UNDETERMINED))
+    ):
+        found = side_bias(named(votes))
+        assert found.reason == reason
+        assert (found.advantage.lower is None) == bool(reason)
+        assert (found.advantage.value is None) == (reason in (ONE_SIDED, UNDETERMINED))
 
 
 def test_the_advantage_of_uneven_experts_is_inside_its_interval() -> None:

@@ -39,22 +39,19 @@ def braking(start: AtTime | NearEgo) -> TrafficAgent:
     return vehicle("New1", 20.0, 0.0, speed_mps=10.0, lane_id="Lane1", motion=motion)
 
 
-@pytest.mark.parametrize(
-    ("start", "places_m"),
-    [
+def test_a_trail_has_a_spot_each_second() -> None:
+    for start, places_m in (
         (AtTime(), [27.5, 30.0]),  # 20 + 10 t - 2.5 t^2
         (AtTime(after_s=1.0), [30.0, 37.5, 40.0]),  # where it sets out, and on
         (AtTime(after_s=6.0), [80.0, 87.5, 90.0]),
         (AtTime(after_s=6.1), []),
         (NearEgo(within_m=5.0), []),
-    ],
-)
-def test_a_trail_has_a_spot_each_second(start: AtTime | NearEgo, places_m: list[float]) -> None:
-    (trail,) = find_trails(STREET, Modification(added=(braking(start),)))
-    assert trail.sets_out == bool(places_m)
-    assert [spot.x_m for spot in trail.spots] == pytest.approx(places_m)
-    # Of one that does not set out, the way that it would take is told from where it is.
-    assert trail.way_m[-1, 0] == pytest.approx(places_m[-1] if places_m else 30.0)
+    ):
+        (trail,) = find_trails(STREET, Modification(added=(braking(start),)))
+        assert trail.sets_out == bool(places_m)
+        assert [spot.x_m for spot in trail.spots] == pytest.approx(places_m)
+        # Of one that does not set out, the way that it would take is told from where it is.
+        assert trail.way_m[-1, 0] == pytest.approx(places_m[-1] if places_m else 30.0)
 
 
 def test_who_has_no_motion_leaves_no_trail_and_the_ego_is_followed_for_six_seconds() -> None:

@@ -131,16 +131,13 @@ def arc(turn_rad: float) -> Polyline:
     return Polyline(np.column_stack([np.sin(angles), side * (1.0 - np.cos(angles))]))
 
 
-@pytest.mark.parametrize(
-    ("turn_deg", "turn_type"),
-    [
+def test_a_line_turns_as_far_as_its_bends_together() -> None:
+    for turn_deg, turn_type in (
         *((10, TurnType.STRAIGHT), (-25, TurnType.STRAIGHT), (35, TurnType.LEFT)),
         *((140, TurnType.LEFT), (-90, TurnType.RIGHT)),
         *((170, TurnType.U_TURN), (-200, TurnType.U_TURN)),
-    ],
-)
-def test_a_line_turns_as_far_as_its_bends_together(turn_deg: float, turn_type: TurnType) -> None:
-    assert classify_turn(arc(math.radians(turn_deg))) is turn_type
+    ):
+        assert classify_turn(arc(math.radians(turn_deg))) is turn_type
 
 
 def test_people_drive_where_oncoming_lanes_are_on_the_other_side() -> None:

@@ -192,9 +192,8 @@ def test_a_motion_is_written_and_read_and_a_walk_beside_it_is_refused() -> None:
         modification_from_document(document)
 
 
-@pytest.mark.parametrize(
-    ("motion", "words"),
-    [
+def test_a_motion_is_told_in_words() -> None:
+    for motion, words in (
         (PlannedMotion(), "sets out at once"),
         (
             PlannedMotion(
@@ -216,7 +215,5 @@ def test_a_motion_is_written_and_read_and_a_walk_beside_it_is_refused() -> None:
             PlannedMotion(start=AtPlace(agent_id="Agent3", x_m=1.0, y_m=2.5)),
             "sets out when Agent3 is within 2 m of (1, 2.5)",
         ),
-    ],
-)
-def test_a_motion_is_told_in_words(motion: PlannedMotion, words: str) -> None:
-    assert str(motion) == words
+    ):
+        assert str(motion) == words

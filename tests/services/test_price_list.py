@@ -1,8 +1,6 @@
 from datetime import UTC, datetime
 from decimal import Decimal
 
-import pytest
-
 from augment.services.endpoints.known_models import find_listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
@@ -28,14 +26,11 @@ def test_a_price_is_that_of_its_day() -> None:
     assert [found and found[0].prompt_usd for found in prices] == [Decimal("0.75"), Decimal("1.5")]
 
 
-@pytest.mark.parametrize(
-    ("base_url", "model"),
-    [
+def test_what_is_not_listed_is_unknown() -> None:
+    for base_url, model in (
         (OPENAI, "gpt-nobody-knows"),
         (OPENAI, "text-embedding-3-small"),
         ("http://127.0.0.1:11434/v1", "gpt-4o"),
         ("https://api.openai.com.example.net/v1", "gpt-4o"),
-    ],
-)
-def test_what_is_not_listed_is_unknown(base_url: str, model: str) -> None:
-    assert find_listed_price(base_url=base_url, model=model, now=NOW) is None
+    ):
+        assert find_listed_price(base_url=base_url, model=model, now=NOW) is None

@@ -18,9 +18,8 @@ CLEAR = "\x1b[2J"
 TITLE = "\x1b]0;owned\x07"
 
 
-@pytest.mark.parametrize(
-    ("text", "printed"),
-    [
+def test_what_steers_a_terminal_is_spelt_out() -> None:
+    for text, printed in (
         (CLEAR, r"\x1b[2J"),
         (TITLE, r"\x1b]0;owned\x07"),
         ("\x9b31m", r"\x9b31m"),
@@ -32,10 +31,8 @@ TITLE = "\x1b]0;owned\x07"
         ("\ud800", r"\ud800"),
         ("a\tb\nc", "a\tb\nc"),
         ("Straße 5 · 10 m² → α", "Straße 5 · 10 m² → α"),
-    ],
-)
-def test_what_steers_a_terminal_is_spelt_out(text: str, printed: str) -> None:
-    assert escape_controls(text) == printed
+    ):
+        assert escape_controls(text) == printed
 
 
 @pytest.mark.slow

@@ -74,19 +74,16 @@ def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
     )  # something stands at the far end of the path
 
 
-@pytest.mark.parametrize(
-    ("what", "agents", "collision"),
-    [
+def test_collisions_multiply() -> None:
+    for what, agents, collision in (
         ("nobody", [], 1.0),
         ("a parked car", [vehicle("A", 20.0, 0.0)], 0.0),
         ("a person", [pedestrian("A", 20.0, 0.0)], 0.0),
         ("a cone", [cone("A", 20.0, 0.0)], 0.5),
         ("a car from behind", [vehicle("A", -10.0, 0.0, speed_mps=12.0)], 1.0),
-    ],
-)
-def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: float) -> None:
-    judged = judged_among(states_along(np.full(41, 8.0))[None], to_objects(agents))
-    assert judged.parts["collision"].tolist() == [collision], what
+    ):
+        judged = judged_among(states_along(np.full(41, 8.0))[None], to_objects(agents))
+        assert judged.parts["collision"].tolist() == [collision], what
 
 
 def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route() -> None:

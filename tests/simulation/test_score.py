@@ -66,9 +66,8 @@ def test_a_plain_drive_is_perfect_in_each_of_nuplans_parts() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("who", "agents", "expected"),
-    [
+def test_collisions() -> None:
+    for who, agents, expected in (
         ("nobody", [], 1.0),
         ("a parked car ahead", [vehicle("A", 30.0, 0.0)], 0.0),
         ("one cone", [cone("A", 30.0, 0.0)], 0.5),
@@ -79,14 +78,12 @@ def test_a_plain_drive_is_perfect_in_each_of_nuplans_parts() -> None:
         ("a slower car ahead", [moving(vehicle("A", 20.0, 0.0), 4.0)], 0.0),
         ("who touched the ego at the start", [vehicle("A", 4.0, 0.0)], 1.0),
         ("a car from the side into the ego's flank", [], 1.0),
-    ],
-)
-def test_collisions(who: str, agents: list[TrafficAgent], expected: float) -> None:
-    if who == "a car from the side into the ego's flank":
-        # Its nose meets the ego's side between the axles at 5 s, at x = 40 m.
-        agents = [moving(vehicle("A", 39.5, 22.0, -math.pi / 2.0), 3.8)]
-        assert len(collisions(driven(states_along(STEADY), agents))) == 1
-    assert value(scored(agents=agents), "no_ego_at_fault_collisions") == expected
+    ):
+        if who == "a car from the side into the ego's flank":
+            # Its nose meets the ego's side between the axles at 5 s, at x = 40 m.
+            agents = [moving(vehicle("A", 39.5, 22.0, -math.pi / 2.0), 3.8)]
+            assert len(collisions(driven(states_along(STEADY), agents))) == 1
+        assert value(scored(agents=agents), "no_ego_at_fault_collisions") == expected
 
 
 @pytest.mark.parametrize(
@@ -99,40 +96,29 @@ def test_the_drivable_area_allows_less_than_30_cm(y_m: float, expected: float) -
     assert value(scored(y_m=y_m), "drivable_area_compliance") == expected
 
 
-@pytest.mark.parametrize(
-    ("speed", "ratio", "enough"),
-    [
+def test_progress_is_a_share_of_the_experts() -> None:
+    for speed, ratio, enough in (
         *((8.0, 1.0, 1.0), (4.0, 0.5, 1.0), (1.61, 0.20125, 1.0), (1.59, 0.19875, 0.0)),
         *((9.0, 1.0, 1.0), (-8.0, 0.0, 0.0)),
-    ],
-)
-def test_progress_is_a_share_of_the_experts(speed: float, ratio: float, enough: float) -> None:
-    score = scored(np.full(151, speed))
-    assert value(score, "ego_progress_along_expert_route") == pytest.approx(ratio)
-    assert value(score, "ego_is_making_progress") == enough
+    ):
+        score = scored(np.full(151, speed))
+        assert value(score, "ego_progress_along_expert_route") == pytest.approx(ratio)
+        assert value(score, "ego_is_making_progress") == enough
 
 
-@pytest.mark.parametrize(
-    ("speed", "expected"),
-    # 11 increments of 0.1 s: 1.1 * speed against the lane's direction.
-    [(1.8, 1.0), (1.83, 0.5), (5.4, 0.5), (5.5, 0.0)],
-)
-def test_the_wrong_way_counts_by_the_metres_of_1_1_s(speed: float, expected: float) -> None:
-    score = scored(np.full(151, speed), y_m=3.5, expert=CALM)
-    assert value(score, "driving_direction_compliance") == expected
+def test_the_wrong_way_counts_by_the_metres_of_1_1_s() -> None:
+    for speed, expected in ((1.8, 1.0), (1.83, 0.5), (5.4, 0.5), (5.5, 0.0)):
+        score = scored(np.full(151, speed), y_m=3.5, expert=CALM)
+        assert value(score, "driving_direction_compliance") == expected
 
 
-@pytest.mark.parametrize(
-    ("gap_m", "expected"),
-    # Closing at 8 m/s on what stands: 0.95 s are 7.6 m, and the steps are whole tenths.
-    [(8.1, 1.0), (7.0, 0.0)],
-)
-def test_time_to_collision_is_bounded_by_0_95_s(gap_m: float, expected: float) -> None:
-    # Four moments only, so that the last gap is what counts.
-    start = gap_m + 3 * 0.8
-    speeds = np.full(4, 8.0)
-    score = scored(speeds, [vehicle("A", start + 2.588 + 2.4, 0.0)], expert=CALM)
-    assert value(score, "time_to_collision_within_bound") == expected
+def test_time_to_collision_is_bounded_by_0_95_s() -> None:
+    for gap_m, expected in ((8.1, 1.0), (7.0, 0.0)):
+        # Four moments only, so that the last gap is what counts.
+        start = gap_m + 3 * 0.8
+        speeds = np.full(4, 8.0)
+        score = scored(speeds, [vehicle("A", start + 2.588 + 2.4, 0.0)], expert=CALM)
+        assert value(score, "time_to_collision_within_bound") == expected
 
 
 def test_who_is_beside_an_ego_in_its_lane_does_not_count_as_a_coming_collision() -> None:
@@ -143,18 +129,15 @@ def test_who_is_beside_an_ego_in_its_lane_does_not_count_as_a_coming_collision()
     assert value(across, "time_to_collision_within_bound") == 0.0
 
 
-@pytest.mark.parametrize(
-    ("limit", "speed", "expected"),
-    [
+def test_overspeed_is_summed_up() -> None:
+    for limit, speed, expected in (
         *((10.0, 10.0, 1.0), (10.0, 11.115, 1.0 - 151 / 150 * 0.5)),
         *((10.0, 13.0, 0.0), (None, 30.0, None)),
-    ],
-)
-def test_overspeed_is_summed_up(limit: float | None, speed: float, expected: float | None) -> None:
-    score = scored(np.full(151, speed), on=street(600.0, limit_mps=limit))
-    assert value(score, "speed_limit_compliance") == (
-        None if expected is None else pytest.approx(expected)
-    )
+    ):
+        score = scored(np.full(151, speed), on=street(600.0, limit_mps=limit))
+        assert value(score, "speed_limit_compliance") == (
+            None if expected is None else pytest.approx(expected)
+        )
 
 
 @pytest.mark.parametrize(("pull", "expected"), [(2.3, 1.0), (2.5, 0.0), (-4.0, 1.0), (-4.1, 0.0)])

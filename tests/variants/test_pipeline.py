@@ -147,17 +147,14 @@ def test_a_draft_in_thoughts_that_were_cut_off_is_no_answer() -> None:
     assert "cut off at its length limit" in made.client.requests[1].messages[-1].text
 
 
-@pytest.mark.parametrize(
-    ("first", "problem"),
-    [
+def test_an_answer_beside_the_text_is_told_so() -> None:
+    for first, problem in (
         (native("{}"), "no native call is answered"),
         (Reply(text="", reasoning="Let me see."), "there are thoughts and no answer"),
-    ],
-)
-def test_an_answer_beside_the_text_is_told_so(first: Reply, problem: str) -> None:
-    made = Play("otm", [first, GOOD])
-    assert made.outcome.status is OutcomeStatus.DONE
-    assert problem in made.client.requests[1].messages[-1].text
+    ):
+        made = Play("otm", [first, GOOD])
+        assert made.outcome.status is OutcomeStatus.DONE
+        assert problem in made.client.requests[1].messages[-1].text
 
 
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:

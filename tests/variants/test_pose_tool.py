@@ -50,19 +50,16 @@ def test_a_place_is_taken_by_the_box_that_interplan_will_use() -> None:
     assert [PoseTool(one).answer(call)["taken_by"] for one in asked] == [None, ["Agent2"]]
 
 
-@pytest.mark.parametrize(
-    ("lateral_m", "lane"),
-    [
+def test_the_lane_is_the_one_under_the_place() -> None:
+    for lateral_m, lane in (
         *((1.75, "Lane1"), (1.76, "Lane2"), (3.5, "Lane2"), (5.26, None)),
         *((-1.75, "Lane1"), (-1.76, None)),
-    ],
-)
-def test_the_lane_is_the_one_under_the_place(lateral_m: float, lane: str | None) -> None:
-    answer = STREET.answer(
-        {"lane": "Lane1", "start": "lane", "distance_m": 60, "lateral_m": lateral_m}
-    )
-    assert answer["lane"] == lane
-    assert answer["route"] == ["Lane1"]
+    ):
+        answer = STREET.answer(
+            {"lane": "Lane1", "start": "lane", "distance_m": 60, "lateral_m": lateral_m}
+        )
+        assert answer["lane"] == lane
+        assert answer["route"] == ["Lane1"]
 
 
 def parking_street() -> PoseTool:
@@ -154,9 +151,8 @@ def test_only_what_the_prompt_shows_is_known() -> None:
     assert cut.curves["Lane1"].after == ()
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_a_call_that_cannot_be_answered_says_why() -> None:
+    for change, said in (
         ({"lane": "Lane9"}, "no lane 'Lane9'. Known: Lane1, Lane2, Lane3, Connector1"),
         ({"lane": [[0, 0], [1, 1]]}, "no lane '[[0, 0], [1, 1]]'"),
         ({"lane": [[0, 0], [1], [2, 2], [3, 3]]}, "lane must be an id, or the control points"),
@@ -177,13 +173,11 @@ def test_only_what_the_prompt_shows_is_known() -> None:
         ({"offset": 1}, "offset: is not a field"),
         ({"object": "TREE"}, "object[0]: String should match pattern '^(VEHICLE|BUS|BICYCLE"),
         ({"object": "EGO_VEHICLE"}, "object[0]: String should match pattern"),
-    ],
-)
-def test_a_call_that_cannot_be_answered_says_why(change: dict[str, object], said: str) -> None:
-    call = {"lane": "Lane1", "start": "Agent1", "distance_m": 10.0, **change}
-    answer = JUNCTION.answer(call)
-    assert list(answer) == ["error"]
-    assert said in str(answer["error"])
+    ):
+        call = {"lane": "Lane1", "start": "Agent1", "distance_m": 10.0, **change}
+        answer = JUNCTION.answer(call)
+        assert list(answer) == ["error"]
+        assert said in str(answer["error"])
 
 
 any_json = st.recursive(

@@ -101,21 +101,18 @@ def test_without_an_accepted_round_the_last_counts_and_is_marked() -> None:
     assert "No round was accepted." in play.outcome.notes
 
 
-@pytest.mark.parametrize(
-    ("script", "roles"),
-    [
+def test_a_visual_review_that_fails_is_unusable() -> None:
+    for script, roles in (
         ([questions(2), questions(9)], "mee"),
         ([questions(), "I see a car.", "A car."], "mevv"),
         ([questions(), SEEN, verdict(said="feedback"), verdict("Bad.", said="accept")], "mevee"),
         ([questions(), Reply(text="", refusal="No picture.")], "mev"),
         ([questions(), Reply(text="", finish_reason="content_filter")], "mev"),
-    ],
-)
-def test_a_visual_review_that_fails_is_unusable(script: list[str | Reply], roles: str) -> None:
-    play = Play("vqa", [car(21.4), *script])
-    assert (play.roles, play.outcome.status) == (roles, OutcomeStatus.DONE)
-    assert play.outcome.is_accepted is None
-    assert "The review is unusable" in play.outcome.notes
+    ):
+        play = Play("vqa", [car(21.4), *script])
+        assert (play.roles, play.outcome.status) == (roles, OutcomeStatus.DONE)
+        assert play.outcome.is_accepted is None
+        assert "The review is unusable" in play.outcome.notes
 
 
 def test_measured_facts_go_back_and_no_model_reviews() -> None:

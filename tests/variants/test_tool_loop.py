@@ -32,21 +32,18 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     assert [note["tool"] for note in play.notes("tool_call")] == ["pose_on_lane"] * 2
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
+def test_what_is_wrong_with_a_call_goes_back_as_text() -> None:
+    for line, said in (
         ('{"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
         (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
         (call(lane="Lane9"), "there is no lane 'Lane9'"),
         ('{"call": "pose_on_lane", "arguments": [1]}', "Input should be a valid dictionary"),
         ('{"call": "pose_on_lane", "arguments": {"distance_m": NaN}}', "NaN is not a number"),
-    ],
-)
-def test_what_is_wrong_with_a_call_goes_back_as_text(line: str, said: str) -> None:
-    play = Play("fc-plus", [line, car(21.4)])
-    (result,) = results(play.client.requests[1].messages[-1])
-    assert said in str(result["error"])
-    assert play.outcome.status is OutcomeStatus.DONE
+    ):
+        play = Play("fc-plus", [line, car(21.4)])
+        (result,) = results(play.client.requests[1].messages[-1])
+        assert said in str(result["error"])
+        assert play.outcome.status is OutcomeStatus.DONE
 
 
 @pytest.mark.parametrize("native", [False, True])
@@ -139,9 +136,8 @@ def test_the_papers_function_returns_one_pose_and_nothing_else(native_calls: boo
     assert play.outcome.status is OutcomeStatus.DONE
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
+def test_what_it_can_t_answer_goes_back_as_text() -> None:
+    for changes, said in (
         ({"lane": "Lane9"}, "there is no lane 'Lane9'"),
         ({"lane": [[0.0, 0.0], [1.0, 1.0]]}, "there is no lane"),
         ({"agent": "TANK"}, "agent: String should match"),
@@ -149,13 +145,11 @@ def test_the_papers_function_returns_one_pose_and_nothing_else(native_calls: boo
         ({"dist": -0.1}, "greater than or equal to 0"),
         ({"dist": [1.0, 2.0]}, "dist: Input should be a valid number"),
         ({"lateral_m": 0.5}, "lateral_m: is not a field of this format"),
-    ],
-)
-def test_what_it_can_t_answer_goes_back_as_text(changes: dict[str, object], said: str) -> None:
-    call = {"call": "retrieve_suitable_pose", "arguments": THERE | changes}
-    play = Play("fc", [json.dumps(call), car(21.4)])
-    (result,) = results(play.client.requests[1].messages[-1])
-    assert said in str(result["error"])
+    ):
+        call = {"call": "retrieve_suitable_pose", "arguments": THERE | changes}
+        play = Play("fc", [json.dumps(call), car(21.4)])
+        (result,) = results(play.client.requests[1].messages[-1])
+        assert said in str(result["error"])
 
 
 def test_our_function_is_none_of_the_papers_variant() -> None:
