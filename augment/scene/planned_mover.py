@@ -7,6 +7,7 @@ Frame: the scene's.
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -232,6 +233,7 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
         return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
+@lru_cache(maxsize=32)  # a search for the nearest motion varies speeds on one path
 def lane_line(graph: LaneGraph, path: planned.LanePath, here: Point) -> Polyline | None:
     """Return the line that a path over lanes takes from a place, None where the lanes end there.
 
