@@ -3,6 +3,7 @@
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import pytest
 
@@ -49,10 +50,7 @@ def asked(
     ("name", "variant", "native"),
     [
         *((name, "otm", False) for name in WISHES),
-        *((name, "fc", False) for name in WISHES),
-        *((name, "fc-plus", False) for name in WISHES),
-        ("cut_in", "fc", True),
-        ("cut_in", "fc-plus", True),
+        *(("cut_in", *how) for how in product(("fc", "fc-plus"), (False, True))),
     ],
 )
 def test_a_good_stand_in_answers_what_is_asked_of_a_motion(
