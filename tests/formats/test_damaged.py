@@ -65,7 +65,7 @@ def read_whole(name: str, path: Path, item: str | None = None) -> None:
 
 
 @pytest.mark.parametrize("name", GOOD)
-@examples(25)
+@examples(15)
 @given(data=st.data())
 def test_damaged_bytes_end_in_a_scene_or_in_our_own_error(
     good: dict[str, Path], name: str, data: st.DataObject

@@ -42,7 +42,7 @@ def check_finite_files(written: Output) -> None:
 
 
 @pytest.mark.parametrize("form", sorted(WRITERS))
-@examples(25)
+@examples(12)
 @given(data=st.data())
 def test_no_file_says_nan_whatever_of_the_ego_and_the_others_was_recorded(
     form: str, data: st.DataObject

@@ -37,8 +37,8 @@ def test_a_study_of_the_papers_size_keeps_every_rule(seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_two_hundred_smaller_studies_keep_every_rule() -> None:
-    for seed in range(200):
+def test_smaller_studies_keep_every_rule() -> None:
+    for seed in range(60):
         asked = paper_rules(seed, votes=100, experts=6)
         made = plan(asked)
         check_extras(asked, made)

@@ -59,7 +59,7 @@ sizes = st.tuples(
 
 
 @given(sizes)
-@examples(150)
+@examples(60)
 def test_a_full_plan_is_balanced_to_one(size: tuple[int, int, int, int, int]) -> None:
     contestants, scenarios, experts, votes, seed = size
     pairs = contestants * (contestants - 1) // 2
@@ -81,7 +81,7 @@ cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 7)), max_size=
 
 
 @given(cells, cells, st.integers(1, 40), st.integers(1, 4), st.integers(0, 5))
-@examples(150)
+@examples(60)
 def test_a_plan_with_holes_keeps_every_rule(
     without: frozenset[tuple[int, int]],
     same: frozenset[tuple[int, int]],

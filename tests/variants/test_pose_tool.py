@@ -18,6 +18,7 @@ from augment.scene.planned_mover import check_lane_path
 from augment.variants.pose_tool import PoseTool
 from augment.variants.retrieval import OBJECT_TYPES
 from tests.fixtures.shelf import whole_scene
+from tests.properties import examples
 from tests.scenes import curve, junction, lanes, scene, vehicle
 
 JUNCTION = PoseTool(junction())
@@ -200,6 +201,7 @@ MOVES = {
 }
 
 
+@examples(40)
 @given(
     arguments=any_json
     | st.fixed_dictionaries(
