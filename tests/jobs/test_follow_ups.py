@@ -48,7 +48,7 @@ from tests.scenes import vehicle
 from tests.variants.playing import agent, answer, block, car, rating
 from tests.web.cast import people, signed_in
 
-pytestmark = pytest.mark.django_db(transaction=True)
+pytestmark = pytest.mark.django_db
 
 State = Augmentation.State
 WISH, NEXT = "Add a parked car 20 m ahead.", "Four metres further, and make it a bus."
@@ -244,6 +244,7 @@ def test_a_follow_up_has_the_scene_of_what_it_follows() -> None:
         add_scenario(new)
 
 
+@pytest.mark.django_db(transaction=True)
 def test_the_stand_in_answers_follow_ups_and_the_careless_one_changes_the_rest() -> None:
     two_steps()
     with running(known=find_stored_tasks) as stand_in:
@@ -327,6 +328,7 @@ def test_a_step_tells_what_it_changed() -> None:
         assert step_changes(before, {"add": before["add"]}) == ["Agent7 no longer removed"]
 
 
+@pytest.mark.django_db(transaction=True)
 def test_a_task_is_found_by_the_text_of_its_instruction_however_it_is_spaced() -> None:
     assert find_stored_tasks(rows.INSTRUCTION) == []
     row = rows.add_scenario("street")
