@@ -27,12 +27,12 @@ from augment.scene.intent import (
     LaneChoice,
     LateralTarget,
     Nearness,
+    Request,
     Side,
     VehicleRequest,
 )
 
 _SIZES_M = {Body.VAN: (5.9, 2.0), Body.TRUCK: (8.0, 2.4)}
-_FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
 BUMPER_GAP_M = 1.0
 """Between neighbours in a row, where no distance is said."""
 SLIGHT_OFFSET_M = 0.75
@@ -86,7 +86,9 @@ def place_vehicles(
         return (give_motion(wish, ground, vehicle, rng),)
     apart_m = request.spacing.draw(rng) if request.spacing else _size_m(body)[0] + BUMPER_GAP_M
     d_m = _offset_m(request, ground, distance_m, rng)
-    turn_rad = turn_from_lane(request)
+    open_to = Facing.ACROSS if body is Body.BARRIER else Facing.WITH_LANE
+    facing_deg = (request.facing or open_to).turn_deg
+    turn_rad = math.radians(facing_deg) + math.radians(request.turn_deg)
     added = []
     for index in range(request.count or 1):
         centre = ground.beside(distance_m + index * apart_m, lane)
@@ -101,12 +103,6 @@ def place_vehicles(
         )
         added.append(agent if wish is None else give_motion(wish, ground, agent, rng))
     return tuple(added)
-
-
-def turn_from_lane(request: VehicleRequest) -> float:
-    """Return how far to the left of its lane's direction a vehicle is to be turned, in rad."""
-    open_to = Facing.ACROSS if request.body is Body.BARRIER else Facing.WITH_LANE
-    return _FACING_RAD[request.facing or open_to] + math.radians(request.turn_deg)
 
 
 def _offset_m(
@@ -141,8 +137,10 @@ def _offset_m(
     return side.sign * size_m
 
 
-def count_arrangements(request: CrashRequest) -> int:
-    """Return how many arrangements `place_crash` has for a request, the preferred one first."""
+def count_arrangements(request: Request) -> int:
+    """Return how many arrangements there are of a request, the preferred one first."""
+    if not isinstance(request, CrashRequest):
+        return 1
     return len(_SHIFTS_M if request.others else _LOOSER)
 
 
@@ -179,7 +177,7 @@ def _in_a_row(
     offset_m -= loose * _SIDES_M[0] if request.spot.lateral else 0.0
     along_m = distance_m
     for index in range(request.count or 2):
-        first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
+        first_rad = 0.0 if index else math.radians((request.facing or Facing.WITH_LANE).turn_deg)
         left_m = offset_m + loose * _SIDES_M[index]
         turn_rad = loose * _TURNS_RAD[index] + first_rad
 
@@ -205,7 +203,7 @@ def _chain_poses(
     """Each where the intent puts it against the one before; of the last ones nothing is said."""
     centre = ground.beside(distance_m, request.spot.lane)
     spot = ground.graph.place(centre.lane_id, centre.s_m, left_m).pose
-    poses = [spot.turn(_FACING_RAD[request.facing or Facing.WITH_LANE])]
+    poses = [spot.turn(math.radians((request.facing or Facing.WITH_LANE).turn_deg))]
     unsaid = (request.count or 0) - 1 - len(request.others)
     for other in [*request.others, *[CrashedCar()] * unsaid]:
         gap_m = None if other.gap is None else other.gap.draw(rng)

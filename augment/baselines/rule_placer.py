@@ -16,12 +16,7 @@ import numpy as np
 
 from augment.baselines.placed_motions import give_motion, is_on_other_arm
 from augment.baselines.placed_people import place_cones, place_walkers
-from augment.baselines.placed_vehicles import (
-    count_arrangements,
-    place_crash,
-    place_vehicles,
-    turn_from_lane,
-)
+from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
 from augment.checks.lanes_across import LanesAcross, find_picked, find_place, resolve_spots
@@ -90,12 +85,8 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
     sentences = [f"{name} is removed." for name in changes.removed]
     for move in resolved.moves:
         agent = find_picked(lanes, move.who)[0]
-        others = tuple(
-            agent_before
-            for agent_before in apply(scene, changes).agents
-            if agent_before.id != agent.id
-        )
-        fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
+        others = apply(scene, replace(changes, removed=(*changes.removed, agent.id)))
+        fitting = _Fitting(others, intent.route, rng)
         request = move.as_request(agent.type)
         if request.speed_mps is None and not move.stays:
             request = replace(request, speed_mps=agent.speed_mps)
@@ -209,13 +200,10 @@ class _Fitting:
         if is_open and request.spot.settings:
             asked_m, open_m = _find_inside(spans_m, asked_m), _FROM_END_M / 2.0
         draw = int(self._rng.integers(2**32))
-        arrangements = (
-            count_arrangements(request) if isinstance(request, intents.CrashRequest) else 1
-        )
         first_problem = ""
         best: tuple[int, _Agents, float] | None = None
         for shift_m, arrangement in itertools.product(
-            _shifts(wanted, open_m), range(arrangements)
+            _shifts(wanted, open_m), range(count_arrangements(request))
         ):
             distance_m = asked_m + math.copysign(shift_m, shift_m * asked_m)
             if is_open and find_off(distance_m, spans_m) > 0.0:
@@ -269,7 +257,8 @@ class _Fitting:
             of = replace(of, speed_mps=request.speed_mps)
         if request.facing is not None:
             lane = find_place(self._place.lanes, (of.x_m, of.y_m))
-            of = replace(of, heading_rad=wrap(lane.tangent_rad + turn_from_lane(request)))
+            turn_rad = math.radians(request.facing.turn_deg + request.turn_deg)
+            of = replace(of, heading_rad=wrap(lane.tangent_rad + turn_rad))
         # Who stands goes nowhere, and who is turned not where it went.
         ends = request.facing is not None or request.speed_mps == 0.0
         return replace(of, walk_to_m=None, motion=None) if ends else of

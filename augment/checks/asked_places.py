@@ -323,7 +323,7 @@ def _facing(case: Case, request: wish.CrashRequest, first: TrafficAgent) -> Iter
     band = case.lanes.band(request.spot.lane or wish.LaneChoice.OWN, case.ahead_m(first))
     if band is None or request.facing in (None, wish.Facing.WITH_LANE):
         return
-    wanted_deg = 90.0 if request.facing is wish.Facing.ACROSS else 180.0
+    wanted_deg = request.facing.turn_deg
     yield hold(
         FindingKind.ASKED_HEADING,
         [first],

@@ -17,8 +17,6 @@ _ON_ROAD_M = 1.0
 _ALONG_SHARE = 0.2
 """Who looks less than this across the road (some 12 degrees) looks along it."""
 _NO_FRONT = frozenset({Body.BARRIER, Body.CONSTRUCTION_SIGN, Body.TRAFFIC_CONE, Body.PEDESTRIAN})
-# To the left of the lane's direction.
-_FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS: 90.0}
 
 
 def check_count(case: Case) -> Iterator[Finding]:
@@ -90,7 +88,7 @@ def check_heading(case: Case) -> Iterator[Finding]:
         if request.body in _NO_FRONT and request.facing is None:
             continue
         facing = request.facing or Facing.WITH_LANE
-        wanted_deg = _FACING_DEG[facing] + request.turn_deg
+        wanted_deg = facing.turn_deg + request.turn_deg
         wanted = Bounds(wanted_deg, wanted_deg, case.tolerances.heading_deg)
         for agent in party.agents:
             band: Band | LanePlace | None = None

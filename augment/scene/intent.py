@@ -83,6 +83,11 @@ class Facing(StrEnum):
     AGAINST_LANE = "against the lane"
     ACROSS = "across the lane"
 
+    @property
+    def turn_deg(self) -> float:
+        """To the left of the lane's direction."""
+        return {"with the lane": 0.0, "against the lane": 180.0, "across the lane": 90.0}[self]
+
 
 class Shape(StrEnum):
     """Arrangement of cones."""
