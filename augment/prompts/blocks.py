@@ -43,8 +43,6 @@ _THOUGHTS_END = re.compile(
     r"|<\|channel\|>final\s*(?:<\|constrain\|>\w+)?<\|message\|>",
     re.IGNORECASE,
 )
-# Of an answer that is a document of its own: its end passes for a block without a word.
-_WRAPPER = re.compile(r"^[ \t]*`{3,}(?:markdown|md)[ \t]*\n", re.MULTILINE | re.IGNORECASE)
 _Loaded = TypeVar("_Loaded")
 
 
@@ -96,7 +94,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
     wished = re.compile(rf'"({"|".join(sorted(keys))})"\s*:\s*(?:\[\s*)?(?!null)[^\[\]\s]')
-    text = _WRAPPER.sub("", without_thoughts(answer))
+    text = without_thoughts(answer)
     # The last fence may lack its end; bare objects count where no fence holds a block.
     blocks = [match.group(1) for match in _FENCE.finditer(text)]
     blocks = blocks if any(map(named.search, blocks)) else _bare_objects(text)
@@ -177,9 +175,9 @@ def without_nulls(value: object, depth: int = 8) -> object:
     """Return a part of an answer without its nulls, for what is null is absent, to a depth."""
     if isinstance(value, list) and depth:
         return [without_nulls(part, depth - 1) for part in value]
-    if not isinstance(value, dict) or not depth:
-        return value
-    return {key: without_nulls(part, depth - 1) for key, part in value.items() if part is not None}
+    if isinstance(value, dict) and depth:
+        return {k: without_nulls(v, depth - 1) for k, v in value.items() if v is not None}
+    return value
 
 
 # Private

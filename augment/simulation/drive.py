@@ -1,8 +1,7 @@
 """The drive itself: plan, track, let traffic answer, 150 times; and who it is measured by."""
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -90,25 +89,26 @@ def run(
     traffic = Traffic(setting, road, body, states[0])
     objects, plans, at_end = [traffic.objects()], list[Plan](), False
     goal_m = _goal_m(setting, road, body)
-    with _exits_told():
+    try:
         planner.start(road, body)
-    for step in range(steps or STEPS[setting.scene.options.interplan is not None]):
-        if road.end_m < road.centreline.length_m:
-            at_end = road.centreline.station_of(states[-1]) + body.front_m >= road.end_m
-        if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
-            break
-        situation = Situation(step=step, ego=states[-1], objects=objects[-1])
-        with _exits_told():
+        for step in range(steps or STEPS[setting.scene.options.interplan is not None]):
+            if road.end_m < road.centreline.length_m:
+                at_end = road.centreline.station_of(states[-1]) + body.front_m >= road.end_m
+            if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
+                break
+            situation = Situation(step=step, ego=states[-1], objects=objects[-1])
             # Of a copy, for whoever computes in place: a drive is not to change by it.
             plans.append(planner.plan(deepcopy(situation)))
-        # (1, T, 3) in, (1, 2, 6) out: one reference, the state now and after one step.
-        following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
-        # With the ego of the same moment: neither side knows the other's next step.
-        traffic.step(states[-1], objects[-1])
-        states.append(following)
-        objects.append(traffic.objects())
-        if after_step is not None:
-            after_step(step + 1)
+            # (1, T, 3) in, (1, 2, 6) out: one reference, the state now and after one step.
+            following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
+            # With the ego of the same moment: neither side knows the other's next step.
+            traffic.step(states[-1], objects[-1])
+            states.append(following)
+            objects.append(traffic.objects())
+            if after_step is not None:
+                after_step(step + 1)
+    except SystemExit as error:  # it would end worker after worker
+        raise CannotDrive(f"The planner ended the process: exit {error.code!r}.") from error
     return Drive(
         road=road,
         body=body,
@@ -118,15 +118,6 @@ def run(
         at_map_end=at_end,
         recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
     )
-
-
-@contextmanager
-def _exits_told() -> Iterator[None]:
-    """Let a planner that exits fail its drive, for it would end worker after worker."""
-    try:
-        yield
-    except SystemExit as error:
-        raise CannotDrive(f"The planner ended the process: exit {error.code!r}.") from error
 
 
 def _goal_m(setting: DriveSetting, road: Road, body: EgoBody) -> float:

@@ -1,8 +1,7 @@
 """Planners by name, and anybody's own by the dotted path of its class."""
 
 import importlib
-from collections.abc import Callable, Collection
-from functools import partial
+from collections.abc import Collection
 
 from augment.errors import CannotDrive, UnknownName, check_names
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
@@ -31,12 +30,10 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
         CannotDrive: The path leads to nothing, or to something that is no planner.
     """
     check_names("offsets", [offsets], OFFSETS_M)
-    planners: dict[str, Callable[[], Planner]] = {
-        PDM_CLOSED: partial(PdmClosed, OFFSETS_M[offsets]),
-        IDM: IdmPlanner,
-    }
-    if name in planners:
-        return planners[name]()
+    if name == PDM_CLOSED:
+        return PdmClosed(OFFSETS_M[offsets])
+    if name == IDM:
+        return IdmPlanner()
     paths = [path for path in allowed if "." in path]
     if name not in paths:
         raise UnknownName("planner", name, [*NAMED, *paths])

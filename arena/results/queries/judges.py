@@ -1,7 +1,7 @@
 """Judge models' answers about a study's pairs. They are no experts: no rating counts them."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from django.db.models import Count, F, Q, QuerySet, Sum
@@ -109,13 +109,8 @@ def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
             continue
         name, rows, own = judge_name(run), [*by_pair.values()], {*_own_family(study, run)}
         preferences[name] = _preferences(rows)
-        strangers = [
-            row
-            for row in rows
-            if own.isdisjoint((row.left.contestant.slug, row.right.contestant.slug))
-        ]
         if own:
-            preferences[name + WITHOUT_FAMILY] = _preferences(strangers)
+            preferences[name + WITHOUT_FAMILY] = _preferences(rows, without=own)
     return preferences
 
 
@@ -188,8 +183,11 @@ def _own_family(study: Study, run: JudgeRun) -> dict[str, str]:
     }
 
 
-def _preferences(rows: list[PairJudgement]) -> dict[tuple[str, str], int]:
+def _preferences(
+    rows: list[PairJudgement], without: Collection[str] = ()
+) -> dict[tuple[str, str], int]:
     return {
         (str(row.left.code), str(row.right.code)): combine_answers(row.first, row.second)
         for row in rows
+        if not {row.left.contestant.slug, row.right.contestant.slug} & {*without}
     }

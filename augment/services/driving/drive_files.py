@@ -8,6 +8,7 @@ own three files alone, so that all parts together are one run byte for byte.
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ from augment.formats.documents import read_json
 from augment.scene import codec
 from augment.services.driving.simulations import NUPLAN, Options, drive_document, load_planner
 from augment.simulation.drive import find_expert, run
-from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
 from augment.simulation.trace import FORMAT
 from augment.simulation.traffic import DriveSetting
@@ -85,15 +85,12 @@ def _setting(source: Path, name: str, options: Options) -> DriveSetting:
 
 
 def _drive(setting: DriveSetting, options: Options) -> dict[str, Any]:
-    road = Road(setting.scene, setting.recording)
-    drove = run(setting, load_planner(options, also=(options.planner,)), road=road)
-    score = score_drive(drove, find_expert(setting, road), modification=setting.modification)
+    drove = run(setting, load_planner(options, also=(options.planner,)))
+    expert = find_expert(setting, drove.road)
+    score = score_drive(drove, expert, modification=setting.modification)
     return {
         "format": FORMAT,
-        "version": options.version,
-        "planner": options.planner,
-        "offsets": options.offsets,
-        "is_reactive": options.is_reactive,
+        **asdict(options),
         "score": score.value,
         "kind": NUPLAN,
         **drive_document(drove, {ScoreKind.NUPLAN: score}),

@@ -137,17 +137,12 @@ def _lines(
     sets = find_sets(ranked, apart)
     name = contestant.name if contestant else str(subject.label)
     line = partial(PlannerLine, name=name, contestant=contestant)
+
+    def letters(planner: str) -> str:
+        return "".join(sign for sign, one in zip(LETTERS, sets, strict=False) if planner in one)
+
     return (
-        *(
-            line(
-                planner=planner,
-                estimate=estimate,
-                sets="".join(
-                    letter for letter, one in zip(LETTERS, sets, strict=False) if planner in one
-                ),
-            )
-            for planner, estimate in means.items()
-        ),
+        *(line(planner=who, estimate=mean, sets=letters(who)) for who, mean in means.items()),
         *(
             line(planner=one.first, against=one.second, estimate=one.estimate, p_holm=one.p_holm)
             for one in differences

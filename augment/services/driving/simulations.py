@@ -4,6 +4,7 @@ import json
 import zlib
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 from django.conf import settings
@@ -23,7 +24,6 @@ from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, find_expert, run
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
-from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.trace import blind_trace, make_trace
 from augment.simulation.traffic import VERSION, DriveSetting
@@ -130,20 +130,12 @@ class Drives(WorkKind[Simulation]):
         if row.version != VERSION:
             raise CannotDrive(f"Version {row.version} of drives is no more; simulate it anew.")
         setting = _load_setting(row)
-        road = Road(setting.scene, setting.recording)
         planner = load_planner(row, also=self._also)
-        drove = run(setting, planner, road=road, after_step=lambda step: held.insist())
-        expert = find_expert(setting, road)
-        scores = {
-            kind: score_drive(
-                drove,
-                expert,
-                kind=kind,
-                scenario_type=find_type(row.scenario.type),
-                modification=setting.modification,
-            )
-            for kind in ScoreKind
-        }
+        drove = run(setting, planner, after_step=lambda step: held.insist())
+        expert = find_expert(setting, drove.road)
+        score = partial(score_drive, drove, expert, modification=setting.modification)
+        scenario_type = find_type(row.scenario.type)
+        scores = {kind: score(kind=kind, scenario_type=scenario_type) for kind in ScoreKind}
         trace = make_trace(setting, drove, scores[ScoreKind.NUPLAN])
         columns = {
             **{SCORES[kind.value]: score.value for kind, score in scores.items()},
