@@ -430,8 +430,7 @@ class Move:
     """A road user of the scene that is to stand or drive elsewhere, or to move otherwise.
 
     Attributes:
-        spot: Where it belongs; the sides and distances are as for what is added. Where it is open
-            the road user stays.
+        spot: Where it belongs, sides and distances as for what is added; open where it stays.
         speed_mps: None where it keeps its speed.
     """
 
