@@ -22,6 +22,9 @@ VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 150.0], "width": 1200, "height": 300
 BOUNCE_MS = 210
 """A press sooner than this after a pair appeared is ignored, as the second of a double one."""
 
+TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+"""How many pixels of a page are beyond its window."""
+
 HERE = {"locale": "en-GB", "timezone_id": "UTC"}
 """Where the browser says that it is."""
 

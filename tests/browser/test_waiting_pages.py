@@ -17,7 +17,7 @@ from augment.models import BaseScene, SceneUpload
 from augment.services.benchmarks.benchmarks import BenchmarkRequest, make_benchmark
 from augment.services.scenarios.pictures import draw_scene
 from tests.board_rows import a_batch, a_board, newcomer, published, voted
-from tests.browser.booth import PHONE, Booth
+from tests.browser.booth import PHONE, TOO_WIDE, Booth
 from tests.browser.chromium import PATIENCE_MS
 from tests.browser.test_voting_page import faults
 from tests.jobs.rows import add_scenario
@@ -95,9 +95,6 @@ def test_the_button_of_an_invitation_leads_to_the_first_pair(booth: Booth) -> No
     page.wait_for_url(f"**{reverse('vote', args=[booth.study.code])}")
     expect(page.get_by_role("button", name="A ist besser")).to_be_visible()
     context.close()
-
-
-TOO_WIDE = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
 @pytest.mark.slow
