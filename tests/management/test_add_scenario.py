@@ -72,3 +72,86 @@ def test_a_reference_that_can_not_be_read_or_does_not_fit_is_refused(tmp_path: P
     assert "add[0].x_m" in refused(reference=file)
     assert "holds null" in refused(reference=reference(tmp_path, "null"))
     assert "No such file" in refused(reference=tmp_path / "gone.json")
+
+
+# --- Many from one file: all of them, or none and every error with its row --------------------
+
+IN_CSV = CHANGE.replace('"', '""')
+CSV = f"""scene,type,instruction,slug,keep_traffic,reference
+street,cut_in,"Let a car cut in, closely.",one,yes,
+street,jaywalking_pedestrian,Let somebody cross.,,,"{IN_CSV}"
+"""
+YAML = """
+- {scene: street, type: cut_in, instruction: Let a car cut in.}
+- {scene: street, type: cut_in, instruction: And another., keep_traffic: true}
+- scene: street
+  type: jaywalking_pedestrian
+  instruction: Let somebody cross.
+  reference:
+""" + json.dumps(json.loads(CHANGE), indent=2).replace("\n", "\n    ").replace("{", "    {", 1)
+
+
+def add(folder: Path, name: str, text: str) -> None:
+    (folder / name).write_text(text)
+    call_command("add_scenario", "--file", str(folder / name))
+
+
+def test_a_csv_file_is_added_row_by_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    add(tmp_path, "many.csv", CSV)
+    assert capsys.readouterr().out.splitlines() == [
+        "Added scenario one.",
+        "Added scenario street-jaywalker-1.",
+        "2 scenarios.",
+    ]
+    one = Scenario.objects.get(slug="one")
+    assert (one.type, one.type_label, one.keep_traffic) == ("cut_in", "Cut-in", True)
+    assert one.instruction == "Let a car cut in, closely."
+    assert Scenario.objects.get(slug="street-jaywalker-1").reference is not None
+
+
+def test_a_yaml_file_is_added_too(tmp_path: Path) -> None:
+    add(tmp_path, "many.yaml", YAML)
+    made = Scenario.objects.filter(type="cut_in").order_by("slug")
+    assert [(row.slug, row.keep_traffic) for row in made] == [
+        ("street-cut-in-1", False),
+        ("street-cut-in-2", True),
+    ]
+    assert Scenario.objects.get(slug="street-jaywalker-1").reference == json.loads(CHANGE)
+
+
+def test_one_bad_row_keeps_all_out_and_every_error_is_named(tmp_path: Path) -> None:
+    wrong = (
+        CSV
+        + """nowhere,cut_in,Something.,,,
+street,cut_in,Something.,,maybe,
+street,cut_in,,,,
+"""
+    )
+    with pytest.raises(CommandError) as refused:
+        add(tmp_path, "many.csv", wrong)
+    said = str(refused.value)
+    for words in (
+        "row 3: Unknown scene 'nowhere'",
+        "row 4.keep_traffic: 'maybe' must be yes or no",
+        "row 5.instruction: is missing",
+    ):
+        assert words in said
+    assert not Scenario.objects.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("many.txt", CSV, "must end in .csv, .yaml or .yml"),
+        ("many.csv", "scene,type\n", "0 rows"),
+        ("many.csv", "scene,colour\nstreet,red\n", "row 1.colour: is no column"),
+        ("many.yaml", "a: 1", "a list of mappings is needed"),
+        ("many.yaml", "- {scene: 3, type: cut_in, instruction: x}", "row 1.scene: 3 must be text"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(tmp_path: Path, name: str, text: str, words: str) -> None:
+    with pytest.raises(CommandError) as refused:
+        add(tmp_path, name, text)
+    assert words in str(refused.value)
