@@ -1,6 +1,10 @@
+import io
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
+from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.errors import NotYours, StudyStillOpen
@@ -98,14 +102,12 @@ def test_who_may_see_results() -> None:
 def test_opening_results_early_is_logged_once_and_ends_voting() -> None:
     study = a_study()
     matchup = matchups_of(study, "eva")[0]
-    vote(matchup)
     for _ in range(2):
         open_early(study=study, actor=matchup.expert)
     logged = Event.objects.get(verb="look early")
     assert logged.after == {"what": "results", "ends_voting": True}
     with pytest.raises(NotYours):
-        vote(matchups_of(study, "eva")[1])
-    vote(matchups_of(study, "finn")[0])
+        vote(matchup)
     with pytest.raises(Conflict, match="is closed: nothing is opened early"):
         open_early(study=close_study(study=study), actor=matchup.expert)
 
@@ -210,3 +212,41 @@ def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_
     RATINGS.perform(snapshot.pk)
     snapshot.refresh_from_db()
     assert (snapshot.state, snapshot.reason != "", snapshot.progress) == ("ready", True, 100)
+
+
+# --- By commands -------------------------------------------------------------------------------
+
+
+def run(*arguments: object) -> str:
+    out = io.StringIO()
+    call_command(*[str(argument) for argument in arguments], stdout=out, stderr=io.StringIO())
+    return out.getvalue()
+
+
+def open_arguments() -> list[object]:
+    cast = cast_of()
+    shown = ["--contestants", *cast["contestants"], "--scenarios", *cast["scenarios"]]
+    people = ["--experts", *cast["experts"], "--votes-per-expert", 6, "--seed", 1]
+    return ["open_study", "Round 1", *shown, *people]
+
+
+def test_a_study_is_opened_closed_rated_and_exported_by_commands(tmp_path: Path) -> None:
+    assert "12 matchups for 2 experts" in run(*open_arguments())
+    assert run("close_study", "Round 1") == "Closed 'Round 1'.\n"
+    assert "There are no votes to rate." in run("rate", "Round 1")
+    run("export", "leaderboard", "Round 1", "--format", "json", "--out", tmp_path / "board.json")
+    assert json.loads((tmp_path / "board.json").read_text())["study"] == "Round 1"
+    assert {path.name for path in tmp_path.iterdir()} == {"board.json", "media"}
+
+
+def test_hypotheses_of_a_repeated_option_are_all_frozen() -> None:
+    lines = ["Nobody is perfect.", "Nobody is alike.", "Nobody is last."]
+    run(*open_arguments(), "--hypotheses", *lines[:2], "--hypotheses", lines[2])
+    assert [one["text"] for one in Study.objects.get().rules["hypotheses"]] == lines
+
+
+def test_a_hyphen_is_standard_output() -> None:
+    run("rate", voted_study().name)
+    assert run("export", "leaderboard", "Round 1", "--out", "-").startswith("rank,model,elo,")
+    with pytest.raises(CommandError, match="name a file"):
+        run("export", "leaderboard", "Round 1", "--format", "png", "--out", "-")

@@ -80,10 +80,12 @@ def test_a_table_rates_the_pooled_votes_on_the_scale_of_the_first_study(board: B
     assert np.mean([found[slug] or 0 for slug in ("ann", "bob", "cid")]) == pytest.approx(1000)
 
 
-def test_a_table_counts_ties_that_nobody_was_shown_apart(board: Board) -> None:
+def test_a_table_marks_what_is_simulated_and_ties_that_nobody_was_shown(board: Board) -> None:
     study = board.studies.get()
     study.rules["identical"] = [["place-0", "ann", "bob"], ["place-1", "ann", "bob"]]
+    study.allow_simulated = True
     study.save()
+    Contestant.objects.filter(slug="cid").update(kind=Contestant.Kind.SIMULATED)
     table = published(board, 1)
     document = table.document
     ties = document.settled_ties or 0
@@ -98,6 +100,10 @@ def test_a_table_counts_ties_that_nobody_was_shown_apart(board: Board) -> None:
     last = ["settled_ties", "remarks", "submitted", "withdrawn", "provisional"]
     assert list(rows[0])[-5:] == last
     assert {row["remarks"] for row in rows} == {" ".join(document.notes)}
+    assert json.loads(table.files["json"])["includes_simulated"]
+    assert {row["simulated"] for row in rows if row["slug"] == "cid"} == {"yes"}
+    assert "Simulated votes and contestants count here" in table.files["html"]
+    assert "(simulated)" in table.files["svg"]
     for row in rows:
         assert int(row["votes"]) == sum(int(row[name]) for name in ("wins", "ties", "losses"))
     assert sum(int(row["votes"]) for row in rows) == 72

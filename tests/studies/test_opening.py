@@ -25,24 +25,13 @@ from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_checks
 from tests.opening import open_study
 from tests.scenes import vehicle
-from tests.study_rows import (
-    KINDS,
-    Cast,
-    a_study,
-    cast_of,
-    contestant,
-    expert,
-    picture,
-    scenario,
-    vote,
-)
+from tests.study_rows import KINDS, Cast, cast_of, contestant, expert, picture, scenario, vote
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
 
-def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> None:
-    study = a_study(votes_per_expert=9)
+def test_an_open_study_has_the_plan_that_its_stored_rules_give_again(study: Study) -> None:
     assert study.state == Study.State.OPEN
     assert study.opened_at is not None
     per_expert = Counter(study.matchups.values_list("expert__username", flat=True))
@@ -50,9 +39,6 @@ def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> Non
     event = Event.objects.get(verb="open")
     assert event.object_code == str(study.code)
     assert event.after == {"name": "Round 1", "matchups": 18, "seed": 7}
-
-
-def test_the_stored_rules_give_the_stored_plan_again_also_those_of_before(study: Study) -> None:
     study.refresh_from_db()
     planned = plan(frozen_rules(study))
     stored = study.matchups.order_by("expert__username", "position").values_list(

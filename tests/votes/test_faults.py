@@ -66,22 +66,20 @@ def test_every_expert_gets_every_finished_augmentation_once(job: GenerationJob, 
         opened(job, "eva", seed=2)
 
 
-def test_a_label_keeps_faults_a_note_and_what_was_guessed(job: GenerationJob, eva: User) -> None:
+def test_a_label_of_ones_own_keeps_faults_a_note_and_what_was_guessed(
+    job: GenerationJob, eva: User
+) -> None:
     first, second = tasks_of(opened(job, "eva"), eva)
     label = save(first, P, L, note=" in the kerb ")
     assert (label.position, label.heading, label.logic) == (True, False, True)
     assert label.note == "in the kerb"
     assert label.guessed_heading is False
     assert not save(second).position
-
-
-def test_nobody_labels_for_somebody_else(job: GenerationJob, eva: User) -> None:
     finn = expert("finn")
-    labelling = opened(job, "eva")
     with pytest.raises(NotYours):
-        save_label(expert=finn, task_code=tasks_of(labelling, eva)[0].code, faults=frozenset())
+        save_label(expert=finn, task_code=first.code, faults=frozenset())
     with pytest.raises(NotYours):
-        labelling_progress(expert=finn, code=labelling.code)
+        labelling_progress(expert=finn, code=first.labelling.code)
 
 
 def test_the_database_takes_a_label_each_and_a_whole_guess(job: GenerationJob, eva: User) -> None:

@@ -3,8 +3,6 @@
 from typing import Any
 
 import pytest
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 
 from arena.errors import AlreadyDecided, InvalidVote
 from arena.models import Study, Vote
@@ -16,7 +14,6 @@ from arena.studies.queries import count_progress
 from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import own_votes, tallies, upcoming, voting_progress
 from augment.errors import Conflict, UnknownName
-from tests.api.asking import signed_in
 from tests.opening import open_study
 from tests.study_rows import a_study, cast_of, matchups_of, shown_again, vote
 
@@ -138,19 +135,3 @@ def test_only_known_questions_each_once_can_be_asked() -> None:
         with pytest.raises(Conflict, match="primary one first"):
             open_study(**rules, questions=asked)
     assert open_study(**rules, questions=[]).questions == ["instruction"]
-
-
-def test_one_vote_takes_as_many_queries_as_with_one_question() -> None:
-    counts: dict[str, int] = {}
-    for name, asked in (("Round 1", ["instruction"]), ("Round 2", ASKED)):
-        study = a_study(votes_per_expert=3) if not counts else Study.objects.get()
-        Study.objects.update(questions=asked)
-        client = signed_in("eva")
-        matchup = matchups_of(study, "eva")[len(counts)]
-        body = {"key": str(matchup.code), "matchup": str(matchup.code), "outcome": "A"}
-        with CaptureQueriesContext(connection) as asked_for:
-            answer = client.post("/api/v1/votes", body, content_type="application/json")
-        coming = [one["matchup"] for one in answer.json()["next"]]
-        assert (body["matchup"] in coming) == (len(asked) > 1)
-        counts[name] = len(asked_for)
-    assert counts["Round 2"] == counts["Round 1"]
