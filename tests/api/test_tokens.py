@@ -104,19 +104,15 @@ def api_admin() -> User:
     return User.objects.create_superuser("another")
 
 
-def test_a_paused_owners_token_opens_nothing() -> None:
+def test_a_token_ends_at_its_time_or_when_its_owner_is_paused() -> None:
     accounts = people()
-    asking = program_of(accounts["researcher"])
-    set_active(user=accounts["researcher"], is_active=False, actor=accounts["admin"])
-    error_of(asking.get(STUDIES), 401, "signed_out")
-
-
-def test_a_token_ends_at_its_time() -> None:
-    secret = secret_of(people()["expert"])
+    asking, other = program_of(accounts["expert"]), program_of(accounts["researcher"])
     ApiToken.objects.update(expires_at=timezone.now() + timedelta(seconds=60))
-    assert role_at(program(secret)) == "expert"
+    assert role_at(asking) == "expert"
+    set_active(user=accounts["researcher"], is_active=False, actor=accounts["admin"])
+    error_of(other.get(STUDIES), 401, "signed_out")
     ApiToken.objects.update(expires_at=timezone.now())
-    error_of(program(secret).get(STUDIES), 401, "signed_out")
+    error_of(asking.get(STUDIES), 401, "signed_out")
 
 
 def test_a_wrong_token_is_401_even_beside_a_session() -> None:

@@ -138,7 +138,7 @@ def secrets_of(study: Study) -> list[str]:
     """Everything that tells who made a picture, or which pictures were made together."""
     told = ["llama", "otm", "hosted"]
     for contestant in study.contestants.all():
-        told += [contestant.slug, str(contestant.code)]
+        told += [contestant.slug, contestant.name, str(contestant.code)]
         card = contestant.card or {}
         told += [card.get("name", ""), card.get("method", ""), *card.get("models", ())]
     for row in Augmentation.objects.select_related("job"):

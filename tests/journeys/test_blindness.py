@@ -96,6 +96,8 @@ def test_following_every_link_tells_nothing(eva: Client, study: Study) -> None:
     for part, what in (("/i/", "picture"), ("/vote/", "voting page"), ("/label/", "labelling")):
         assert any(part in address for address in seen), f"the crawl saw no {what}"
     assert leaks(study, seen) == []
+    for page in ("/", f"/studies/{study.code}/vote/"):
+        assert not re.search(rb"(?i)\b(model|LLM|generated|ground truth)\b", seen[page].body), page
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from django.test import Client
 
 from arena.models import Study
 from arena.people.services import create_person
-from augment.models import Augmentation, Contestant, GenerationJob
+from augment.models import Augmentation, GenerationJob
 from augment.services.scenarios.pictures import store
 from tests import study_rows
 from tests.jobs import rows
@@ -104,9 +104,3 @@ def world() -> World:
         augmentation=job.augmentations.first() or Augmentation(),
         expert=User.objects.get(username="eva"),
     )
-
-
-def names_of_contestants() -> list[str]:
-    """Every word that would tell an expert who made what."""
-    found = Contestant.objects.values_list("slug", "name", "code")
-    return [str(word) for row in found for word in row]

@@ -180,9 +180,8 @@ def test_the_button_plans_the_drives_and_queues_them(
     assert len(waiting) == 1
 
 
-@pytest.mark.parametrize("planner", ["pdm-open", "tests.jobs.test_simulations.Straight"])
-def test_a_page_drives_with_the_projects_own_planners_alone(planner: str, admin: Client) -> None:
-    job = launched()
+def test_a_page_drives_with_the_projects_own_planners_alone(admin: Client) -> None:
+    job, planner = launched(), "tests.jobs.test_simulations.Straight"
     sent = {"planner": planner}
     shown = admin.post(reverse("job-simulate", args=[job.code]), sent, follow=True)
     assert planner in shown.content.decode()

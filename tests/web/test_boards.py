@@ -95,22 +95,3 @@ def test_a_board_grows_by_pages_alone_and_anybody_reads_it_by_its_link(tmp_path:
 
     admin.post(reverse("board-unshare", args=[board.code]))
     assert stranger.get(address).status_code == 404
-
-
-def test_what_is_simulated_says_so_in_every_file(admin: Client) -> None:
-    study = voted(a_study(votes_per_expert=18, contestants=("ann", "bob"), scenarios=18))
-    Contestant.objects.filter(slug="bob").update(kind=Contestant.Kind.SIMULATED)
-    Study.objects.filter(pk=study.pk).update(allow_simulated=True)
-    asked = {"name": "City", "study": str(study.code), "provisional_above": "50"}
-    admin.post(reverse("boards"), asked)
-    board = Board.objects.get()
-    admin.post(reverse("board-publish", args=[board.code]))
-    files = board.tables.get().files
-    assert "Simulated votes and contestants count here" in files["html"]
-    assert json.loads(files["json"])["includes_simulated"]
-    assert "(simulated)" in files["svg"]
-    assert ",yes," in files["csv"] or ",true," in files["csv"].lower()
-    assert (
-        "Simulated votes and contestants count"
-        in admin.get(reverse("board", args=[board.code])).content.decode()
-    )

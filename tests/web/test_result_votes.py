@@ -21,7 +21,7 @@ from augment.models import Augmentation
 from augment.services.scenarios.pictures import store
 from tests.mixed_study import mixed_study
 from tests.study_rows import a_study, hang, vote
-from tests.web.cast import png, signed_in
+from tests.web.cast import png
 
 pytestmark = pytest.mark.django_db
 
@@ -125,26 +125,6 @@ def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, researcher: Client)
         assert said in page, said
     address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
     assert researcher.get(address).status_code == 404
-
-
-def test_an_open_study_keeps_its_votes_until_an_early_look(researcher: Client) -> None:
-    study = mixed_study(close=False)
-    rate(study=study, rounds=10, early=True)
-    vote = Vote.objects.latest("pk")
-    addresses = [
-        reverse("results-votes", args=[study.code]),
-        reverse("results-votes-file", args=[study.code]),
-        reverse("shown-picture", args=[study.code, vote.matchup.code, "left"]),
-    ]
-    hang(vote.shown_left, store(png(7)))
-    assert [researcher.get(address).status_code for address in addresses] == [403] * 3
-    eva = signed_in(vote.expert)
-    researcher.post(reverse("results-open", args=[study.code]))
-    for address in addresses:
-        answer = researcher.get(address)
-        b"".join(answer)
-        assert answer.status_code == 200, address
-        assert eva.get(address).status_code == 403
 
 
 def test_ties_that_nobody_was_shown_are_told_apart_from_votes(

@@ -212,6 +212,9 @@ def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> Non
     researcher.post(reverse("study-rate", args=[study.code]))
     shown = researcher.get(address).content.decode()
     assert "you opened its results early" in shown
+    votes = reverse("results-votes", args=[study.code])
+    eva = signed_in(study.experts.get(username="eva"))
+    assert (researcher.get(votes).status_code, eva.get(votes).status_code) == (200, 403)
     assert "Early look" not in shown, "one note says that the study is open"
     early = study.snapshots.latest("pk")
     close_study(study=study)
