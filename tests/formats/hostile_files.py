@@ -200,6 +200,15 @@ def opendrive_of_a_million_lane_sections(root: Path) -> Made:
     return _text(root, "opendrive", by_hand(lanes='<laneSection s="0"/>' * 1_000_000))
 
 
+def opendrive_that_laughs_a_billion_times(root: Path) -> Made:
+    _, bomb = commonroad_that_laughs_a_billion_times(root)
+    return "opendrive", bomb
+
+
+def opendrive_of_widths_that_are_none(root: Path) -> Made:
+    return _text(root, "opendrive", by_hand(width=WIDTH.replace("3.5", "NaN")))
+
+
 def opendrive_of_roads_that_follow_each_other_in_circles(root: Path) -> Made:
     """Twenty there and twenty back, each joined to all of the others: 20 ** 8 ways."""
     there, back = range(2, 22), range(22, 42)
@@ -226,6 +235,12 @@ def openscenario_whose_catalogs_lie_elsewhere(root: Path) -> Made:
     refers = '<CatalogReference catalogName="Cars" entryName="car"/>'
     text = openscenario_files.scenario(other=refers).replace(openscenario_files.CAR, refers)
     return "openscenario", openscenario_files.write(inner, text)
+
+
+def openscenario_of_a_power_of_powers(root: Path) -> Made:
+    at = '<LanePosition roadId="1" laneId="-1" s="${9 ** 9 ** 9 ** 9}"/>'
+    text = openscenario_files.scenario().replace(openscenario_files.EGO_AT, at)
+    return "openscenario", openscenario_files.write(root, text)
 
 
 def openscenario_that_is_nested_without_an_end(root: Path) -> Made:

@@ -1,6 +1,7 @@
 """Whatever is done to the bytes of a good file, it is read or refused in our own words."""
 
 import shutil
+import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -95,3 +96,30 @@ def _damaged(block: bytes, data: st.DataObject) -> bytes:
         case "twice":
             made[start:start] = made[start : start + 200]
     return bytes(made)
+
+
+VALUES = ("NULL", "''", "'x'", "-1", "1e400", "1e15", "9223372036854775807", "x'ff'", "0.5")
+
+
+@examples(30)
+@given(data=st.data())
+def test_any_value_in_any_column_of_a_database_is_read_or_refused(
+    good: dict[str, Path], data: st.DataObject
+) -> None:
+    with tempfile.TemporaryDirectory() as root:
+        folder = Path(root) / "all"
+        shutil.copytree(good["nuplan"].parent, folder)
+        files = sorted(folder.rglob("*.db")) + sorted(folder.rglob("*.gpkg"))
+        file = data.draw(st.sampled_from(files))
+        base = sqlite3.connect(file)
+        named = "SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name"
+        table = data.draw(st.sampled_from([name for (name,) in base.execute(named)]))
+        columns = [row[1] for row in base.execute(f"PRAGMA table_info({table})")]
+        change = f"UPDATE {table} SET {data.draw(st.sampled_from(columns))} = "
+        # A column may refuse a value itself.
+        with suppress(sqlite3.IntegrityError, sqlite3.OperationalError):
+            base.execute(change + data.draw(st.sampled_from(VALUES)))
+        base.commit()
+        base.close()
+        with suppress(InvalidDocument):
+            read_whole("nuplan", folder / "made.db", item=nuplan_files.token(100).hex())

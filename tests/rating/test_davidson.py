@@ -5,7 +5,8 @@ import math
 import pytest
 
 from arena.rating.chains import Status
-from arena.rating.leaderboard import Method
+from arena.rating.leaderboard import Method, rate
+from arena.rating.rules import Unit
 from tests.rating.votes import by_votes, named, simulated, versus
 
 
@@ -23,6 +24,13 @@ def test_without_ties_it_is_bradley_terry() -> None:
     one, other = (by_votes(votes, method=m) for m in (Method.DAVIDSON, Method.BRADLEY_TERRY))
     assert [line.rating for line in one.lines] == [line.rating for line in other.lines]
     assert one.tie_strength is None
+
+
+def test_it_has_intervals_by_every_unit() -> None:
+    votes = simulated([1080.0, 1000.0, 920.0], 900, 3, ties=0.4)
+    for unit in Unit:
+        for line in rate(votes, method=Method.DAVIDSON, unit=unit, rounds=300).lines:
+            assert line.lower < line.rating < line.upper
 
 
 def test_scores_by_ties_only_are_no_limit_in_this_model_and_said_to_be_none() -> None:
