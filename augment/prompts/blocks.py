@@ -43,6 +43,8 @@ _THOUGHTS_END = re.compile(
     r"|<\|channel\|>final\s*(?:<\|constrain\|>\w+)?<\|message\|>",
     re.IGNORECASE,
 )
+# Of an answer that is a document of its own: its end passes for a block without a word.
+_WRAPPER = re.compile(r"^[ \t]*`{3,}(?:markdown|md)[ \t]*\n", re.MULTILINE | re.IGNORECASE)
 _Loaded = TypeVar("_Loaded")
 
 
@@ -94,7 +96,7 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
     wished = re.compile(rf'"({"|".join(sorted(keys))})"\s*:\s*(?:\[\s*)?(?!null)[^\[\]\s]')
-    text = without_thoughts(answer)
+    text = _WRAPPER.sub("", without_thoughts(answer))
     # The last fence may lack its end; bare objects count where no fence holds a block.
     blocks = [match.group(1) for match in _FENCE.finditer(text)]
     blocks = blocks if any(map(named.search, blocks)) else _bare_objects(text)

@@ -83,6 +83,7 @@ def test_the_last_block_with_the_keys_counts() -> None:
         f"  ```json\n{block(agent())}\n  ```",
         f"```json\n{block(agent())}",
         f"```markdown\nSummary: x\n```json\n{block(agent())}\n```\n```",
+        f'```markdown\nThe "add": one car\n```json\n{block(agent())}\n```\n```',
         f"<THINK>```json\n{DRAFT}\n```</THINK >{GOOD}",
         f'```json\n{{"remove": []}}\n```\n```json\n{{"add": [{json.dumps(agent())}]}}\n```',
         GOOD + '\n```json\n{"Action": "add"}\n```',
