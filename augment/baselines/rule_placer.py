@@ -235,7 +235,7 @@ class _Fitting:
         if of is not None:
             wish: MotionWish | None = getattr(request, "motion", None)
             if isinstance(request, intents.VehicleRequest):
-                of = self._turn(request, of)
+                of = self._change_in_place(request, of)
             return (_round(of if wish is None else give_motion(wish, self._place, of, rng)),)
         along = self._place.over(request.spot.via)
         match request:
@@ -251,16 +251,19 @@ class _Fitting:
                 raise AssertionError("a door is of somebody")
         return tuple(map(_round, agents))
 
-    def _turn(self, request: intents.VehicleRequest, of: TrafficAgent) -> TrafficAgent:
+    def _change_in_place(self, request: intents.VehicleRequest, of: TrafficAgent) -> TrafficAgent:
         """Return a road user where it is, turned and as fast as is asked for."""
         if request.speed_mps is not None:
-            of = replace(of, speed_mps=request.speed_mps)
+            # Speeds of its motion would have it go on as fast as before.
+            motion = of.motion and replace(of.motion, speeds=())
+            of = replace(of, speed_mps=request.speed_mps, motion=motion)
         if request.facing is not None:
             lane = find_place(self._place.lanes, (of.x_m, of.y_m))
             turn_rad = math.radians(request.facing.turn_deg + request.turn_deg)
             of = replace(of, heading_rad=wrap(lane.tangent_rad + turn_rad))
-        # Who stands goes nowhere, and who is turned not where it went.
-        ends = request.facing is not None or request.speed_mps == 0.0
+        # Who stands until the end goes nowhere, and who is turned not where it went.
+        stays = request.speed_mps == 0.0 and request.motion is None
+        ends = request.facing is not None or stays
         return replace(of, walk_to_m=None, motion=None) if ends else of
 
     def _judge(

@@ -85,7 +85,7 @@ class Facing(StrEnum):
 
     @property
     def turn_deg(self) -> float:
-        """To the left of the lane's direction."""
+        """Angle to the left of the lane's direction, in degrees."""
         return {"with the lane": 0.0, "against the lane": 180.0, "across the lane": 90.0}[self]
 
 

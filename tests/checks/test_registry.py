@@ -122,10 +122,10 @@ FACING = {"nudge-ferry-road", "overtake-terrace-row-facing"}
 """Here the instruction asks for a vehicle that faces the traffic."""
 
 
-def test_a_reference_has_nothing_wrong() -> None:
-    for slug in SLUGS:
-        asked_for = {(FindingKind.HEADING, Severity.DOUBTFUL)} if slug in FACING else set()
-        assert severities(findings(shown_scene(slug), entry(slug).reference)) == asked_for, slug
+@pytest.mark.parametrize("slug", SLUGS)
+def test_a_reference_has_nothing_wrong(slug: str) -> None:
+    asked_for = {(FindingKind.HEADING, Severity.DOUBTFUL)} if slug in FACING else set()
+    assert severities(findings(shown_scene(slug), entry(slug).reference)) == asked_for
 
 
 DRIVES_MPS = 2.0

@@ -7,12 +7,12 @@ import math
 
 import pytest
 
-from augment.baselines.rule_placer import place
 from augment.fake_llm.server import FakeServer
 from augment.metrics.displacement import displacement
 from augment.prompts.calls import Tools
 from augment.variants.pipeline import EditTask, Outcome, OutcomeStatus
 from augment.variants.recipes import RECIPES, find_recipe
+from tests.baselines.test_rule_placer import placed
 from tests.checks.worlds import findings
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 from tests.variants.playing import MemoryTranscript, play, stand_in_model
@@ -124,7 +124,7 @@ def _is_complete(
 
 def _is_where_it_belongs(outcome: Outcome, slug: str) -> None:
     """Everything within half a metre of where the rules put it, whatever was in between."""
-    meant = place(shown_scene(slug), entry(slug).intent).modification.added
+    meant = placed(slug).modification.added
     assert len(outcome.modification.added) == len(meant)
     for agent in outcome.modification.added:
         gaps = [math.hypot(one.x_m - agent.x_m, one.y_m - agent.y_m) for one in meant]
