@@ -11,7 +11,7 @@ import numpy as np
 from augment.errors import CannotDrive
 from augment.scene.entities import Modification
 from augment.scene.recording import Recording
-from augment.simulation.planning import IdmPlanner, Plan, Planner, Situation
+from augment.simulation.planning import IdmPlanner, Plan, Planner, Situation, is_of_signal
 from augment.simulation.road import Road
 from augment.simulation.shapes import move_ahead
 from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, start_state
@@ -97,8 +97,8 @@ def run(
             if at_end or road.centreline.station_of(body.boxes(states[-1])) > goal_m:
                 break
             situation = Situation(step=step, ego=states[-1], objects=objects[-1])
-            # Of a copy, for whoever computes in place: a drive is not to change by it.
-            plans.append(planner.plan(deepcopy(situation)))
+            # Copies, for whoever computes in place: a drive is not to change by it.
+            plans.append(deepcopy(planner.plan(deepcopy(situation))))
             # (1, T, 3) in, (1, 2, 6) out: one reference, the state now and after one step.
             following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
             # With the ego of the same moment: neither side knows the other's next step.
@@ -108,6 +108,8 @@ def run(
             if after_step is not None:
                 after_step(step + 1)
     except SystemExit as error:  # it would end worker after worker
+        if is_of_signal(error):
+            raise
         raise CannotDrive(f"The planner ended the process: exit {error.code!r}.") from error
     return Drive(
         road=road,

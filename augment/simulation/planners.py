@@ -5,7 +5,7 @@ from collections.abc import Collection
 
 from augment.errors import CannotDrive, UnknownName, check_names
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
-from augment.simulation.planning import IdmPlanner, Planner
+from augment.simulation.planning import IdmPlanner, Planner, is_of_signal
 
 OFFSETS_M: dict[str, tuple[float, ...]] = {
     "paper": PAPER_OFFSETS_M,
@@ -41,6 +41,8 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
     try:
         planner = getattr(importlib.import_module(module), attribute)()
     except (Exception, SystemExit) as error:
+        if is_of_signal(error):
+            raise
         raise CannotDrive(
             f"The planner {name} can't be made ({type(error).__name__}: {error}). It is the "
             "dotted path of a class without arguments."

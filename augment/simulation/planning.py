@@ -87,6 +87,12 @@ class Planner(Protocol):
         """Return the plan from this moment on."""
 
 
+def is_of_signal(error: BaseException) -> bool:
+    """Return whether a signal ends the process: a worker exits with a code below zero then."""
+    code = error.code if isinstance(error, SystemExit) else None
+    return isinstance(code, int) and code < 0
+
+
 @dataclass(frozen=True, slots=True)
 class Idm:
     """The intelligent driver model.

@@ -123,30 +123,38 @@ def test_an_ego_off_every_lane_can_not_be_driven() -> None:
 
 
 class InPlace(ConstantSpeed):
-    """Computes in the ego's frame without a copy."""
+    """Computes in the ego's frame without a copy, all plans in one array."""
+
+    poses = np.empty((41, 3))
 
     def plan(self, situation: Situation) -> Plan:
-        plan = super().plan(situation)
+        self.poses[:] = super().plan(situation).poses
         situation.objects.boxes[:, :2] -= situation.ego[:2]
         situation.ego[:] = 0.0
-        return plan
+        return Plan(poses=self.poses)
 
 
 class Exits(ConstantSpeed):
+    code: str | int = "no way out"
+
     def plan(self, situation: Situation) -> Plan:
-        sys.exit("no way out")
+        sys.exit(self.code)
 
 
 def test_a_planner_that_computes_in_place_drives_as_with_copies() -> None:
     drives = [run(busy(), planner(8.0), steps=8) for planner in (ConstantSpeed, InPlace)]
     assert (drives[0].states == drives[1].states).all()
     assert (drives[0].objects[4].boxes == drives[1].objects[4].boxes).all()
+    assert (drives[0].plans[2].poses == drives[1].plans[2].poses).all()
 
 
 def test_a_planner_that_exits_fails_the_drive_and_not_the_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(CannotDrive, match="no way out"):
+        run(busy(), Exits(8.0))
+    monkeypatch.setattr(Exits, "code", -241)  # of a worker that is told to end
+    with pytest.raises(SystemExit):
         run(busy(), Exits(8.0))
     (tmp_path / "planner_of_one.py").write_text("if True\n")
     monkeypatch.syspath_prepend(tmp_path)
