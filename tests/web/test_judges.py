@@ -181,7 +181,9 @@ def test_a_run_that_was_cut_short_hides_no_answer_of_an_earlier_one(
 ) -> None:
     call_command("judge_study", study.name, endpoint="stand-in", model="fake-good")
     old = PairJudgement.objects.earliest("pk")
-    short = JudgeRun.objects.create(endpoint=endpoint, model="fake-good", state="cancelled")
+    short = JudgeRun.objects.create(
+        endpoint=endpoint, model="fake-good", state="cancelled", frames=4
+    )
     same = {"left_image": "a.png", "right_image": "b.png", "first": "A", "second": "A"}
     row = PairJudgement.objects.create(
         run=short, left=old.right, right=old.left, state=PairJudgement.State.DONE, **same
@@ -190,6 +192,8 @@ def test_a_run_that_was_cut_short_hides_no_answer_of_an_earlier_one(
     ((_, found),) = judge_preferences(study, "instruction").items()
     assert len(found) == 6
     assert found[str(row.left.code), str(row.right.code)] == 0
+    JudgeRun.objects.filter(pk=short.pk).update(frames=0)  # another picture, another judge
+    assert len(judge_preferences(study, "instruction").popitem()[1]) == 1
 
 
 def test_a_contestant_uses_what_its_roles_ask_and_what_its_card_names() -> None:

@@ -95,19 +95,21 @@ def judge_lines(study: Study) -> list[JudgeLine]:
 def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
     """Return each judge's preferences by its name; of a pair the newest answer.
 
-    A run that was cut short hides no answer of an earlier one.
+    A run that was cut short hides no answer of an earlier one that showed as many frames.
     Where contestants ask a model of the judge's own family, it comes once more without them.
     """
     preferences: dict[str, Preferences] = {}
-    answered: dict[str, dict[frozenset[int], PairJudgement]] = {}
+    answered: dict[tuple[str, int], dict[frozenset[int], PairJudgement]] = {}
+    frames: dict[str, int] = {}
     runs = study.judges.filter(question=question).select_related("endpoint")
     for run in runs.order_by("-pk"):
-        by_pair = answered.setdefault(judge_name(run), {})
+        name = judge_name(run)
+        by_pair = answered.setdefault((name, run.frames), {})
         for row in list_answered_pairs(run):
             by_pair.setdefault(frozenset((row.left_id, row.right_id)), row)
-        if not by_pair:
+        if not by_pair or frames.setdefault(name, run.frames) != run.frames:
             continue
-        name, rows, own = judge_name(run), [*by_pair.values()], {*_own_family(study, run)}
+        rows, own = [*by_pair.values()], {*_own_family(study, run)}
         preferences[name] = _preferences(rows)
         if own:
             preferences[name + WITHOUT_FAMILY] = _preferences(rows, without=own)
