@@ -79,8 +79,8 @@ def _open_study(pairs: int) -> Any:
     study = open_study(
         StudyPlan(
             name=f"{STUDY} of {username}",
-            contestants=tuple(set(done.values_list("contestant__slug", flat=True))),
-            scenarios=tuple(set(done.values_list("scenario__slug", flat=True))),
+            contestants=tuple(sorted(set(done.values_list("contestant__slug", flat=True)))),
+            scenarios=tuple(sorted(set(done.values_list("scenario__slug", flat=True)))),
             experts=(username,),
             votes_per_expert=pairs,
             seed=5,

@@ -233,7 +233,7 @@ def smooth_line(points_m: list[Point]) -> Polyline | None:
         return Polyline(PchipInterpolator(chords_m, points)(samples_m))
 
 
-@lru_cache(maxsize=32)  # a search for the nearest motion varies speeds on one path
+@lru_cache(maxsize=8)  # a search for the nearest motion varies speeds on one path
 def lane_line(graph: LaneGraph, path: planned.LanePath, here: Point) -> Polyline | None:
     """Return the line that a path over lanes takes from a place, None where the lanes end there.
 

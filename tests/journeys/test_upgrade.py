@@ -50,6 +50,17 @@ ballot = {"key": str(uuid.uuid4()), "matchup": given["pairs"][0]["matchup"], "ou
 answer = expert.post(given["urls"]["votes"], ballot, content_type="application/json")
 assert answer.status_code == 200, answer.content
 """
+NAME_IS_EXPLAINED = """
+from django.contrib.auth.models import User
+from django.test import Client
+from django.urls import reverse
+from augment.models import Contestant
+row = Contestant.objects.get(slug="sim-careless-fc")
+staff = Client(HTTP_HOST="localhost")
+staff.force_login(User.objects.filter(is_superuser=True).first())
+page = staff.get(reverse("contestant", args=[row.code])).content.decode()
+assert "Simulated careless FC runs FC-plus: it was named before FC meant" in page, page
+"""
 
 
 @pytest.fixture
@@ -92,6 +103,7 @@ def test_no_vote_picture_or_study_of_an_earlier_version_is_lost(
     assert home.rows(
         "SELECT slug, name, variant FROM augment_contestant WHERE variant LIKE 'fc%'"
     ) == [("sim-careless-fc", "Simulated careless FC", "fc-plus")]
+    home.must("shell", "--verbosity", "0", "-c", NAME_IS_EXPLAINED)
     votes = home.rows(
         "SELECT v.outcome FROM arena_vote v JOIN arena_matchup m ON v.matchup_id = m.id "
         "JOIN arena_study s ON m.study_id = s.id WHERE s.state = 'open' ORDER BY m.position"

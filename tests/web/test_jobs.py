@@ -240,7 +240,7 @@ def test_the_grid_is_narrowed_by_word_and_state(researcher: Client) -> None:
     job = large_job(scenarios=3, contestants=2)
     first = job.augmentations.filter(scenario__slug="street-000").order_by("pk")[0]
     job.augmentations.filter(pk=first.pk).update(state=State.FAILED, reason="broke")
-    everything = [f"street-{number:03}" for number in range(3)]
+    everything = ["street-000", "street-002", "street-001"]  # two of one type, one of another
     for query, shown in {
         "?q=street-001": ["street-001"],
         "?state=failed": ["street-000"],
