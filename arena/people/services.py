@@ -251,7 +251,7 @@ def check_may_change(user: User, actor: User) -> None:
 
 def end_sessions(name: str, values: Collection[str]) -> None:
     """End the sessions that keep one of the values under a name; they are stored sealed."""
-    for session in Session.objects.filter(expire_date__gte=timezone.now()).iterator():
+    for session in Session.objects.filter(expire_date__gte=timezone.now()):
         if session.get_decoded().get(name) in values:
             session.delete()
 

@@ -3,9 +3,13 @@
 import json
 import time
 import uuid
+from collections.abc import Sequence
+from contextlib import closing
+from typing import Any
 
 import pytest
 from django.contrib.auth.models import User
+from django.db import connection
 from django.urls import reverse
 
 from arena.errors import InvalidVote, NotYours
@@ -37,14 +41,22 @@ AHEAD_M = {"ann": 20.0, "bob": 20.3, "cid": 45.0}
 COLUMNS = ("left_image", "right_image", "original_image", "view")
 
 
-@pytest.fixture
-def study() -> Study:
-    cast = cast_of(contestants=tuple(AHEAD_M), scenarios=1, experts=("eva",))
+def undrawn(scenarios: int = 1, experts: Sequence[str] = ("eva",)) -> Study:
+    """Open a study of three pairs a scenario, all of them for each expert."""
+    cast = cast_of(contestants=tuple(AHEAD_M), scenarios=scenarios, experts=experts)
     for name, ahead_m in AHEAD_M.items():
         change = Modification(added=(vehicle("New1", ahead_m, 0.0),))
         row = Augmentation.objects.filter(contestant__slug=name)
         row.update(modification=modification_to_document(change))
-    return open_undrawn(StudyPlan.read({**cast, "name": "s", "votes_per_expert": 3, "seed": 7}))
+    votes = 3 * scenarios
+    return open_undrawn(
+        StudyPlan.read({**cast, "name": "s", "votes_per_expert": votes, "seed": 7})
+    )
+
+
+@pytest.fixture
+def study() -> Study:
+    return undrawn()
 
 
 def test_pairs_wait_until_they_are_drawn_each_in_its_own_window(study: Study) -> None:
@@ -80,6 +92,24 @@ def test_pairs_wait_until_they_are_drawn_each_in_its_own_window(study: Study) ->
     }
     assert shown[frozenset({"ann", "bob"})] == 2
     assert json.loads(study.preregistration)["rules"]["windows"] == "pair"
+
+
+@pytest.mark.django_db(transaction=True)
+def test_a_pair_is_drawn_while_others_write_and_many_wait() -> None:
+    study = undrawn(scenarios=6, experts=("eva", "finn", "gus"))
+    waiting = find_undrawn(study).count()
+    assert waiting > 50, "more than are read at once"
+
+    def after_a_write_by_another(execute: Any, sql: str, *rest: Any) -> Any:
+        if sql.startswith("UPDATE"):
+            other: Any = connection.copy()
+            with closing(other), other.cursor() as cursor:
+                cursor.execute("UPDATE arena_study SET name = 'renamed'")
+        return execute(sql, *rest)
+
+    with connection.execute_wrapper(after_a_write_by_another):
+        assert draw_pictures(study, within_s=0.0)
+    assert find_undrawn(study).count() < waiting
 
 
 def test_a_repeat_and_a_pair_handed_over_show_what_was_drawn(study: Study) -> None:

@@ -3,7 +3,9 @@
 import logging
 import math
 import time
-from typing import Any
+from collections.abc import Generator
+from contextlib import closing
+from typing import Any, cast
 
 from django.db.models import QuerySet
 
@@ -60,13 +62,22 @@ def show_own_pictures(study: Study, *, pairs: int | None = None) -> None:
 
 def _claim(study: Study) -> Matchup | None:
     """Return a pair that nobody draws; who loses a claim by its age draws the same once more."""
+    while (row := _first_free(study)) is not None:
+        own = Matchup.objects.filter(pk=row.pk, view=row.view)
+        if own.update(view={"since": database_now().timestamp()}):
+            return row
+    return None
+
+
+def _first_free(study: Study) -> Matchup | None:
     now = database_now().timestamp()
     rows = find_undrawn(study).order_by("position", "pk").only("code", "view")
-    for row in rows.iterator(chunk_size=50):
-        is_free = not 0.0 <= now - (row.view or {}).get("since", 0.0) <= _CLAIM_S
-        own = Matchup.objects.filter(pk=row.pk, view=row.view)
-        if is_free and own.update(view={"since": now}):
-            return row
+    # SQLite refuses a write of who still reads what others have changed since.
+    undrawn = cast(Generator[Matchup, None, None], rows.iterator(chunk_size=50))
+    with closing(undrawn):
+        for row in undrawn:
+            if not 0.0 <= now - (row.view or {}).get("since", 0.0) <= _CLAIM_S:
+                return row
     return None
 
 
