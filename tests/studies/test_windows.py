@@ -3,7 +3,6 @@
 import json
 import time
 import uuid
-from collections.abc import Sequence
 from contextlib import closing
 from typing import Any
 
@@ -41,7 +40,7 @@ AHEAD_M = {"ann": 20.0, "bob": 20.3, "cid": 45.0}
 COLUMNS = ("left_image", "right_image", "original_image", "view")
 
 
-def undrawn(scenarios: int = 1, experts: Sequence[str] = ("eva",)) -> Study:
+def undrawn(scenarios: int = 1, experts: tuple[str, ...] = ("eva",)) -> Study:
     """Open a study of three pairs a scenario, all of them for each expert."""
     cast = cast_of(contestants=tuple(AHEAD_M), scenarios=scenarios, experts=experts)
     for name, ahead_m in AHEAD_M.items():
