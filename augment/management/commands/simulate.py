@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from django.core.management.base import CommandError
 from django.db import transaction
 from django.db.models import Q
 
@@ -86,9 +87,15 @@ class Command(TerminalCommand):
 
     def _drive_files(self, options: dict[str, Any], how: Options) -> None:
         source, shard = Path(options["what"]), read_shard(options["shard"])
-        for name, score in drive_files(source, options["to"], options=how, shard=shard):
-            self.stdout.write(f"{name}: nuPlan {100.0 * score:.1f}")
+        failed = number = 0
+        for name, outcome in drive_files(source, options["to"], options=how, shard=shard):
+            number += 1
+            failed += isinstance(outcome, str)
+            result = outcome if isinstance(outcome, str) else f"nuPlan {100.0 * outcome:.1f}"
+            self.stdout.write(f"{name}: {result}")
             self.stdout.flush()
+        if failed:
+            raise CommandError(f"{failed} of {number} can't be driven; the others are written.")
 
     def _say(self, pk: int, place: str) -> None:
         row = Simulation.objects.select_related("scenario", "augmentation__contestant").get(pk=pk)

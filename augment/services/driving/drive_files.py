@@ -6,13 +6,14 @@ own three files alone, so that all parts together are one run byte for byte.
 """
 
 import json
+import logging
 import re
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from augment.errors import Conflict
+from augment.errors import AugmentError, Conflict
 from augment.formats.documents import read_json
 from augment.scene import codec
 from augment.services.driving.simulations import NUPLAN, Options, drive_document, load_planner
@@ -22,6 +23,7 @@ from augment.simulation.trace import FORMAT
 from augment.simulation.traffic import DriveSetting
 
 _BEFORE = ".before.json"
+logger = logging.getLogger(__name__)
 
 
 def read_shard(text: str) -> tuple[int, int]:
@@ -39,10 +41,10 @@ def read_shard(text: str) -> tuple[int, int]:
 
 def drive_files(
     source: Path, out: Path, *, options: Options, shard: tuple[int, int]
-) -> Iterator[tuple[str, float]]:
-    """Drive every N-th scenario of a folder, by name; yield each name with nuPlan's score.
+) -> Iterator[tuple[str, float | str]]:
+    """Drive every N-th scenario of a folder; yield each name with nuPlan's score or the reason.
 
-    A result that is there already is written anew, whole or not at all.
+    A result that is there already is written anew, whole, or removed where there is none now.
 
     Args:
         source: Where the scenarios are.
@@ -52,19 +54,31 @@ def drive_files(
 
     Raises:
         Conflict: The folder has no scenario.
-        UnknownName, CannotDrive, InvalidDocument, InvalidModification: Of planner or files.
+        UnknownName, CannotDrive: Of the planner.
     """
     names = sorted(file.name.removesuffix(_BEFORE) for file in source.glob(f"*{_BEFORE}"))
     if not names:
         raise Conflict(f"{source} has no *{_BEFORE}: it is no folder of scenarios as own JSON.")
+    load_planner(options, also=(options.planner,))
     out.mkdir(parents=True, exist_ok=True)
     part, parts = shard
     for name in names[part - 1 :: parts]:
-        document = _drive(_setting(source, name, options), options)
+        result = out / f"{name}.drive.json"
+        try:
+            document = _drive(_setting(source, name, options), options)
+        except AugmentError as error:
+            result.unlink(missing_ok=True)
+            yield name, str(error)
+            continue
+        except Exception as error:  # a planner from outside may raise anything
+            result.unlink(missing_ok=True)
+            logger.exception("Driving %s broke.", name)
+            yield name, f"unexpected: {type(error).__name__}: {error}"
+            continue
         text = json.dumps({"scenario": name, **document}, indent=1, sort_keys=True) + "\n"
         scratch = out / f".{name}.{part}"
         scratch.write_text(text, encoding="utf-8")
-        scratch.replace(out / f"{name}.drive.json")
+        scratch.replace(result)
         yield name, document["score"]
 
 
@@ -72,12 +86,12 @@ def drive_files(
 
 
 def _setting(source: Path, name: str, options: Options) -> DriveSetting:
-    def read(what: str) -> object:
-        return read_json(source / f"{name}.{what}.json", what=what)
+    def read(part: str, *, what: str = "") -> object:
+        return read_json(source / f"{name}.{part}.json", what=what or part)
 
     has_recording = (source / f"{name}.recording.json").exists()
     return DriveSetting(
-        scene=codec.scene_from_document(read("before")),
+        scene=codec.scene_from_document(read("before", what="scene")),
         modification=codec.modification_from_document(read("modification")),
         recording=codec.recording_from_document(read("recording")) if has_recording else None,
         reactive=options.is_reactive,
