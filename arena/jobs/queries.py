@@ -1,29 +1,19 @@
 """A job's grid, some rows at a time; drives, labellings and what a study shows of jobs."""
 
 from collections import defaultdict
-from collections.abc import Collection
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.core.paginator import Paginator
-from django.db.models import Count, Q
+from django.db.models import Case, Count, F, QuerySet, When
 
 from arena.errors import NotYours
 from arena.models import LabellingRound, LabelTask, Study
 from arena.shell.listing import Listing
-from augment.models import (
-    Augmentation,
-    Contestant,
-    EndpointModel,
-    GenerationJob,
-    Scenario,
-    Simulation,
-)
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.driving.simulations import Options
-from augment.services.endpoints import Spending, sum_spending
-from augment.services.endpoints.known_models import CONTESTANT
 
 State = Augmentation.State
 
@@ -79,63 +69,31 @@ def list_shown_ids(study: Study) -> frozenset[int]:
     return frozenset(pk for pair in rows for pk in pair)
 
 
-def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:
-    """Return spending by the contestant's primary key over a study's augmentations; one query."""
-    return sum_spending(Q(attempt__augmentation__in=augmentations), by=CONTESTANT)
-
-
-def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
-    """The class of the model that modifies, by the contestant's primary key; one query."""
-    own = [row for row in contestants if row.endpoint_id is not None]
-    wanted = Q(endpoint__in={row.endpoint_id for row in own})
-    sizes = {
-        (endpoint, model): EndpointModel.ModelClass(classes).value
-        for endpoint, model, classes in EndpointModel.objects.filter(wanted)
-        .exclude(model_class="")
-        .values_list("endpoint", "model", "model_class")
-    }
-    classes = {row.pk: sizes.get((row.endpoint_id or 0, row.model)) for row in own}
-    return {pk: name for pk, name in classes.items() if name is not None}
-
-
 # --- Labellings --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LabellingProgress:
-    """A labelling and how many of its planned showings have a label."""
+def find_labellings(**narrow: Any) -> QuerySet[Any]:
+    """Return labellings; of those that are narrowed to an expert's, their own showings count.
 
-    labelling: LabellingRound
-    planned: int
-    labelled: int
-
-    @property
-    def left(self) -> int:
-        """Number of tasks without a label; 0 in a closed labelling."""
-        return 0 if self.labelling.closed_at else self.planned - self.labelled
-
-
-def find_labellings(**narrow: Any) -> list[LabellingProgress]:
-    """Return labellings; of those that are narrowed to an expert's, their own showings count."""
+    Each has `planned` and `labelled`, and what is `left`, which is 0 in a closed one.
+    """
     counted = LabellingRound.objects.filter(**narrow).annotate(
         planned=Count("tasks", distinct=True), labelled=Count("tasks__label", distinct=True)
     )
-    return [
-        LabellingProgress(labelling=row, planned=row.planned, labelled=row.labelled)
-        for row in counted
-    ]
+    left = Case(When(closed_at=None, then=F("planned") - F("labelled")), default=0)
+    return counted.annotate(left=left)
 
 
-def labelling_progress(*, expert: User, code: UUID) -> LabellingProgress:
-    """One of the expert's own labellings.
+def labelling_progress(*, expert: User, code: UUID) -> Any:
+    """One of the expert's own labellings, as `find_labellings` returns it.
 
     Raises:
         NotYours: There is none with that code, or the expert takes no part in it.
     """
-    progress = find_labellings(code=code, tasks__expert=expert)
-    if not progress:
+    labelling = find_labellings(code=code, tasks__expert=expert).first()
+    if labelling is None:
         raise NotYours("You do not take part in this labelling.")
-    return progress[0]
+    return labelling
 
 
 def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:

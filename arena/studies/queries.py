@@ -4,10 +4,11 @@ from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import TypeVar
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import Count, F, Q, QuerySet
+from django.db.models import Count, F, Model, Q, QuerySet
 from django.utils import timezone
 
 from arena.models import Authorship, Enrolment, Invitation, Matchup, Report, Study, StudyDraft
@@ -33,6 +34,8 @@ from augment.models import (
 )
 from augment.services.benchmarks import Split
 
+Row = TypeVar("Row", bound=Model)
+
 # --- Studies -----------------------------------------------------------------------------------
 
 
@@ -42,14 +45,22 @@ def study_named(name_or_code: str) -> Study:
     Raises:
         UnknownName: There is none.
     """
+    return find_named(Study.objects.all(), "study", name_or_code)
+
+
+def find_named(rows: QuerySet[Row], what: str, name_or_code: str) -> Row:
+    """Return the row of that name or code.
+
+    Raises:
+        UnknownName: There is none.
+    """
     wanted = Q(name=name_or_code)
     with suppress(ValueError):  # most names are not codes
         wanted |= Q(code=UUID(name_or_code))
-    study = Study.objects.filter(wanted).first()
-    if study is None:
-        names = Study.objects.values_list("name", flat=True)
-        raise UnknownName("study", name_or_code, sorted(names))
-    return study
+    row = rows.filter(wanted).first()
+    if row is None:
+        raise UnknownName(what, name_or_code, sorted(rows.values_list("name", flat=True)))
+    return row
 
 
 def expert_named(study: Study, username: str) -> User:

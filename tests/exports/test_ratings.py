@@ -194,18 +194,18 @@ def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_
 ) -> None:
     snapshot = planned()
     kept = snapshot.filters
-    Snapshot.objects.filter(pk=snapshot.pk).update(filters={"kinds": 7})  # no list: a TypeError
+    Snapshot.objects.filter(pk=snapshot.pk).update(filters={"kinds": 7})  # no list of words
     RATINGS.perform(snapshot.pk)
     snapshot.refresh_from_db()
     assert snapshot.state == Snapshot.State.FAILED
-    assert snapshot.reason.startswith("unexpected: TypeError: ")
+    assert snapshot.reason.startswith("unexpected: ValidationError: ")
     assert f"snapshot {snapshot.pk}" in caplog.text
     assert "Traceback" in caplog.text
     event = Event.objects.get(verb="rating failed")
     assert event.after == {"snapshot": str(snapshot.code), "why": snapshot.reason}
     researcher = signed_in(people()["researcher"])
     page = researcher.get(reverse("results", args=[snapshot.study.code])).content.decode()
-    assert "could not be computed: unexpected: TypeError" in page
+    assert "could not be computed: unexpected: ValidationError" in page
     assert reverse("rating-again", args=[snapshot.study.code, snapshot.code]) in page
     Snapshot.objects.filter(pk=snapshot.pk).update(filters=kept)
     researcher.post(reverse("rating-again", args=[snapshot.study.code, snapshot.code]))

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 import pytest
+from django.db.models import Q
 
-from arena.jobs.queries import spent_on
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.endpoints.known_models import Spending
+from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
 from augment.services.running import jobs, runner
 from augment.services.running.jobs import JobRequest
 from tests.jobs.models import Model, llama_job, reply
@@ -25,7 +25,8 @@ def spent(job: GenerationJob, model: Model) -> Spending:
     runner.Augmentations(model).perform(row.pk)
     row.refresh_from_db()
     assert row.state == Augmentation.State.DONE
-    return spent_on([row.pk])[Contestant.objects.get().pk]
+    found = sum_spending(Q(attempt__augmentation=row), by=CONTESTANT)
+    return found[Contestant.objects.get().pk]
 
 
 def once_busy() -> Model:

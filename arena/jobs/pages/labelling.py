@@ -64,13 +64,13 @@ class LabellingForm(forms.Form):
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the next picture; a label is saved and followed by a redirect."""
     expert = get_user(request)
-    progress = queries.labelling_progress(expert=expert, code=code)
+    labelling = queries.labelling_progress(expert=expert, code=code)
     if request.method == "POST":
         _save(request, expert)
         return redirect("label", code=code)
-    task = queries.next_task(labelling=progress.labelling, expert=expert)
+    task = queries.next_task(labelling=labelling, expert=expert)
     context = {
-        **{"progress": progress, "task": task, "faults": list(FaultClass)},
+        **{"labelling": labelling, "task": task, "faults": list(FaultClass)},
         "has_original": task is not None and bool(original_beside(task.augmentation)),
     }
     return render(request, "label/label.html" if task else "label/done.html", context)
@@ -130,22 +130,19 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             close_labelling(labelling=labelling, actor=get_user(request))
             messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
     elif labelling.closed_at is None:
-        return ask(request, _closing(labelling))
+        labels = FaultLabel.objects.filter(task__labelling=labelling).count()
+        missing = labelling.tasks.count() - labels
+        back = reverse("faults", args=[labelling.job.code])
+        question = Confirmation(
+            title=f"Close the labelling “{labelling.name}”?",
+            facts=(
+                f"Labels saved, which stay: {labels}.",
+                f"Planned labels that will be missing: {missing}.",
+                "It takes no more labels. This can’t be taken back.",
+            ),
+            button="Close the labelling",
+            back=back,
+            crumbs=(*job_crumbs(labelling.job), ("Fault labels", back)),
+        )
+        return ask(request, question)
     return redirect("faults", code=labelling.job.code)
-
-
-def _closing(labelling: LabellingRound) -> Confirmation:
-    labels = FaultLabel.objects.filter(task__labelling=labelling).count()
-    missing = labelling.tasks.count() - labels
-    back = reverse("faults", args=[labelling.job.code])
-    return Confirmation(
-        title=f"Close the labelling “{labelling.name}”?",
-        facts=(
-            f"Labels saved, which stay: {labels}.",
-            f"Planned labels that will be missing: {missing}.",
-            "It takes no more labels. This can’t be taken back.",
-        ),
-        button="Close the labelling",
-        back=back,
-        crumbs=(*job_crumbs(labelling.job), ("Fault labels", back)),
-    )

@@ -8,10 +8,11 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any, NamedTuple, Self, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 from django.db.models import Case, Exists, F, Max, Model, OuterRef, Q, QuerySet, Value, When
 from django.db.models.fields import CharField
+from pydantic import TypeAdapter
 
 from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
@@ -121,17 +122,6 @@ class RatedVote(NamedTuple):
         return sides.get(self.outcome)
 
 
-class Competitor(NamedTuple):
-    """Contestant of a rating, as a Standing has it; `contestant` is None for names of a file."""
-
-    slug: str
-    name: str
-    variant: str = ""
-    kind: str = IMPORTED
-    is_simulated: bool = False
-    contestant: Contestant | None = None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filters:
     """Filters of votes.
@@ -162,31 +152,20 @@ class Filters:
 
     def as_document(self) -> dict[str, Any]:
         """As a snapshot keeps it."""
-        return {
-            "types": list(self.types),
-            "experts": list(self.experts),
-            "kinds": list(self.kinds),
-            "leave_out_settled": self.leave_out_settled,
-            "leave_out_own": self.leave_out_own,
-            "authors": [list(pair) for pair in sorted(self.authors)],
-            "question": self.question,
-        }
+        document: dict[str, Any] = _FILTERS.dump_python(self, mode="json", warnings=False)
+        return document | {"authors": [list(pair) for pair in sorted(self.authors)]}
 
-    @classmethod
-    def of_document(cls, document: dict[str, Any]) -> Self:
+    @staticmethod
+    def of_document(document: dict[str, Any]) -> "Filters":
         """Return the filters from `as_document`.
 
         Older snapshots left settled pairs out, and were made when studies asked one question.
         """
-        return cls(
-            types=tuple(document.get("types", ())),
-            experts=tuple(document.get("experts", ())),
-            kinds=tuple(document.get("kinds", (MAIN,))),
-            leave_out_settled=bool(document.get("leave_out_settled", True)),
-            leave_out_own=bool(document.get("leave_out_own", False)),
-            authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
-            question=str(document.get("question", Question.INSTRUCTION)),
-        )
+        older = {"leave_out_settled": True, "question": Question.INSTRUCTION.value}
+        return _FILTERS.validate_python(older | document)
+
+
+_FILTERS = TypeAdapter(Filters)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +173,7 @@ class VoteSet:
     """Votes of a rating, in the order of their decisions.
 
     Attributes:
-        competitors: By slug.
+        competitors: By slug; those of a file are stored nowhere.
         counted: The votes that count.
         repeats: Decided hidden repeats, whether they count or not.
         checks: Votes on attention checks by the primary question, and `references` who should win
@@ -202,7 +181,7 @@ class VoteSet:
         left_out: How many votes do not count, by reason.
     """
 
-    competitors: tuple[Competitor, ...]
+    competitors: tuple[Contestant, ...]
     counted: tuple[RatedVote, ...]
     repeats: tuple[RatedVote, ...]
     checks: tuple[RatedVote, ...]
@@ -402,22 +381,12 @@ def find_users(codes: Collection[str]) -> dict[str, int]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _competitors(study: Study, votes: Iterable[RatedVote]) -> tuple[Competitor, ...]:
+def _competitors(study: Study, votes: Iterable[RatedVote]) -> tuple[Contestant, ...]:
     """Return competitors by slug: a study's contestants, or the names in a file's votes."""
     if is_imported(study):
         names = {name for vote in votes for name in (vote.left, vote.right)}
-        return tuple(Competitor(slug=name, name=name) for name in sorted(names))
-    return tuple(
-        Competitor(
-            slug=row.slug,
-            name=row.name,
-            variant=row.variant,
-            kind=row.kind,
-            is_simulated=row.is_simulated,
-            contestant=row,
-        )
-        for row in study.contestants.order_by("slug")
-    )
+        return tuple(Contestant(slug=name, name=name, kind=IMPORTED) for name in sorted(names))
+    return tuple(study.contestants.order_by("slug"))
 
 
 def _check_names(study: Study, filters: Filters, votes: Sequence[RatedVote]) -> None:

@@ -7,9 +7,9 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-from django.db.models import Count
+from django.db.models import Count, Q
 
-from arena.jobs.queries import list_shown_ids, model_classes, spent_on
+from arena.jobs.queries import list_shown_ids
 from arena.models import Matchup, Study, Vote
 from arena.rating.comparisons import (
     LOSS,
@@ -17,7 +17,6 @@ from arena.rating.comparisons import (
     WIN,
     Comparisons,
     FloatArray,
-    IntArray,
     count_wins,
     select_votes,
 )
@@ -29,8 +28,11 @@ from arena.rating.snapshot_document import (
     TypeRating,
     TypeStanding,
 )
-from arena.results.queries.votes import AUTOMATIC, Competitor, Filters, RatedVote
+from arena.results.queries.votes import AUTOMATIC, Filters, RatedVote
 from arena.voting.queries.blinding import is_imported
+from augment.models import Contestant, EndpointModel
+from augment.services.endpoints import sum_spending
+from augment.services.endpoints.known_models import CONTESTANT
 from augment.services.judging.displacement import MeasuredRow, of_rows, summarise
 from augment.services.scenarios import in_type_order, type_label
 
@@ -47,20 +49,17 @@ class VoteArrays:
 
     Attributes:
         comparisons: `first` was shown on the left.
-        judges, items, types: Names by their numbers.
-        type_of: (V,) the type of each vote's scenario.
+        judges, items: Names by their numbers.
         ms: (V,) how long each pair was on screen, not a number where unknown.
     """
 
     comparisons: Comparisons
     judges: tuple[str, ...]
     items: tuple[str, ...]
-    types: tuple[str, ...]
-    type_of: IntArray
     ms: FloatArray
 
 
-def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[RatedVote]) -> VoteArrays:
+def vote_arrays(competitors: Sequence[Contestant], votes: Sequence[RatedVote]) -> VoteArrays:
     """Number everything, in the order in which it occurs.
 
     Args:
@@ -70,9 +69,7 @@ def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[RatedVote]) -
     number = {competitor.slug: index for index, competitor in enumerate(competitors)}
     judges: dict[str, int] = {}
     items: dict[str, int] = {}
-    types: dict[str, int] = {}
     whole = partial(np.array, dtype=np.int64)
-    type_of = whole([types.setdefault(vote.type, len(types)) for vote in votes])
     comparisons = Comparisons(
         names=tuple(competitor.slug for competitor in competitors),
         shown=tuple(competitor.name for competitor in competitors),
@@ -86,8 +83,6 @@ def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[RatedVote]) -
         comparisons=comparisons,
         judges=tuple(judges),
         items=tuple(items),
-        types=tuple(types),
-        type_of=type_of,
         ms=np.array(
             [np.nan if vote.ms_visible is None else vote.ms_visible for vote in votes],
             dtype=np.float64,
@@ -99,6 +94,7 @@ FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""
 
 TYPE_ROUNDS = 2000
+_OF_LINE = ("rating", "lower", "upper", "rank", "votes")
 
 
 def pairs(
@@ -161,17 +157,15 @@ def by_type(
         votes: The same.
         board: Their rating.
     """
-    types = in_type_order(name for name in arrays.types if name)
-    return tuple(
-        _rate_type(arrays, name, count_settled_ties(x for x in votes if x.type == name), board)
-        for name in types
-    )
+    types = in_type_order(dict.fromkeys(vote.type for vote in votes if vote.type))
+    return tuple(_rate_type(arrays.comparisons, votes, name, board) for name in types)
 
 
 def _rate_type(
-    arrays: VoteArrays, name: str, ties: Counter[str], whole: Leaderboard
+    comparisons: Comparisons, given: Sequence[RatedVote], name: str, whole: Leaderboard
 ) -> TypeRating:
-    votes = select_votes(arrays.comparisons, arrays.type_of == arrays.types.index(name))
+    votes = select_votes(comparisons, np.array([vote.type == name for vote in given]))
+    ties = count_settled_ties(vote for vote in given if vote.type == name)
     board = rate(
         votes,
         method=whole.method,
@@ -190,12 +184,8 @@ def _rate_type(
         lines=tuple(
             TypeStanding(
                 slug=line.name,
-                rating=line.rating,
-                lower=line.lower,
-                upper=line.upper,
-                rank=line.rank,
+                **{field: getattr(line, field) for field in _OF_LINE},
                 note=line.note or None,
-                votes=line.votes,
                 few=line.votes - ties[line.name] < FEW_VOTES,
                 settled=ties[line.name],
             )
@@ -237,23 +227,21 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
     )
 
 
-def cost(study: Study, competitors: Sequence[Competitor]) -> tuple[ScenarioCost, ...]:
+def cost(study: Study, contestants: Sequence[Contestant]) -> tuple[ScenarioCost, ...]:
     """Return the average use for a scenario of each contestant that asks a language model."""
-    rows = [
-        competitor.contestant for competitor in competitors if competitor.contestant is not None
-    ]
-    spent = spent_on(list_shown_ids(study))
-    classes = model_classes(rows)
+    spent = sum_spending(Q(attempt__augmentation__in=list_shown_ids(study)), by=CONTESTANT)
+    models = EndpointModel.objects.values_list("endpoint", "model", "model_class")
+    classes = {(endpoint, model): size for endpoint, model, size in models}
     return tuple(
         ScenarioCost(
             slug=row.slug,
             model=row.model,
-            model_class=classes.get(row.pk, ""),
+            model_class=classes.get((row.endpoint_id or 0, row.model), ""),
             augmentations=totals.augmentations,
             calls=totals.calls / totals.augmentations,
             tokens=None if totals.tokens is None else totals.tokens / totals.augmentations,
             usd=None if totals.nano_usd is None else totals.nano_usd / totals.augmentations / 1e9,
         )
-        for row in rows
+        for row in contestants
         if (totals := spent.get(row.pk)) is not None
     )

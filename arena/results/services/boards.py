@@ -15,40 +15,26 @@ from arena.errors import StudyStillOpen
 from arena.exports.files import sha256_hex
 from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
-from arena.rating.board_table import (
-    PROVISIONAL_ABOVE,
-    BoardLine,
-    BoardTableDocument,
-    PooledStudy,
-    anchor_lines,
-    is_provisional,
-)
-from arena.rating.leaderboard import Leaderboard, rate
+from arena.rating import board_table
+from arena.rating.leaderboard import rate
 from arena.rating.lines import Line, hide_ranks, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, text_of_intervals
-from arena.results.queries.votes import (
-    AUTOMATIC,
-    Competitor,
-    Filters,
-    VoteSet,
-    last_vote_id,
-    vote_set,
-)
+from arena.results.queries.votes import AUTOMATIC, Filters, VoteSet, last_vote_id, vote_set
 from arena.results.services.analysis import count_settled_ties, vote_arrays
 from arena.results.services.ratings import software_versions
 from arena.results.services.trust import board_remarks
 from arena.results.services.vote_files import vote_rows, votes_csv
-from arena.studies.queries import author_pairs
+from arena.studies.queries import author_pairs, find_named
 from arena.studies.services.opening import preregistration_sha256
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict
 from augment.models import Benchmark, Contestant, Scenario, Submission
 from augment.services import log_change, one_line
 from augment.services.benchmarks import Split, list_remarks
 
 LONGEST_NAME = 100
 
-WriteFiles = Callable[[BoardTableDocument], dict[str, str]]
+WriteFiles = Callable[[board_table.BoardTableDocument], dict[str, str]]
 """Makes the files of a table: their texts by their endings, "json" the document itself."""
 
 # --- A board and its link ----------------------------------------------------------------------
@@ -60,7 +46,7 @@ def make_board(
     name: str,
     study: Study,
     benchmark: Benchmark | None = None,
-    provisional_above: int = PROVISIONAL_ABOVE,
+    provisional_above: int = board_table.PROVISIONAL_ABOVE,
     actor: User | None = None,
 ) -> Board:
     """Begin a board with its first study, whose scenarios and rules all batches share.
@@ -88,11 +74,15 @@ def make_board(
     board.studies.add(study)
     require_poolable(board, but_open=True)
     # Asked once: a benchmark may be retired, and its scenarios changed, while the board goes on.
-    if benchmark is not None and _frozen_scenarios(study) != _test_split(benchmark):
-        raise Conflict(
-            f"'{study.name}' does not show just the scenarios and instructions of the test split "
-            f"of {benchmark}: its votes can't be rated on this board."
-        )
+    if benchmark is not None:
+        # Of the test split alone: references of the practice split are public.
+        items = benchmark.items.filter(split=Split.TEST)
+        scenarios = Scenario.objects.filter(benchmark_items__in=items).order_by("slug")
+        if _frozen_scenarios(study) != list(scenarios.values_list(*_SHOWN)):
+            raise Conflict(
+                f"'{study.name}' does not show just the scenarios and instructions of the test "
+                f"split of {benchmark}: its votes can't be rated on this board."
+            )
     log_change(board, "make", actor, after={"name": name, "study": str(study.code)})
     return board
 
@@ -103,11 +93,7 @@ def board_named(name_or_code: str) -> Board:
     Raises:
         UnknownName: There is none.
     """
-    for board in Board.objects.all():
-        if name_or_code in (board.name, str(board.code)):
-            return board
-    names = Board.objects.order_by("name").values_list("name", flat=True)
-    raise UnknownName("board", name_or_code, list(names))
+    return find_named(Board.objects.all(), "board", name_or_code)
 
 
 @transaction.atomic
@@ -192,11 +178,11 @@ def require_poolable(board: Board, *, but_open: bool = False) -> list[Study]:
 def make_document(
     board: Board,
     studies: Sequence[Study],
-    before: BoardTableDocument | None,
+    before: board_table.BoardTableDocument | None,
     *,
     number: int,
     now: datetime,
-) -> BoardTableDocument:
+) -> board_table.BoardTableDocument:
     """Rate the votes of closed studies; experts and scenarios are clusters over all of them.
 
     Args:
@@ -216,6 +202,7 @@ def make_document(
     arrays = vote_arrays([by_slug[slug] for slug in sorted(by_slug)], votes)
     rated = rate(arrays.comparisons, founders=founders)
     remarks = board_remarks(rated, arrays)
+    intervals = text_of_intervals(rated.intervals, rated.unit, rated.rounds)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
     settled = count_settled_ties(votes)
     not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
@@ -224,17 +211,17 @@ def make_document(
     since = {line.slug: line.since for line in before.lines} if before else {}
     lines = tuple(
         _board_line(board, line, by_slug[line.name], since.get(line.name, made_at[:10]), settled)
-        for line in anchor_lines(standings, founders)
+        for line in board_table.anchor_lines(standings, founders)
     )
     judges = {vote.judge: vote.judge_name for vote in votes}
-    return BoardTableDocument(
+    return board_table.BoardTableDocument(
         board=board.name,
         number=number,
         made_at=made_at,
         benchmark=str(board.benchmark or ""),
         benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
         question=str(Question(studies[0].questions[0]).label),
-        method=_method_text(rated),
+        method=f"{METHOD_TEXTS[rated.method]}, {intervals}",
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
         studies=tuple(map(_pool, studies, sets)),
@@ -254,11 +241,6 @@ def make_document(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _method_text(rated: Leaderboard) -> str:
-    intervals = text_of_intervals(rated.intervals, rated.unit, rated.rounds)
-    return f"{METHOD_TEXTS[rated.method]}, {intervals}"
-
-
 _SHOWN = ("slug", "type", "instruction")
 
 
@@ -274,15 +256,8 @@ def _frozen_scenarios(study: Study) -> list[tuple[str, ...]]:
     return [tuple(scenario[name] for name in _SHOWN) for scenario in frozen]
 
 
-def _test_split(benchmark: Benchmark) -> list[tuple[str, ...]]:
-    """Return the study's scenarios of a benchmark's test split; other references are public."""
-    items = benchmark.items.filter(split=Split.TEST)
-    scenarios = Scenario.objects.filter(benchmark_items__in=items).order_by("slug")
-    return list(scenarios.values_list(*_SHOWN))
-
-
-def _pool(study: Study, votes: VoteSet) -> PooledStudy:
-    return PooledStudy(
+def _pool(study: Study, votes: VoteSet) -> board_table.PooledStudy:
+    return board_table.PooledStudy(
         name=study.name,
         code=str(study.code),
         closed_at=study.closed_at.astimezone(UTC).isoformat() if study.closed_at else "",
@@ -293,11 +268,11 @@ def _pool(study: Study, votes: VoteSet) -> PooledStudy:
 
 
 def _board_line(
-    board: Board, line: Line, who: Competitor, since: str, settled: Counter[str]
-) -> BoardLine:
-    card = (who.contestant and who.contestant.card) or {}
-    submitted, withdrawn = _count_attempts(who.contestant)
-    return BoardLine(
+    board: Board, line: Line, who: Contestant, since: str, settled: Counter[str]
+) -> board_table.BoardLine:
+    card = who.card or {}
+    submitted, withdrawn = _count_attempts(who)
+    return board_table.BoardLine(
         slug=who.slug,
         kind=who.kind,
         is_simulated=who.is_simulated,
@@ -305,7 +280,7 @@ def _board_line(
         authors=tuple(card.get("authors", ())),
         is_open=card.get("is_open"),
         settled_ties=settled[who.slug],
-        is_provisional=is_provisional(line, board.provisional_above),
+        is_provisional=board_table.is_provisional(line, board.provisional_above),
         submitted=submitted,
         withdrawn=withdrawn,
         **asdict(line)
@@ -314,9 +289,9 @@ def _board_line(
     )
 
 
-def _count_attempts(contestant: Contestant | None) -> tuple[int | None, int | None]:
+def _count_attempts(contestant: Contestant) -> tuple[int | None, int | None]:
     """Return how many folders the sender of a submission sent and took back."""
-    own = Submission.objects.filter(contestant=contestant).first() if contestant else None
+    own = Submission.objects.filter(contestant=contestant).first()
     if own is None:
         return None, None
     # Where no sender is known, nobody knows whose the others are.

@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import TypedDict, TypeVar, Unpack
 
@@ -16,7 +16,6 @@ from arena.errors import StudyStillOpen
 from arena.exports.files import sha256_hex
 from arena.models import EarlyLook, ImportedVote, SharedRating, Snapshot, Standing, Study, Vote
 from arena.models.ratings import snapshot_values
-from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import (
     MOST_DRAWS,
@@ -61,14 +60,6 @@ class Choices(TypedDict, total=False):
     filters: vote_queries.Filters | None
     early: bool
     actor: User | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ComputedRating:
-    """Results beside the snapshot's own fields: its lines."""
-
-    board: Leaderboard
-    competitors: tuple[vote_queries.Competitor, ...]
 
 
 # --- Entry points ------------------------------------------------------------------------------
@@ -177,8 +168,8 @@ def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
 # --- Computing and keeping ---------------------------------------------------------------------
 
 
-def compute(snapshot: Snapshot, report: Callable[[int], None]) -> ComputedRating:
-    """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
+def compute(snapshot: Snapshot, report: Callable[[int], None]) -> list[Standing]:
+    """Rate the votes that a planned snapshot names, into it and its lines; nothing is stored.
 
     Args:
         snapshot: A planned one, stored or not.
@@ -188,7 +179,17 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> ComputedRating
     votes = _vote_set(snapshot)
     arrays = vote_arrays(votes.competitors, votes.counted)
     report(20)
-    board = _rate(snapshot, arrays.comparisons)
+    try:
+        board = rate(
+            arrays.comparisons,
+            method=Method(snapshot.method),
+            rounds=snapshot.rounds,
+            unit=Unit(snapshot.resampling_unit),
+            intervals=Intervals(snapshot.intervals),
+            seed=snapshot.seed,
+        )
+    except TooManyContestants as error:
+        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
     report(60)
     snapshot.results = results = _results(snapshot, votes, arrays, board)
     report(90)
@@ -202,21 +203,29 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> ComputedRating
     snapshot.includes_simulated = any(
         entry.is_simulated for entry in votes.competitors + votes.counted
     )
-    return ComputedRating(board=board, competitors=votes.competitors)
+    return [
+        Standing(
+            snapshot=snapshot,
+            contestant=row if row.pk else None,
+            **{name: getattr(row, name) for name in _OF_CONTESTANT},
+            **snapshot_values(line),
+        )
+        for row, line in zip(votes.competitors, board.lines, strict=True)
+    ]
+
+
+_OF_CONTESTANT = ("slug", "name", "variant", "kind", "is_simulated")
 
 
 @transaction.atomic
-def keep(snapshot: Snapshot, computed: ComputedRating) -> Snapshot:
+def keep(snapshot: Snapshot, standings: list[Standing]) -> Snapshot:
     """Store what was computed."""
     snapshot.state = Snapshot.State.READY
     snapshot.progress = 100
     snapshot.claim = snapshot.heartbeat_at = None
     snapshot.finished_at = timezone.now()
     snapshot.save()
-    Standing.objects.bulk_create(
-        Standing(snapshot=snapshot, **competitor._asdict(), **snapshot_values(line))
-        for competitor, line in zip(computed.competitors, computed.board.lines, strict=True)
-    )
+    Standing.objects.bulk_create(standings)
     return snapshot
 
 
@@ -346,20 +355,6 @@ def _vote_set(snapshot: Snapshot) -> vote_queries.VoteSet:
     return vote_queries.vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
 
 
-def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
-    try:
-        return rate(
-            comparisons,
-            method=Method(snapshot.method),
-            rounds=snapshot.rounds,
-            unit=Unit(snapshot.resampling_unit),
-            intervals=Intervals(snapshot.intervals),
-            seed=snapshot.seed,
-        )
-    except TooManyContestants as error:
-        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
-
-
 def _results(
     snapshot: Snapshot, votes: vote_queries.VoteSet, arrays: VoteArrays, board: Leaderboard
 ) -> Results:
@@ -377,11 +372,7 @@ def _results(
         types=analysis.by_type(arrays, votes.counted, board),
         displacement=() if from_file else analysis.displacement(study),
         cost=() if from_file else analysis.cost(study, votes.competitors),
-        models={
-            competitor.slug: competitor.contestant.model
-            for competitor in votes.competitors
-            if competitor.contestant is not None
-        },
+        models={row.slug: row.model for row in votes.competitors if row.pk},
         judges={vote.judge: vote.judge_name for vote in votes.counted},
         agreement=rater_agreement(snapshot),
     )
