@@ -7,7 +7,8 @@ from django.db import models
 
 from arena.models.people import CodedModel
 from arena.models.studies import Study
-from arena.rating.board_table import PROVISIONAL_ABOVE, BoardTableDocument, table_from_document
+from arena.rating.board_table import PROVISIONAL_ABOVE, BoardTableDocument
+from arena.rating.snapshot_document import read_document
 from augment.models import AppendOnly, Benchmark
 
 
@@ -61,4 +62,5 @@ class BoardTable(AppendOnly):
     @cached_property
     def document(self) -> BoardTableDocument:
         """Content of the table as a typed value."""
-        return table_from_document(json.loads(self.files["json"]))
+        document = json.loads(self.files["json"])
+        return read_document(BoardTableDocument, document, what="board table")

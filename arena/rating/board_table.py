@@ -3,12 +3,11 @@
 In: the lines of a rating. Out: the same lines on the scale of the board's first table.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 from arena.rating.lines import AnyLine, Line, votes_text
-from arena.rating.snapshot_document import read_document
 
 MEAN = 1000.0
 """Elo points: the mean of the contestants of the first study, in every table."""
@@ -44,6 +43,11 @@ class BoardLine(Line):
     submitted: int | None = None
     withdrawn: int | None = None
     is_provisional: bool = False
+
+    @property
+    def model(self) -> str:
+        """The name, with "(simulated)" where that is so."""
+        return f"{self.name}{' (simulated)' * self.is_simulated}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,15 +119,6 @@ class BoardTableDocument:
     def made_on(self) -> str:
         """The day, as ISO 8601."""
         return self.made_at[:10]
-
-
-def table_from_document(document: Mapping[str, Any]) -> BoardTableDocument:
-    """Return the table of a JSON object, which is the table's fields by their names.
-
-    Raises:
-        InvalidDocument: It is none that this version knows.
-    """
-    return read_document(BoardTableDocument, document, what="board table")
 
 
 def anchor_lines(lines: Sequence[AnyLine], founders: Collection[str]) -> list[AnyLine]:

@@ -13,9 +13,9 @@ from arena.rating.board_table import (
     anchor_lines,
     is_provisional,
     spread_over,
-    table_from_document,
 )
 from arena.rating.lines import Line
+from arena.rating.snapshot_document import read_document
 from augment.errors import InvalidDocument
 
 
@@ -74,13 +74,13 @@ def a_table() -> BoardTableDocument:
 
 def test_a_table_is_read_as_it_was_kept() -> None:
     document = json.loads(json.dumps(asdict(a_table())))
-    assert table_from_document(document) == a_table()
+    assert read_document(BoardTableDocument, document, what="board table") == a_table()
 
 
 @pytest.mark.parametrize("change", [{"format": "x"}, {"version": 2}, {"votes": "many"}])
 def test_what_is_no_table_of_this_version_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(InvalidDocument, match=next(iter(change))):
-        table_from_document(asdict(a_table()) | change)
+        read_document(BoardTableDocument, asdict(a_table()) | change, what="board table")
 
 
 @pytest.mark.parametrize(

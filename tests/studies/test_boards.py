@@ -9,7 +9,8 @@ import pytest
 
 from arena.errors import StudyStillOpen
 from arena.models import Board, Matchup, Study, Vote
-from arena.rating.board_table import table_from_document
+from arena.rating.board_table import BoardTableDocument
+from arena.rating.snapshot_document import read_document
 from arena.results.exports.board_files import board_folder
 from arena.results.services.boards import make_board
 from arena.results.services.ratings import rate_now
@@ -112,7 +113,8 @@ def test_a_table_marks_what_is_simulated_and_ties_that_nobody_was_shown(board: B
     assert page.count(f" + {ties}</td>") == 2
     old = json.loads(table.files["json"])
     del old["settled_ties"], old["lines"][0]["settled_ties"]
-    assert table_from_document(old).votes_text == "36 votes"
+    read = read_document(BoardTableDocument, old, what="board table")
+    assert read.votes_text == "36 votes"
 
 
 def _elo_by_choix(slugs: list[str], founders: list[str]) -> dict[str, float]:

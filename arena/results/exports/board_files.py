@@ -6,8 +6,7 @@ published; the folder has them as they were.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
-from itertools import repeat
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +17,15 @@ from arena.exports.formats import json_bytes, make_sheet, sheet_csv
 from arena.exports.leaderboard import BOARD, file_columns
 from arena.models import Board
 from arena.rating.board_table import BoardTableDocument
-from arena.rating.lines import Line
 from arena.results.exports.charts import rows_chart
-from arena.results.exports.tables import Row
 
 STYLE, INDEX = "board.css", "index.html"
 
 
 def write_table(table: BoardTableDocument) -> dict[str, str]:
     """Write the files of a table, by their endings."""
-    rows = table_rows(table)
     simulated = " (simulated)" if table.includes_simulated else ""
-    chart = rows_chart(rows, f"Elo with 95 % intervals{simulated}", file_format="svg")
+    chart = rows_chart(table.lines, f"Elo with 95 % intervals{simulated}", file_format="svg")
     sheet = make_sheet(table.lines, file_columns(BOARD, table), name="board-table")
     return {
         "json": json_bytes(asdict(table)).decode(),
@@ -37,12 +33,6 @@ def write_table(table: BoardTableDocument) -> dict[str, str]:
         "svg": chart.decode(),
         "html": render_to_string("boards/frozen.html", _table_context(table)),
     }
-
-
-def table_rows(table: BoardTableDocument) -> list[Row]:
-    """Return the lines as pages and charts of ratings take them."""
-    names = ["slug", "kind", "is_simulated", *(field.name for field in fields(Line))]
-    return [Row(**{name: getattr(line, name) for name in names}) for line in table.lines]
 
 
 def board_folder(board: Board) -> dict[str, bytes]:
@@ -75,5 +65,5 @@ def write_folder(files: Mapping[str, bytes], out: Path) -> None:
 
 def _table_context(table: BoardTableDocument) -> dict[str, Any]:
     """Return the table as the template shows it; its chart is a file of its own."""
-    rows = list(zip(table_rows(table), table.lines, repeat(None)))
+    rows = [(line, None) for line in table.lines]
     return {"title": table.board, "table": table, "rows": rows}

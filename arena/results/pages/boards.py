@@ -17,7 +17,7 @@ from arena.exports.formats import attach
 from arena.models import Board, BoardTable, Study
 from arena.people.queries import by_pseudonym, experts
 from arena.rating.board_table import PROVISIONAL_ABOVE
-from arena.results.exports.board_files import board_folder, table_rows, write_table
+from arena.results.exports.board_files import board_folder, write_table
 from arena.results.pages.plots import plot
 from arena.results.services.batches import BatchRequest, open_batch, possible_newcomers
 from arena.results.services.boards import LONGEST_NAME, make_board, publish_table, share_board
@@ -195,11 +195,8 @@ def _context(request: HttpRequest, board: Board) -> dict[str, Any]:
     if not shown:
         return context
     table = shown[0].document
-    drawn = plot(table_rows(table))
-    rows = [
-        (line_drawn["row"], line, line_drawn["mark"])
-        for line_drawn, line in zip(drawn["lines"], table.lines, strict=True)
-    ]
+    drawn = plot(table.lines)
+    rows = [(line["row"], line["mark"]) for line in drawn["lines"]]
     return context | {"table": table, "rows": rows, "ticks": drawn["ticks"]}
 
 

@@ -2,24 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from arena.results.exports.tables import Row
+from arena.rating.lines import Line
 
 MOST_TICKS = 5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlacedInterval:
-    """A rating and its interval in percent of the axis; without a bound it reaches to the edge."""
-
-    lower: float
-    rating: float
-    upper: float
+PlacedInterval = dict[str, float]
+"""Rating, lower and upper bound in percent of the axis; without a bound it reaches to the edge."""
 
 
-def plot(rows: Sequence[Row]) -> dict[str, Any]:
+def plot(rows: Sequence[Line]) -> dict[str, Any]:
     """Lines with their marks, None for who has no rating, and the ticks of the axis."""
     bounds = [value for row in rows for value in row.interval if value is not None]
     step = _step(max(bounds, default=1000.0) - min(bounds, default=1000.0))
@@ -30,14 +24,11 @@ def plot(rows: Sequence[Row]) -> dict[str, Any]:
         at = 100.0 * (value / step - first) / (last - first) if value is not None else default
         return round(at, 2)
 
-    def mark(row: Row) -> PlacedInterval | None:
+    def mark(row: Line) -> PlacedInterval | None:
         if row.rating is None:
             return None
-        return PlacedInterval(
-            lower=place(row.lower, 0.0),
-            rating=place(row.rating, 0.0),
-            upper=place(row.upper, 100.0),
-        )
+        edges = {"lower": 0.0, "rating": 0.0, "upper": 100.0}
+        return {name: place(getattr(row, name), edge) for name, edge in edges.items()}
 
     ticks = [
         (round(number * step), place(number * step, 0.0)) for number in range(first, last + 1)

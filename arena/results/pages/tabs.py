@@ -17,14 +17,9 @@ from arena.rating.agreement import agreement_sentence
 from arena.rating.comparisons import Estimate
 from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import BoardRemarks, PairRecord, PanelRater
+from arena.results.exports import tables
 from arena.results.exports.agreement import agreement_by_question
 from arena.results.exports.charts import key_rows, make_scatters
-from arena.results.exports.tables import (
-    EARLY_LOOK,
-    LeaderboardTable,
-    for_experts,
-    leaderboard_table,
-)
 from arena.results.pages.plots import PlacedInterval, plot
 from arena.results.queries.access import list_events, list_snapshots, names_in_log
 from arena.results.queries.evidence import count_settled
@@ -42,21 +37,21 @@ LOG_LINES = 200
 
 def describe(snapshot: Snapshot, *, is_staff: bool) -> Context:
     """Return the common part of all tabs of a rating: its table, and its meaning in a sentence."""
-    table = leaderboard_table(snapshot)
+    table = tables.leaderboard_table(snapshot)
     if not is_staff:
-        table = for_experts(table)
+        table = tables.for_experts(table)
     settled = count_settled(snapshot)
     cast = snapshot.votes_counted - settled
     return {
         "table": table,
         "answer": snapshot.results.board.answer(table.rows, [r.slug for r in table.rows], cast),
-        "early_look": EARLY_LOOK,
+        "early_look": tables.EARLY_LOOK,
         "settled": settled,
         "cast": cast,
     }
 
 
-def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_table(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
     trust = snapshot.results.trust
     moves = [line.moves for line in trust.raters if line.moves is not None]
@@ -78,12 +73,12 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def fill_all(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_all(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """The same, with the study's questions beside each other where it asks several."""
     return fill_table(snapshot, table) | {"questions": compare_questions(snapshot)}
 
 
-def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_pairs(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """Every pair as a line, from the view of the one that stands higher."""
     board = snapshot.results.board
     place = {row.slug: n for n, row in enumerate(table.rows)}
@@ -114,7 +109,7 @@ def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_types(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """One chart of all scenario types, and a table each."""
     whole = {row.slug: row for row in table.rows}
     names = ("rank", "rating", "lower", "upper", "votes")
@@ -148,7 +143,7 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_raters(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """A judgement of each expert, who needs a look first; agreement, repeats, sides, figures."""
     trust = snapshot.results.trust
     lines = [line for line in trust.raters if line.judge != AUTOMATIC]
@@ -189,7 +184,7 @@ def _counts(rater: PanelRater) -> Context:
     }
 
 
-def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_agreement(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """Return the agreement of metrics: each question's decided votes, and by scenario type."""
     labels = {part.type: part.label for part in snapshot.results.types}
     return {
@@ -213,7 +208,7 @@ def fill_agreement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 _DISTANCES = {"wish": "distance to the wish", "displacement": "displacement"}
 
 
-def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_displacement(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """Elo against the distances to the wishes and from the references."""
     lines = _key_rows(table, {line.slug: line for line in snapshot.results.displacement})
     drawn = make_scatters(snapshot, table)
@@ -227,7 +222,7 @@ def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_driving(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """The drives of the augmentations that the study shows."""
     ids = list_shown_ids(snapshot.study)
     if not (Simulation.objects.exists() or NuplanResult.objects.exists()):
@@ -240,7 +235,7 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     return {"drivings": [driving_context(score) for score in scores if score.lines]}
 
 
-def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_cost(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """Elo against money, by class of model."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
@@ -258,7 +253,7 @@ def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_log(snapshot: Snapshot, table: tables.LeaderboardTable) -> Context:
     """Return the events of the study, and every rating of it."""
     study = snapshot.study
     rows = list_snapshots(study).defer("results").annotate(settled=KT("results__board__settled"))
@@ -273,7 +268,7 @@ def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
+TABS: dict[str, Callable[[Snapshot, tables.LeaderboardTable], Context]] = {
     "table": fill_all,
     "pairs": fill_pairs,
     "types": fill_types,
@@ -298,14 +293,14 @@ def _mark(share: Estimate) -> PlacedInterval | None:
     """A share in percent on an axis to 100; without an interval a point."""
     if share.value is None:
         return None
-    lower, value, upper = (
-        round(100.0 * (share.value if bound is None else bound), 2)
-        for bound in (share.lower, share.value, share.upper)
-    )
-    return PlacedInterval(lower=lower, rating=value, upper=upper)
+    bounds = {"lower": share.lower, "rating": share.value, "upper": share.upper}
+    return {
+        name: round(100.0 * (share.value if bound is None else bound), 2)
+        for name, bound in bounds.items()
+    }
 
 
-def _key_rows(table: LeaderboardTable, values: Mapping[str, Any]) -> list[Context]:
+def _key_rows(table: tables.LeaderboardTable, values: Mapping[str, Any]) -> list[Context]:
     """Return each contestant's results, with its key in the charts."""
     return [
         {"key": key, "row": row, "found": values[row.slug]}
