@@ -108,6 +108,12 @@ class Snapshot(Work):
         """Question of the rated votes; older ratings know a single question."""
         return str(self.filters.get("question", Question.INSTRUCTION))
 
+    @property
+    def marks(self) -> list[str]:
+        """Words for captions: whether it is simulated, and whether the study was still open."""
+        marks = {"simulated": self.includes_simulated, "early": self.is_early}
+        return [word for word, holds in marks.items() if holds]
+
     @cached_property
     def settled_ties(self) -> int | None:
         """Number of counted ties that were not shown; None if nobody counted them."""

@@ -79,14 +79,12 @@ FORMATS = table_formats(agreement_sheet) | formats(latex=agreement_latex)
 
 def _latex(snapshot: Snapshot, question: str, lines: Sequence[AgreementLine]) -> str:
     whole = [line for line in lines if not line.type]
-    marks = {"simulated": snapshot.includes_simulated, "early": snapshot.is_early}
-    words = [word for word, holds in marks.items() if holds]
     caption = f"{Question(question).label} {_caption(whole)}"
     return latex_table(
         ([escape(line.rater), share_text(line.share), *map(str, _counts(line))] for line in whole),
         heads=("Rater", "Agrees (95 % CI)", "Votes", "Called equal", "No value"),
         comments=(f"{snapshot.study.name}, rating {snapshot.code}: {METHOD}",),
-        caption=escape(caption + (f" ({', '.join(words)})" if words else "")),
+        caption=escape(caption + (f" ({', '.join(snapshot.marks)})" if snapshot.marks else "")),
         label=f"tab:agreement-{question}",
     )
 

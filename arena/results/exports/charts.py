@@ -11,18 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arena.exports.drawing import (
-    INK,
-    MARK,
-    SIMULATED,
-    SOFT,
-    Interval,
-    chart_style,
-    draw_interval,
-    draw_once,
-    name_lines,
-    write_figure,
-)
+from arena.exports import drawing
 from arena.models import Snapshot
 from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord, TypeRating
@@ -43,7 +32,7 @@ LONGEST_NAME = 38
 _HEAT = ("#f0a15c", "#f7f8f8", "#6aa5db")
 """Orange for the column, blue for the row: told apart with any colour vision."""
 
-_CLASSES = {"frontier": MARK, "utility": "#2c7a4b", "open_weight": "#a35a00"}
+_CLASSES = {"frontier": drawing.MARK, "utility": "#2c7a4b", "open_weight": "#a35a00"}
 """Colours of the classes of models."""
 
 
@@ -118,38 +107,44 @@ def key_rows(table: LeaderboardTable) -> list[tuple[str, Row]]:
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
     """Draw the ratings of a table, and say below what kind of intervals these are."""
-    return rows_chart(table.rows, _interval_label(table), file_format=file_format)
+    has_intervals = any(row.has_bound for row in table.rows)
+    label = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
+    words = [*table.snapshot.marks, *["only within groups comparable"] * table.has_parts]
+    label += f" ({', '.join(words)})" if words else ""
+    return rows_chart(table.rows, label, file_format=file_format)
 
 
-@draw_once
+@drawing.draw_once
 def rows_chart(rows: Sequence[Row], label: str, *, file_format: str) -> bytes:
     """Draw ratings as dots with their intervals as bars, best on top; diamonds are simulated."""
     from matplotlib.figure import Figure
 
-    with chart_style():
+    with drawing.chart_style():
         figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(rows)), layout="constrained")
         axes = figure.add_subplot()
         _draw_intervals(axes, rows, {row.slug: row.interval for row in rows})
         _name_ranked(axes, rows)
         axes.set_xlabel(label)
-        return write_figure(figure, file_format)
+        return drawing.write_figure(figure, file_format)
 
 
-@draw_once
+@drawing.draw_once
 def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format: str) -> bytes:
     """Draw a panel for each scenario type, contestants in the order of the whole table."""
     from matplotlib.figure import Figure
 
     across = min(len(parts), 3)
     down = math.ceil(len(parts) / across)
-    with chart_style():
+    with drawing.chart_style():
         size = (2.4 + 2.1 * across, 0.5 + (0.7 + 0.26 * len(rows)) * down)
         figure = Figure(figsize=size, layout="constrained")
         grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
         for panel, part in zip(grid.flat, parts, strict=False):
             intervals = {line.slug: (line.lower, line.rating, line.upper) for line in part.lines}
             _draw_intervals(panel, rows, intervals)
-            name_lines(panel, [row.model for row in rows], [row.is_simulated for row in rows])
+            drawing.name_lines(
+                panel, [row.model for row in rows], [row.is_simulated for row in rows]
+            )
             _note_ranks(panel, rows, part)
             panel.set_title(f"{part.label} (n {part.votes - (part.settled or 0)})", fontsize=7)
             panel.tick_params(axis="x", labelbottom=True)
@@ -158,10 +153,10 @@ def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format
         text = "Elo with 95 % intervals, each type rated by itself;"
         text += f" ranks at the right, * with fewer than {FEW_VOTES} votes"
         figure.supxlabel(text, fontsize=8)
-        return write_figure(figure, file_format)
+        return drawing.write_figure(figure, file_format)
 
 
-@draw_once
+@drawing.draw_once
 def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format: str) -> bytes:
     """Draw percent and number of votes in every cell, contestants in the given order."""
     from matplotlib.colors import LinearSegmentedColormap
@@ -175,7 +170,7 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         scores[a, b], scores[b, a] = won, pair.votes - won
         votes[a, b] = votes[b, a] = pair.votes
     shares = np.divide(scores, votes, out=np.full_like(scores, np.nan), where=votes > 0)
-    with chart_style():
+    with drawing.chart_style():
         side_in = 0.62 * max(len(rows), 2)
         names_in = 0.6 + 0.08 * max((len(row.model) for row in rows), default=0)
         figure = Figure(figsize=(side_in + names_in, side_in + 0.9), layout="constrained")
@@ -193,20 +188,25 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
             "Columns in the order of the rows. Score\nof the row in percent, a tie half a win;\n"
             "votes beneath"
         )
-        return write_figure(figure, file_format)
+        return drawing.write_figure(figure, file_format)
 
 
-@draw_once
+@drawing.draw_once
 def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
     """Draw points with letters and intervals, and beside them what the letters stand for."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
-    with chart_style():
+    with drawing.chart_style():
         height = max(3.6, 0.2 * (len(plot.points) + 4))
         figure = Figure(figsize=(7.2, height), layout="constrained")
         axes = figure.add_subplot()
         if plot.is_log:
-            _scale_logarithmically(axes)
+            # 1, 2 and 5 of every decade, as plain numbers.
+            axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.minorticks_off()
         for point in plot.points:
             _draw_point(axes, point)
         axes.grid()
@@ -214,25 +214,27 @@ def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
         axes.set_ylabel("Elo with 95 % interval")
         legend = figure.legend(loc="outside right upper", frameon=False, fontsize=7)
         for text, point in zip(legend.get_texts(), plot.points, strict=True):
-            text.set_color(SIMULATED if point.row.is_simulated else INK)
-        return write_figure(figure, file_format)
+            text.set_color(drawing.SIMULATED if point.row.is_simulated else drawing.INK)
+        return drawing.write_figure(figure, file_format)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _draw_intervals(axes: Axes, rows: Sequence[Row], intervals: Mapping[str, Interval]) -> None:
+def _draw_intervals(
+    axes: Axes, rows: Sequence[Row], intervals: Mapping[str, drawing.Interval]
+) -> None:
     for place, row in enumerate(rows):
         if row.slug in intervals:
-            draw_interval(axes, place, intervals[row.slug], simulated=row.is_simulated)
+            drawing.draw_interval(axes, place, intervals[row.slug], simulated=row.is_simulated)
 
 
 def _name_ranked(axes: Axes, rows: Sequence[Row]) -> None:
     """Name the lines of a chart, each with its rank."""
     names = [f"{row.model}  {row.rank or '–'}" for row in rows]
-    name_lines(axes, names, [row.is_simulated for row in rows])
+    drawing.name_lines(axes, names, [row.is_simulated for row in rows])
     edge = (0, 1), (-2, 2), "axes fraction", "offset points"
-    axes.annotate("Rank", *edge, ha="right", color=SOFT)
+    axes.annotate("Rank", *edge, ha="right", color=drawing.SOFT)
 
 
 def _note_ranks(axes: Axes, rows: Sequence[Row], part: TypeRating) -> None:
@@ -248,36 +250,14 @@ def _note_ranks(axes: Axes, rows: Sequence[Row], part: TypeRating) -> None:
 def _draw_point(axes: Axes, point: Point) -> None:
     row, kind = point.row, point.model_class.replace("_", " ")
     name = row.model if len(row.model) <= LONGEST_NAME else f"{row.model[: LONGEST_NAME - 1]}…"
-    draw_interval(
+    drawing.draw_interval(
         axes,
         point.x,
         point.row.interval,
         simulated=row.is_simulated,
-        colour=_CLASSES.get(point.model_class, MARK),
+        colour=_CLASSES.get(point.model_class, drawing.MARK),
         upright=True,
         label=f"{point.key}  {name}, rank {row.rank or '–'}" + (f" ({kind})" if kind else ""),
     )
     place = (point.x, row.rating or 0.0)
     axes.annotate(point.key, place, (4, 4), textcoords="offset points")
-
-
-def _scale_logarithmically(axes: Axes) -> None:
-    """Put 1, 2 and 5 of every decade across, as plain numbers."""
-    from matplotlib.ticker import LogLocator
-
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.minorticks_off()
-
-
-def _interval_label(table: LeaderboardTable) -> str:
-    marks = {
-        "simulated": table.snapshot.includes_simulated,
-        "early": table.snapshot.is_early,
-        "only within groups comparable": table.has_parts,
-    }
-    has_intervals = any(row.has_bound for row in table.rows)
-    text = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
-    words = [word for word, holds in marks.items() if holds]
-    return f"{text} ({', '.join(words)})" if words else text

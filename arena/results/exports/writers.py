@@ -12,22 +12,9 @@ from typing import Any
 from django.http import Http404, HttpResponse
 from django.utils.text import slugify
 
+from arena.exports import formats
 from arena.exports.cells import csv_text
 from arena.exports.files import describe_files, zip_bytes
-from arena.exports.formats import (
-    Export,
-    Format,
-    Sheet,
-    Value,
-    download,
-    drawings,
-    formats,
-    json_bytes,
-    make_csv,
-    make_sheet,
-    read_value,
-    table_formats,
-)
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.exports.leaderboard import RATING, file_columns, list_columns, print_lines
 from arena.models import Snapshot
@@ -48,15 +35,15 @@ MANIFEST = "manifest.json"
 # --- The table ---------------------------------------------------------------------------------
 
 
-def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
+def leaderboard_sheet(table: LeaderboardTable) -> formats.Sheet:
     """Return one row a contestant; in CSV numbers have two decimals."""
     columns = file_columns(RATING, table, is_old=_is_old(table))
-    return make_sheet(table.rows, columns, name="leaderboard", digits=None, number=".2f")
+    return formats.make_sheet(table.rows, columns, name="leaderboard", digits=None, number=".2f")
 
 
 def leaderboard_json(table: LeaderboardTable) -> bytes:
     """Return an object whose `standings` is a list of {model, rank, rating, lower, upper, ...}."""
-    return json_bytes(
+    return formats.json_bytes(
         _document(table) | {"standings": [_standing(table, row) for row in table.rows]}
     )
 
@@ -113,8 +100,6 @@ def plain_text(table: LeaderboardTable) -> str:
 def leaderboard_latex(table: LeaderboardTable) -> bytes:
     """Return the paper's table with comments."""
     rating, board = table.snapshot, table.snapshot.results.board
-    marks = {"simulated": rating.includes_simulated, "early": rating.is_early}
-    words = [word for word, holds in marks.items() if holds]
     caption = caption_text(
         table.method_text,
         votes=rating.votes_cast,
@@ -134,19 +119,19 @@ def leaderboard_latex(table: LeaderboardTable) -> bytes:
             *table.warnings,
         ),
         notes=[*table.missing, *table.reasons],
-        caption=f"{caption} ({', '.join(words)})" if words else caption,
+        caption=f"{caption} ({', '.join(rating.marks)})" if rating.marks else caption,
     )
     return text.encode()
 
 
-FORMATS: dict[str, Format[LeaderboardTable]] = {
-    **table_formats(leaderboard_sheet),
-    **formats(json=leaderboard_json, latex=leaderboard_latex),
-    **drawings(interval_chart),
+FORMATS: dict[str, formats.Format[LeaderboardTable]] = {
+    **formats.table_formats(leaderboard_sheet),
+    **formats.formats(json=leaderboard_json, latex=leaderboard_latex),
+    **formats.drawings(interval_chart),
 }
 
 
-CHART_FORMATS: dict[str, Format[Chart]] = drawings(
+CHART_FORMATS: dict[str, formats.Format[Chart]] = formats.drawings(
     lambda chart, *, file_format: chart(file_format=file_format)
 )
 
@@ -182,15 +167,15 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     }
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
-    files["raters.csv"] = make_csv(RATERS, results.trust.raters)
+    files["raters.csv"] = formats.make_csv(RATERS, results.trust.raters)
     if results.agreement:
         files["agreement.csv"] = AGREEMENT_FORMATS["csv"].write(snapshot)
     if frozen := snapshot.study.preregistration.encode():
         files[FILE_NAME] = frozen
     if table.hypotheses:
-        files["hypotheses.csv"] = make_csv(HYPOTHESES, table.hypotheses)
-    files["statistics.json"] = json_bytes(_statistics(results), sort_keys=True)
-    files[MANIFEST] = json_bytes(_manifest(table, files), sort_keys=True)
+        files["hypotheses.csv"] = formats.make_csv(HYPOTHESES, table.hypotheses)
+    files["statistics.json"] = formats.json_bytes(_statistics(results), sort_keys=True)
+    files[MANIFEST] = formats.json_bytes(_manifest(table, files), sort_keys=True)
     return files
 
 
@@ -207,15 +192,17 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
 
 CHARTS = ("pairs", "types", "wish", "displacement", "elo-usd")
 RATING_FILES = {
-    "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
-    "agreement": Export(
+    "leaderboard": formats.Export(FORMATS, leaderboard_table, "the newest rating of a study"),
+    "agreement": formats.Export(
         AGREEMENT_FORMATS,
         agreement_rating,
         "which metric agrees with experts, of the newest rating",
     ),
-    "votes": Export(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),
-    "all": Export(formats(zip=zip_bytes), bundle_files),
-    **{name: Export(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},
+    "votes": formats.Export(
+        VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"
+    ),
+    "all": formats.Export(formats.formats(zip=zip_bytes), bundle_files),
+    **{name: formats.Export(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},
 }
 """What a rating is offered as. PostgreSQL keeps the keys of stored documents in an order of its
 own, so documents are sorted."""
@@ -235,7 +222,7 @@ def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
     except UnknownName as error:
         raise Http404 from error
     stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
-    return download(RATING_FILES[name].formats, form, stem, made)
+    return formats.download(RATING_FILES[name].formats, form, stem, made)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -249,7 +236,7 @@ def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
     part: dict[str, Any] = {"part": row.part} if table.has_parts else {}
     part |= {"card": dict(sorted(row.card.items()))} if row.card else {}
     return {
-        column.key: read_value(row, column.field)
+        column.key: formats.read_value(row, column.field)
         for column in list_columns(RATING, is_old=_is_old(table))
         if column.key
     } | part
@@ -352,7 +339,7 @@ def _csv_with_ties(head: Sequence[str], rows: Iterable[list[Any]]) -> bytes:
     return csv_text([*head, "settled_ties"], written).encode()
 
 
-RATERS: dict[str, Value] = {
+RATERS: dict[str, formats.Value] = {
     "judge": "name",
     "votes": "votes",
     "median_ms": "median_ms",
@@ -371,7 +358,7 @@ RATERS: dict[str, Value] = {
     "checks_skipped": "checks_skipped",
     "aids": lambda line: " ".join(f"{name}={number}" for name, number in line.aids),
 }
-HYPOTHESES: dict[str, Value] = {
+HYPOTHESES: dict[str, formats.Value] = {
     "hypothesis": "hypothesis.text",
     "better": lambda answer: (answer.hypothesis.above or ("", ""))[0],
     "other": lambda answer: (answer.hypothesis.above or ("", ""))[1],
