@@ -18,10 +18,8 @@ from arena.exports.cells import Columns as Columns
 from arena.exports.cells import Dtype as Dtype
 from arena.exports.cells import Value as Value
 from arena.exports.cells import csv_text
-from augment.errors import check_names
 
 Table = TypeVar("Table")
-Named = TypeVar("Named")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,16 +71,6 @@ def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
         suffix, content_type, is_text = _KINDS[name]
         made[name] = Format(suffix=suffix, content_type=content_type, is_text=is_text, write=write)
     return made
-
-
-def format_named(named: Mapping[str, Named], name: str) -> Named:
-    """Return the format of that name.
-
-    Raises:
-        UnknownName: It is none of the known ones.
-    """
-    check_names("format", [name], named)
-    return named[name]
 
 
 def drawings(chart: Callable[..., bytes]) -> dict[str, Format[Any]]:
@@ -225,11 +213,6 @@ def sheet_parquet(sheet: Sheet) -> bytes:
     return file.getvalue()
 
 
-TABLE_FORMATS: dict[str, Format[Sheet]] = formats(
-    csv=sheet_csv, json=sheet_json, parquet=sheet_parquet
-)
-
-
 def table_formats(make: Callable[[Table], Sheet]) -> dict[str, Format[Table]]:
     """Return the formats of what can be made a sheet."""
     return formats(
@@ -237,3 +220,6 @@ def table_formats(make: Callable[[Table], Sheet]) -> dict[str, Format[Table]]:
         json=lambda table: sheet_json(make(table)),
         parquet=lambda table: sheet_parquet(make(table)),
     )
+
+
+TABLE_FORMATS: dict[str, Format[Sheet]] = table_formats(lambda sheet: sheet)

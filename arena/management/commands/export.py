@@ -11,7 +11,7 @@ from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
 from arena.exports.files import write_whole
-from arena.exports.formats import Export, format_named
+from arena.exports.formats import Export
 from arena.jobs.exports.faults import tabulate_votes
 from arena.jobs.exports.files import pack_scenarios
 from arena.jobs.exports.tables import JOB_FILES
@@ -45,7 +45,10 @@ Chosen = dict[str, Any]
 Say = Callable[[str], None]
 """Where a kind tells what was left out or lost, beside the file."""
 
-BY_OBJECT = "object"
+_DISPLACEMENT: dict[str, str] = {
+    **{by: f"displacement-by-{by}" for by in By},
+    "object": "displacement-objects",
+}
 
 
 class ExportedFile(NamedTuple):
@@ -80,7 +83,8 @@ class ExportKind:
 
 def _write(exported: Export, form: str, find: Callable[[], Any], **more: Any) -> ExportedFile:
     """Write one format of what is found; the format is looked at first."""
-    chosen = format_named(exported.formats, form)
+    check_names("format", [form], exported.formats)
+    chosen = exported.formats[form]
     content = chosen.write(exported.make(find(), **more))
     return ExportedFile(content, chosen.suffix, chosen.is_text)
 
@@ -138,12 +142,6 @@ def _write_faults(options: Chosen, say: Say) -> ExportedFile:
         return _write_table("faults", options)
     table = Export(JOB_FILES["faults"].formats, tabulate_votes)
     return _write(table, options["format"], lambda: find_job(options["job"]))
-
-
-def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
-    """Write how far from the references: in groups, or one row an object."""
-    part = "objects" if options["by"] == BY_OBJECT else f"by-{options['by']}"
-    return _write_table(f"displacement-{part}", options)
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:
@@ -218,21 +216,19 @@ _DRIVEN = "as it was simulated with"
 _FAULT_SOURCES = {"choices": ["labels", "votes"], "default": "labels"}
 
 KINDS: dict[str, ExportKind] = {
-    "leaderboard": ExportKind(
-        "study",
-        RATING_FILES["leaderboard"].help,
-        _write_rating,
-        _format([*RATING_FILES["leaderboard"].formats, "zip"]) | _OF_RATING,
-    ),
-    "agreement": ExportKind(
-        "study",
-        RATING_FILES["agreement"].help,
-        _write_rating,
-        _format(RATING_FILES["agreement"].formats) | _OF_RATING,
-    ),
-    "votes": ExportKind(
-        "study", RATING_FILES["votes"].help, _write_votes, _format(VOTE_FORMATS) | _OF_RATING
-    ),
+    **{
+        name: ExportKind(
+            "study",
+            RATING_FILES[name].help,
+            write,
+            _format([*RATING_FILES[name].formats, *more]) | _OF_RATING,
+        )
+        for name, write, more in (
+            ("leaderboard", _write_rating, ["zip"]),
+            ("agreement", _write_rating, []),
+            ("votes", _write_votes, []),
+        )
+    },
     "preferences": ExportKind(
         "study",
         "the votes of a closed study with scenes and modifications, to train and test on",
@@ -259,8 +255,8 @@ KINDS: dict[str, ExportKind] = {
     "displacement": ExportKind(
         "job",
         "how far from the references",
-        _write_displacement,
-        _option("--by", "grouped by, or a row an object", choices=[*By, BY_OBJECT], default="type")
+        lambda options, say: _write_table(_DISPLACEMENT[options["by"]], options),
+        _option("--by", "grouped by, or a row an object", choices=_DISPLACEMENT, default="type")
         | _format(JOB_FILES["displacement-by-type"].formats),
     ),
     "samples": ExportKind(

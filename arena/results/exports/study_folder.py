@@ -16,7 +16,7 @@ from django.utils.text import slugify
 
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
-from arena.exports.files import new_folder, zip_bytes, zip_folder
+from arena.exports.files import new_folder, sha256_hex, zip_bytes, zip_folder
 from arena.exports.formats import Value, make_csv, read_value, sheet_csv
 from arena.exports.written_files import FileWork, MadeFile
 from arena.jobs.exports.displacement import object_sheet
@@ -81,12 +81,6 @@ _JUDGED: dict[str, Value] = {
 """One line a vote, superseded ones and skips included, and one for each pair without a vote."""
 
 
-def _digest_of_change(row: Augmentation) -> str | None:
-    if row.modification is None:
-        return None
-    return hashlib.sha256(_json(row.modification)).hexdigest()
-
-
 AUGMENTATIONS: dict[str, Value] = {
     "augmentation": "code",
     "job": "job.name",
@@ -97,7 +91,9 @@ AUGMENTATIONS: dict[str, Value] = {
     "state": "state",
     "reason": "reason",
     "picture": "image",
-    "modification_sha256": _digest_of_change,
+    "modification_sha256": lambda row: (
+        None if row.modification is None else sha256_hex(_json(row.modification))
+    ),
     "finished_at": lambda row: row.finished_at and row.finished_at.isoformat(),
 }
 

@@ -86,10 +86,7 @@ pair whether their preference was kept."""
 
 def judge_answers_csv(run: JudgeRun) -> bytes:
     """Return all answers of a judge in the order of their pairs."""
-    return csv_text(COLUMNS, _rows(run)).encode()
-
-
-def _rows(run: JudgeRun) -> Iterator[tuple[object, ...]]:
+    rows: list[tuple[object, ...]] = []
     for row in list_answered_pairs(run):
         about = judge_name(run), run.question, row.left.scenario.slug
         became = exchange(row.first, row.second).value
@@ -98,4 +95,5 @@ def _rows(run: JudgeRun) -> Iterator[tuple[object, ...]]:
             (2, row.right, row.left, row.second, row.second_reason),
         ):
             shown = a.contestant.slug, b.contestant.slug, a.code, b.code
-            yield *about, order, *shown, answer, became, reason
+            rows.append((*about, order, *shown, answer, became, reason))
+    return csv_text(COLUMNS, rows).encode()
