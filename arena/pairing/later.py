@@ -8,7 +8,7 @@ Notation: P pairs, S scenarios.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -176,81 +176,90 @@ def follow_on(
         units: What comes now; none of it is known to the expert.
         rng: Shuffles.
     """
+    sequel = _Sequel(rules, grid, so_far, rng)
     items = [Slot(kind=MAIN, scenario=unit.scenario, pair=unit.pair) for unit in units]
-    items += _draw_repeats(rules, grid, so_far, units, rng)
-    items += _draw_checks(rules, grid, so_far, len(units), rng)
-    order = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
+    items += [*sequel.draw_repeats(units), *sequel.draw_checks(len(units))]
+    order = sequel.find_order(items)
     start = so_far[-1].position + 1 if so_far else 1
     position_of = {index: position for position, index in enumerate(order, start=start)}
     slots = [
         item if item.of is None else replace(item, again=position_of[item.of])
         for item in (items[index] for index in order)
     ]
-    flips = _turn_mains(grid, so_far, slots, rng)
+    flips = sequel.turn_mains(slots)
     return lay_out(rules, grid, expert, slots, flips, so_far, rng)
 
 
-def _draw_repeats(
-    rules: PlanRules,
-    grid: Grid,
-    so_far: Sequence[PlannedMatchup],
-    units: Sequence[GridUnit],
-    rng: np.random.Generator,
-) -> list[Slot]:
-    """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
-    done = {showing.repeats for showing in so_far if showing.kind == REPEAT}
-    mains = [showing for showing in so_far if showing.kind == MAIN]
-    # The share is of all the expert's main showings, so what was repeated already is taken off.
-    count = min(round(rules.repeat_share * (len(mains) + len(units))) - len(done), len(units))
-    if count < 1:
-        return []
-    latest = (so_far[-1].position + 1 if so_far else 1) - rules.repeat_distance
-    old = [s for s in mains if s.position <= latest and s.position not in done]
-    offered = [
-        Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, again=showing.position)
-        for showing, wanted in zip(old, main_units(grid, old), strict=True)
-    ]
-    if len(offered) < count:
+@dataclass(frozen=True, slots=True)
+class _Sequel:
+    """What an expert's next showings depend on beside their units."""
+
+    rules: PlanRules
+    grid: Grid
+    so_far: Sequence[PlannedMatchup]
+    rng: np.random.Generator
+
+    def draw_repeats(self, units: Sequence[GridUnit]) -> list[Slot]:
+        """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
+        rules, so_far = self.rules, self.so_far
+        done = {showing.repeats for showing in so_far if showing.kind == REPEAT}
+        mains = [showing for showing in so_far if showing.kind == MAIN]
+        # The share is of all the expert's main showings, so what was repeated is taken off.
+        count = min(round(rules.repeat_share * (len(mains) + len(units))) - len(done), len(units))
+        if count < 1:
+            return []
+        latest = (so_far[-1].position + 1 if so_far else 1) - rules.repeat_distance
+        old = [s for s in mains if s.position <= latest and s.position not in done]
         offered = [
-            Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, of=index)
-            for index, wanted in enumerate(units)
+            Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, again=showing.position)
+            for showing, wanted in zip(old, main_units(self.grid, old), strict=True)
         ]
-    return [offered[index] for index in rng.permutation(len(offered))[:count]]
+        if len(offered) < count:
+            offered = [
+                Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, of=index)
+                for index, wanted in enumerate(units)
+            ]
+        return [offered[index] for index in self.rng.permutation(len(offered))[:count]]
 
+    def draw_checks(self, more: int) -> list[Slot]:
+        """Draw attention checks that the expert has not seen, for so many more main showings."""
+        shown = {showing.scenario for showing in self.so_far if showing.kind == CHECK}
+        mains = sum(showing.kind == MAIN for showing in self.so_far) + more
+        unused = [check.scenario for check in self.rules.checks if check.scenario not in shown]
+        count = min(max(round(self.rules.check_share * mains) - len(shown), 0), len(unused))
+        columns = self.grid.column_of_scenario
+        drawn = [columns[unused[index]] for index in self.rng.permutation(len(unused))[:count]]
+        return [Slot(kind=CHECK, scenario=n, pair=-1) for n in drawn]
 
-def _draw_checks(
-    rules: PlanRules,
-    grid: Grid,
-    so_far: Sequence[PlannedMatchup],
-    more: int,
-    rng: np.random.Generator,
-) -> list[Slot]:
-    shown = {showing.scenario for showing in so_far if showing.kind == CHECK}
-    mains = sum(showing.kind == MAIN for showing in so_far) + more
-    unused = [check.scenario for check in rules.checks if check.scenario not in shown]
-    count = min(max(round(rules.check_share * mains) - len(shown), 0), len(unused))
-    columns = grid.column_of_scenario
-    drawn = [columns[unused[index]] for index in rng.permutation(len(unused))[:count]]
-    return [Slot(kind=CHECK, scenario=n, pair=-1) for n in drawn]
+    def find_order(self, items: Sequence[Slot]) -> list[int]:
+        """Order the items with the largest gap that can be kept, also to what was shown before."""
+        bases, most = [int(base) for base in self.grid.bases], self.rules.scenario_gap
+        before = [showing.scenario for showing in self.so_far][-most:]
+        last = [bases[self.grid.column_of_scenario[name]] for name in before]
+        # Greedy orders depend on their lots: five of each gap, then a smaller one.
+        for gap in range(most, -1, -1):
+            for _ in range(5):
+                shown = last[len(last) - min(gap, len(last)) :]
+                order = _try_order(items, shown, gap, self.rng, bases)
+                if order is not None:
+                    return order
+        raise AssertionError("without a gap any order will do")
 
-
-def _find_order(
-    items: Sequence[Slot],
-    before: Sequence[str],
-    grid: Grid,
-    rules: PlanRules,
-    rng: np.random.Generator,
-) -> list[int]:
-    """Order the items with the largest gap that can be kept, also to what was shown before."""
-    bases = [int(base) for base in grid.bases]
-    last = [bases[grid.column_of_scenario[name]] for name in before[-rules.scenario_gap :]]
-    # Greedy orders depend on their lots: five of each gap, then a smaller one.
-    for gap in range(rules.scenario_gap, -1, -1):
-        for _ in range(5):
-            order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng, bases)
-            if order is not None:
-                return order
-    raise AssertionError("without a gap any order will do")
+    def turn_mains(self, slots: Sequence[Slot]) -> list[bool]:
+        """Say which main showings to turn around: what was more often on the left goes right."""
+        lead: Counter[frozenset[str]] = Counter()
+        for showing in self.so_far:
+            if showing.kind == MAIN:
+                pair = frozenset((showing.left, showing.right))
+                lead[pair] += 1 if showing.left < showing.right else -1
+        flips = []
+        for slot in slots:
+            if slot.kind == MAIN:
+                pair = frozenset(self.grid.pairs[slot.pair])
+                flip = lead[pair] > 0 or (lead[pair] == 0 and bool(self.rng.random() < 0.5))
+                lead[pair] += -1 if flip else 1
+                flips.append(flip)
+        return flips
 
 
 def _try_order(
@@ -277,22 +286,3 @@ def _try_order(
         order.append(waiting[place].pop())
         recent.append(bases[place])
     return order
-
-
-def _turn_mains(
-    grid: Grid, so_far: Sequence[PlannedMatchup], slots: Sequence[Slot], rng: np.random.Generator
-) -> list[bool]:
-    """Say which main showings to turn around: what was on the left more often goes right."""
-    lead: Counter[frozenset[str]] = Counter()
-    for showing in so_far:
-        if showing.kind == MAIN:
-            pair = frozenset((showing.left, showing.right))
-            lead[pair] += 1 if showing.left < showing.right else -1
-    flips = []
-    for slot in slots:
-        if slot.kind == MAIN:
-            pair = frozenset(grid.pairs[slot.pair])
-            flip = lead[pair] > 0 or (lead[pair] == 0 and bool(rng.random() < 0.5))
-            lead[pair] += -1 if flip else 1
-            flips.append(flip)
-    return flips

@@ -10,22 +10,31 @@ from collections import deque
 import numpy as np
 
 from arena.errors import NothingToPlan
-from arena.pairing.order import BoolArray, FloatArray, IntArray
+from arena.pairing.order import BoolArray, IntArray
 
 
 def choose_units(
     showable: BoolArray, experts: int, votes: int, rng: np.random.Generator
 ) -> BoolArray:
-    """Units per expert, (E, P, S): balanced over scenarios first, then over pairs."""
+    """Units per expert, (E, P, S): balanced over scenarios first, then over pairs.
+
+    On each scenario the pairs that the expert is owed most, then those that fewest experts have
+    judged there, then by lot.
+    """
     pairs, scenarios = showable.shape
     of_scenario = quotas(showable.sum(axis=0), experts, votes, rng)
     of_pair = quotas(showable.sum(axis=1), experts, votes, rng)
     chosen = np.zeros((experts, pairs, scenarios), dtype=bool)
     judges = np.zeros((pairs, scenarios))
     for expert in range(experts):
-        mine = chosen[expert]
-        order = rng.permutation(scenarios)
-        _fill(mine, showable, judges, order, of_scenario[expert], of_pair[expert], rng)
+        mine, owed = chosen[expert], of_pair[expert].astype(float)
+        for scenario in rng.permutation(scenarios):
+            # (P,): what is owed outweighs any number of judges, and these the lots below 1.
+            score = 1e4 * owed - judges[:, scenario] + rng.random(pairs)
+            score[~showable[:, scenario]] = -np.inf
+            picked = np.argsort(-score)[: of_scenario[expert, scenario]]
+            mine[picked, scenario] = True
+            owed[picked] -= 1
         even_out(mine, showable, of_pair[expert])
         judges += mine
     # (P, E * S): with each expert's scenarios as columns of their own, whose sums stay, pairs are
@@ -34,38 +43,6 @@ def choose_units(
     everywhere = np.tile(showable, (1, experts))
     even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
     return flat.reshape(pairs, experts, scenarios).transpose(1, 0, 2)
-
-
-def _fill(
-    mine: BoolArray,
-    showable: BoolArray,
-    judges: FloatArray,
-    order: IntArray,
-    take: IntArray,
-    owed: IntArray,
-    rng: np.random.Generator,
-) -> None:
-    """Choose rows of `mine` (n, K) column by column.
-
-    Those that are owed most, then those that fewest have judged there, then by lot.
-
-    Args:
-        mine: Changed in place.
-        showable: (n, K), where a unit can be.
-        judges: (n, K) how many experts have each unit.
-        order: Of the columns.
-        take: (K,) how many rows of each column.
-        owed: (n,) how many columns each row should have.
-        rng: The lots.
-    """
-    wanted = owed.astype(float)
-    for column in order:
-        # (n,): what is owed outweighs any number of judges, and these outweigh the lots below 1.
-        score = 1e4 * wanted - judges[:, column] + rng.random(len(wanted))
-        score[~showable[:, column]] = -np.inf
-        picked = np.argsort(-score)[: take[column]]
-        mine[picked, column] = True
-        wanted[picked] -= 1
 
 
 def quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generator) -> IntArray:

@@ -20,7 +20,6 @@ from arena.voting.services.pictures import (
     Showing,
     check_pictures,
     find_showable,
-    find_sides,
     frames_shown,
     with_picture,
     without_lost_checks,
@@ -131,7 +130,9 @@ def store(
     named = {scenario_at(pair.scenario) for pair in planned}
     earlier = _find_earlier(study, named) if batch else {}
     frames = frames_shown(study, named) if batch else {}
-    sides = [find_sides(pair, cells) for pair in planned]
+    sides = [
+        (cells[pair.scenario, pair.left], cells[pair.scenario, pair.right]) for pair in planned
+    ]
     rows = []
     for pair, (left, right) in zip(planned, sides, strict=True):
         window = (

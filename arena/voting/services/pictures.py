@@ -16,7 +16,7 @@ from django.db.models import F, Min, Q, QuerySet
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.pairing.plan import Check, PlannedMatchup, PlanRules
+from arena.pairing.plan import Check, PlanRules
 from arena.pairing.rules import sample_place, scenario_at
 from arena.voting.queries.showings import LEGEND
 from augment.errors import Conflict
@@ -172,11 +172,6 @@ def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
         )
         if view
     }
-
-
-def find_sides(pair: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
-    """Return the augmentations on the left and on the right."""
-    return cells[pair.scenario, pair.left], cells[pair.scenario, pair.right]
 
 
 class SampleRule(StrEnum):
