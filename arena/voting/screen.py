@@ -4,7 +4,6 @@ from collections.abc import Collection
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.core.exceptions import ValidationError
 from django.db.models import Q
 from django.db.models.functions import Length
 from django.urls import reverse
@@ -13,6 +12,7 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
+from arena.shell.forms import read_code
 from arena.voting.queries.ballots import list_voters, own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import as_shown, note_objects
@@ -187,10 +187,7 @@ def _times_today(study: Study, expert: User) -> list[int | None]:
 
 
 def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
-    try:
-        vote = own_votes(study, expert).filter(key=key).first() if key else None
-    except ValidationError:  # it is no key at all
-        return None
+    vote = own_votes(study, expert).filter(key=read_code(key)).first()
     if vote is None:
         return None
     if study.ask_why:

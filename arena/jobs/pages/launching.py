@@ -7,7 +7,6 @@ from typing import Any
 
 from django import forms
 from django.contrib import messages
-from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
@@ -16,7 +15,7 @@ from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.shell.access import ADMIN, form_for, get_user
 from arena.shell.acts import refusals_in, send_later
-from arena.shell.forms import ChoiceForm, Offer, offer
+from arena.shell.forms import ChoiceForm, Offer, offer, read_code
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
 from augment.services import read_request, read_values, running, to_inputs
 from augment.services.endpoints import OPTION_INPUTS
@@ -112,45 +111,35 @@ class LaunchForm(ChoiceForm, OptionsForm):
 @form_for(ADMIN)
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
-    form = _form(request, request.POST or None)
+    contestants = Contestant.objects.filter(retired_at=None).select_related("endpoint")
+    models = EndpointModel.objects.select_related("endpoint")
+    chosen_set = set_asked(request.GET.get("set"))
+    form = LaunchForm(
+        request.POST or None,
+        contestants=list(contestants.order_by("name")),
+        groups=by_type(chosen_set),
+        models=list(models.order_by("endpoint__label", "model")),
+    )
+    context: dict[str, Any] = {"form": form, "sets": set_choices(chosen_set)}
     if not form.is_bound:
         form.initial = _like(request) or form.usual()
-    if "estimate" in request.POST:
-        return _show_estimate(request, form)
+    if "estimate" in request.POST:  # nothing is launched: the form comes back as it came in
+        with refusals_in(form):
+            context |= {"estimate": form.find_estimate()}
+            context |= {"cap_usd": form.cleaned_data.get("cap_usd")}
+        return render(request, "jobs/new.html", context)
     if form.is_bound and form.is_valid():
         with refusals_in(form), transaction.atomic():
             job = _launch(request, form)
             send_later(request, enqueue_job, job.pk)
             messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
-    return _page(request, form, status=422 if form.errors else 200)
-
-
-def _form(request: HttpRequest, data: Any) -> LaunchForm:
-    contestants = Contestant.objects.filter(retired_at=None).select_related("endpoint")
-    models = EndpointModel.objects.select_related("endpoint")
-    return LaunchForm(
-        data,
-        contestants=list(contestants.order_by("name")),
-        groups=by_type(set_asked(request.GET.get("set"))),
-        models=list(models.order_by("endpoint__label", "model")),
-    )
-
-
-def _page(
-    request: HttpRequest, form: LaunchForm, *, status: int = 200, **more: object
-) -> HttpResponse:
-    chosen_set = set_asked(request.GET.get("set"))
-    context = {"form": form, "sets": set_choices(chosen_set), **more}
-    return render(request, "jobs/new.html", context, status=status)
+    return render(request, "jobs/new.html", context, status=422 if form.errors else 200)
 
 
 def _like(request: HttpRequest) -> dict[str, Any]:
     """Return the values of another job where the address names one."""
-    try:
-        job = GenerationJob.objects.filter(code=request.GET.get("like", "")).first()
-    except ValidationError:
-        return {}
+    job = GenerationJob.objects.filter(code=read_code(request.GET.get("like", ""))).first()
     if job is None:
         return {}
     names = ("samples", "is_fresh", "cap_calls", "cap_tokens")
@@ -164,14 +153,6 @@ def _like(request: HttpRequest) -> dict[str, Any]:
         like["cap_usd"] = f"{job.cap_usd.normalize():f}"
     is_all = request.GET.get("all") == "1"
     return like | (job.full_plan or {}) if is_all else like
-
-
-def _show_estimate(request: HttpRequest, form: LaunchForm) -> HttpResponse:
-    """Show the form as it came in, with what the job would use; nothing is launched."""
-    more: dict[str, Any] = {}
-    with refusals_in(form):
-        more = {"estimate": form.find_estimate(), "cap_usd": form.cleaned_data.get("cap_usd")}
-    return _page(request, form, **more)
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:

@@ -23,7 +23,7 @@ from arena.results.exports.tables import for_experts, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, list_unrated
 from arena.results.exports.writers import CHART_FORMATS, FORMATS, download_rating
 from arena.results.pages.tabs import FOR_EXPERTS, MAIN, TABS, describe, fill_table
-from arena.results.queries.access import list_snapshots, snapshot_to_export
+from arena.results.queries.access import list_snapshots, ready_snapshots, snapshot_to_export
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import (
     Choices,
@@ -33,40 +33,14 @@ from arena.results.services.ratings import (
     rate_now,
     share_rating,
 )
-from arena.shell import sending
-from arena.shell.access import (
-    ADMIN,
-    EXPERT,
-    RESEARCHER,
-    STAFF,
-    act_for,
-    form_for,
-    get_user,
-    keep_secret,
-    page_for,
-)
+from arena.shell import access, acts, sending
 from arena.shell.accounts import top_role
-from arena.shell.acts import (
-    Confirmation,
-    ask,
-    is_sure,
-    refusals_told,
-    send_later,
-    tell_errors,
-    wait_for_workers,
-)
-from arena.shell.forms import RequestForm, offer
+from arena.shell.forms import RequestForm, offer, read_code
 from arena.shell.pictures import charts_for_pages
 from arena.studies.pages.studies import export_place, study_question
 from arena.studies.queries import count_progress
 from arena.studies.services.opening import close_study
-from arena.voting.queries.blinding import (
-    ResultsAccess,
-    is_imported,
-    refuse_open_judge,
-    results_access,
-    votes_in,
-)
+from arena.voting.queries import blinding
 from augment.services import read_request, to_inputs
 from augment.services.scenarios import type_choices
 
@@ -106,28 +80,28 @@ class RatingForm(RequestForm):
         self.judges = sorted(names.items(), key=lambda item: item[1])
 
 
-@page_for(ADMIN, RESEARCHER, EXPERT)
+@access.page_for(access.ADMIN, access.RESEARCHER, access.EXPERT)
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    user = get_user(request)
+    user = access.get_user(request)
     role = top_role(user)
-    access = results_access(user=user, study=study, role=role)
-    if access is ResultsAccess.NONE:
+    allowed = blinding.results_access(user=user, study=study, role=role)
+    if allowed is blinding.ResultsAccess.NONE:
         raise PermissionDenied
-    if access is ResultsAccess.EARLY:
-        context = {"study": study, "is_expert": votes_in(user, study)}
+    if allowed is blinding.ResultsAccess.EARLY:
+        context = {"study": study, "is_expert": blinding.votes_in(user, study)}
         return render(request, "results/gate.html", context)
-    is_staff = role in STAFF
+    is_staff = role in access.STAFF
     if tab not in TABS:
         raise Http404
     if tab not in FOR_EXPERTS and not is_staff:
         raise PermissionDenied
     ratings = list(list_snapshots(study).defer("results")[:SHOWN])
-    snapshot = _choose_snapshot(request, study, ratings)
+    snapshot = _choose_snapshot(request, study)
     context = {
         "study": study,
-        "imported": is_imported(study),
+        "imported": blinding.is_imported(study),
         "snapshot": snapshot,
         "ratings": ratings,
         "under_way": [rating for rating in ratings if rating.state != Snapshot.State.READY],
@@ -135,14 +109,16 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "tab_template": f"results/{tab}.html",
         "more": [name for name in (TABS if is_staff else FOR_EXPERTS) if name not in MAIN],
         "is_staff": is_staff,
-        "has_evidence": is_staff and not is_imported(study),
+        "has_evidence": is_staff and not blinding.is_imported(study),
         "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
     }
     if is_staff:
         context["form"] = RatingForm(snapshot=snapshot, study=study)
         # Votes from a file have no page of a study, where the files are otherwise.
-        export = context["export"] = export_place(study, user) if is_imported(study) else None
-        context |= wait_for_workers(waits=export is not None and export["is_waiting"])
+        export = context["export"] = (
+            export_place(study, user) if blinding.is_imported(study) else None
+        )
+        context |= acts.wait_for_workers(waits=export is not None and export["is_waiting"])
     if is_staff and (link := getattr(snapshot, "shared", None)):
         address = reverse("shared-results", args=[link.token])
         context["shared_address"] = request.build_absolute_uri(address)
@@ -152,20 +128,20 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
     return render(request, "results/page.html", context)
 
 
-@act_for(*STAFF, back="results")
+@access.act_for(*access.STAFF, back="results")
 def rate_study(request: HttpRequest, code: uuid.UUID) -> None:
     """Freeze a new rating of the votes as they are now; a big one is left to a worker."""
     study = get_readable_study(request, code)
     form = RatingForm(request.POST)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return
     choices = read_request(RatingRequest, form.cleaned_data).choices()
-    choices |= {"early": study.state == Study.State.OPEN, "actor": get_user(request)}
+    choices |= {"early": study.state == Study.State.OPEN, "actor": access.get_user(request)}
     rate_or_send(request, study, **choices)
 
 
-@act_for(*STAFF, back="results")
+@access.act_for(*access.STAFF, back="results")
 def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> None:
     """Send a rating that waits or failed to the workers once more; twice does no harm."""
     study = get_readable_study(request, code)
@@ -174,24 +150,24 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> N
     sending.send_snapshot(snapshot.pk)
 
 
-@act_for(*STAFF, back="results")
+@access.act_for(*access.STAFF, back="results")
 def share(
     request: HttpRequest, code: uuid.UUID, rating: uuid.UUID, *, is_shared: bool
 ) -> HttpResponse:
     """Make the link by which anybody reads the table of this rating, or take it back."""
     snapshot = snapshot_to_export(get_readable_study(request, code), rating)
-    share_rating(snapshot, is_shared=is_shared, actor=get_user(request))
+    share_rating(snapshot, is_shared=is_shared, actor=access.get_user(request))
     return redirect(f"{reverse('results', args=[code])}?rating={rating}")
 
 
-@act_for(*STAFF, back="results")
+@access.act_for(*access.STAFF, back="results")
 def open_results_early(request: HttpRequest, code: uuid.UUID) -> None:
     """The explicit, logged act; who votes in the study votes no longer."""
     study = get_object_or_404(Study, code=code)
-    open_early(study=study, actor=get_user(request))
+    open_early(study=study, actor=access.get_user(request))
 
 
-@page_for(ADMIN, RESEARCHER, EXPERT)
+@access.page_for(access.ADMIN, access.RESEARCHER, access.EXPERT)
 @charts_for_pages
 def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A file of the rating that the address names, else of the newest.
@@ -200,28 +176,38 @@ def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> 
     cancelled study, which has no rating, staff get the votes.
     """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    is_staff = top_role(request.user) in STAFF
+    is_staff = top_role(request.user) in access.STAFF
     if form not in CHART_FORMATS and not is_staff:
         raise PermissionDenied
     if study.state == Study.State.CANCELLED and name == "votes":
         stem = f"{slugify(study.name) or 'study'}-votes"
         return download(VOTE_FORMATS, form, stem, list_unrated(study))
     snapshot = get_snapshot(request, get_readable_study(request, code))
-    with refusals_told(request):
+    with acts.refusals_told(request):
         return download_rating(snapshot, name, form)
     return redirect("results", code=code)
 
 
-@form_for(ADMIN)
+@access.form_for(access.ADMIN)
 def close_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take no more votes, rate them with the defaults and show the table; asks first."""
     study = get_object_or_404(Study, code=code)
-    if not is_sure(request):
+    if not acts.is_sure(request):
         if study.state != Study.State.OPEN:
             return redirect("study", code=code)
-        return ask(request, _closing(study))
-    actor = get_user(request)
-    with refusals_told(request):
+        (line,) = count_progress([study])
+        question = study_question(
+            study,
+            f"Close the study “{study.name}”?",
+            f"Votes given: {line.voted}. Pairs skipped: {line.skipped}. "
+            f"Still planned: {line.left}.",
+            "No more votes are taken. This can’t be taken back.",
+            "Its results can be read then, also by its experts. To end it without any, cancel it.",
+            button="Close the study",
+        )
+        return acts.ask(request, question)
+    actor = access.get_user(request)
+    with acts.refusals_told(request):
         closed = close_study(study=study, actor=actor)
         if study.state == Study.State.OPEN:  # not pressed twice
             rate_or_send(request, closed, actor=actor)
@@ -242,7 +228,7 @@ def show_shared(request: HttpRequest, token: str) -> HttpResponse:
     description = describe(snapshot, is_staff=False)
     context = {"study": snapshot.study, "snapshot": snapshot, "token": token}
     context |= description | fill_table(snapshot, description["table"])
-    return keep_secret(render(request, "results/shared.html", context))
+    return access.keep_secret(render(request, "results/shared.html", context))
 
 
 @login_not_required
@@ -252,7 +238,7 @@ def send_shared(request: HttpRequest, token: str, form: str) -> HttpResponse:
     snapshot = _find_snapshot(request, token)
     stem = f"{slugify(snapshot.study.name) or 'study'}-leaderboard"
     table = for_experts(leaderboard_table(snapshot))
-    return keep_secret(download(DATA, form, stem, table))
+    return access.keep_secret(download(DATA, form, stem, table))
 
 
 # --- What other pages of a rating share --------------------------------------------------------
@@ -265,7 +251,10 @@ def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
         PermissionDenied: They may not, or not without opening them early first.
     """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    if results_access(user=get_user(request), study=study) is not ResultsAccess.FULL:
+    if (
+        blinding.results_access(user=access.get_user(request), study=study)
+        is not blinding.ResultsAccess.FULL
+    ):
         raise PermissionDenied
     return study
 
@@ -289,7 +278,7 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
         AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
     """
     if not is_big(study):
-        send_later(request, sending.send_charts, rate_now(study=study, **choices).pk)
+        acts.send_later(request, sending.send_charts, rate_now(study=study, **choices).pk)
         return
     with transaction.atomic():
         planned = plan_snapshot(study=study, **choices)
@@ -299,40 +288,19 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
 
 def _rating_code(request: HttpRequest) -> uuid.UUID | None:
     wanted = request.GET.get("rating")
-    try:
-        return uuid.UUID(wanted) if wanted else None
-    except ValueError:
-        raise Http404 from None
+    return read_code(wanted) if wanted else None
 
 
-def _choose_snapshot(
-    request: HttpRequest, study: Study, ratings: list[Snapshot]
-) -> Snapshot | None:
+def _choose_snapshot(request: HttpRequest, study: Study) -> Snapshot | None:
     """The rating that the address names, else the first of `ready_snapshots`; with its results."""
-    ready = [rating for rating in ratings if rating.state == Snapshot.State.READY]
-    ready.sort(key=lambda rating: rating.question != study.questions[0])
-    code = _rating_code(request) or next((rating.code for rating in ready), None)
-    if code is None:
-        return None
-    rows = Snapshot.objects.select_related("study__vote_file", "made_by__person", "shared")
-    return get_object_or_404(rows, study=study, code=code, state=Snapshot.State.READY)
-
-
-def _closing(study: Study) -> Confirmation:
-    (line,) = count_progress([study])
-    return study_question(
-        study,
-        f"Close the study “{study.name}”?",
-        f"Votes given: {line.voted}. Pairs skipped: {line.skipped}. Still planned: {line.left}.",
-        "No more votes are taken. This can’t be taken back.",
-        "Its results can be read then, also by its experts. To end it without any, cancel it.",
-        button="Close the study",
-    )
+    rows = ready_snapshots(study).select_related("study__vote_file", "made_by__person", "shared")
+    code = _rating_code(request)
+    return rows.first() if code is None else get_object_or_404(rows, code=code)
 
 
 def _find_snapshot(request: HttpRequest, token: str) -> Snapshot:
     """The rating of a link that holds; of a study that is closed, as it was when it was shared."""
-    refuse_open_judge(request.user, Study.objects.filter(snapshots__shared__token=token))
+    blinding.refuse_open_judge(request.user, Study.objects.filter(snapshots__shared__token=token))
     rows = Snapshot.objects.select_related("study__vote_file")
     closed = rows.filter(study__state=Study.State.CLOSED, state=Snapshot.State.READY)
     return get_object_or_404(closed, shared__token=token)
