@@ -11,15 +11,8 @@ from rest_framework.permissions import IsAuthenticated
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api import fields
 from arena.api.access import ADMINS, EXPERTS
-from arena.api.fields import (
-    CodeField,
-    Field,
-    FlagField,
-    StrictSerializer,
-    TextField,
-    WholeNumberField,
-)
 from arena.api.views import ApiView, FileView, Params, file_operation, operation
 from arena.errors import BeingDrawn
 from arena.models import AIDS, OUTCOME_LETTERS, Question, Report, Vote
@@ -28,13 +21,7 @@ from arena.shell.sending import send_pictures
 from arena.voting.queries.ballots import find_undrawn, is_being_drawn, require_open, upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
-from arena.voting.services.casting import (
-    FAULT_CLASSES,
-    LONGEST_COMMENT,
-    Decision,
-    FaultMark,
-    receive_vote,
-)
+from arena.voting.services import casting
 from arena.voting.services.reports import SIDES, Complaint, report
 
 PNG = "image/png"
@@ -44,7 +31,7 @@ AHEAD, MOST = 4, 12
 """How many coming pairs are sent, by default and at most."""
 
 
-class MatchupsQuery(StrictSerializer):
+class MatchupsQuery(fields.StrictSerializer):
     """Study, and largest number of pairs."""
 
     study = serializers.UUIDField()
@@ -89,40 +76,42 @@ class MatchupDocument(serializers.Serializer[Any]):
     )
 
 
-class FaultBody(StrictSerializer):
+class FaultBody(fields.StrictSerializer):
     """A mark of what is wrong."""
 
     side = serializers.ChoiceField(choices=["A", "B"])
-    object = WholeNumberField(min_value=0, help_text="Its place in `objects` of the side.")
-    fault = serializers.ChoiceField(choices=FAULT_CLASSES)
+    object = fields.WholeNumberField(min_value=0, help_text="Its place in `objects` of the side.")
+    fault = serializers.ChoiceField(choices=casting.FAULT_CLASSES)
 
 
-class VoteBody(StrictSerializer):
+class VoteBody(fields.StrictSerializer):
     """One decision of an expert."""
 
-    key = CodeField()
-    matchup = CodeField()
+    key = fields.CodeField()
+    matchup = fields.CodeField()
     question = serializers.ChoiceField(
         choices=Question.choices, required=False, allow_blank=True, default=""
     )
     outcome = serializers.ChoiceField(choices=list(OUTCOMES))
-    both_miss = FlagField(required=False, default=False)
+    both_miss = fields.FlagField(required=False, default=False)
     strength = serializers.ChoiceField(
         choices=Vote.Strength.choices, required=False, allow_blank=True, default=""
     )
     reason = serializers.ChoiceField(
         choices=Vote.SkipReason.choices, required=False, allow_blank=True, default=""
     )
-    comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
-    ms_visible = WholeNumberField(
+    comment = fields.TextField(
+        required=False, allow_blank=True, default="", max_length=casting.LONGEST_COMMENT
+    )
+    ms_visible = fields.WholeNumberField(
         required=False, allow_null=True, default=None, min_value=0, max_value=LONGEST_MS
     )
     aids = serializers.ListField(
         child=serializers.ChoiceField(choices=AIDS), required=False, default=list, max_length=16
     )
     faults = FaultBody(many=True, required=False, default=list)
-    supersedes = CodeField(required=False, allow_null=True, default=None)
-    n = WholeNumberField(required=False, default=AHEAD, min_value=1, max_value=MOST)
+    supersedes = fields.CodeField(required=False, allow_null=True, default=None)
+    n = fields.WholeNumberField(required=False, default=AHEAD, min_value=1, max_value=MOST)
 
 
 class ReceivedDocument(serializers.Serializer[Any]):
@@ -134,14 +123,16 @@ class ReceivedDocument(serializers.Serializer[Any]):
     next = MatchupDocument(many=True)
 
 
-class ReportBody(StrictSerializer):
+class ReportBody(fields.StrictSerializer):
     """One report of an expert."""
 
-    key = CodeField()
-    matchup = CodeField()
+    key = fields.CodeField()
+    matchup = fields.CodeField()
     reason = serializers.ChoiceField(choices=Report.Reason.choices)
     side = serializers.ChoiceField(choices=list(SIDES), required=False, default="both")
-    comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
+    comment = fields.TextField(
+        required=False, allow_blank=True, default="", max_length=casting.LONGEST_COMMENT
+    )
 
 
 class SavedDocument(serializers.Serializer[Any]):
@@ -150,18 +141,18 @@ class SavedDocument(serializers.Serializer[Any]):
     saved = serializers.BooleanField()
 
 
-class PreferencesBody(StrictSerializer):
+class PreferencesBody(fields.StrictSerializer):
     """Changed preferences; missing fields stay."""
 
-    def get_fields(self) -> dict[str, Field]:
+    def get_fields(self) -> dict[str, fields.Field]:
         """Return a field for every switch."""
-        return {name: FlagField(required=False) for name in SWITCHES}
+        return {name: fields.FlagField(required=False) for name in SWITCHES}
 
 
 class PreferencesDocument(serializers.Serializer[Any]):
     """All preferences."""
 
-    def get_fields(self) -> dict[str, Field]:
+    def get_fields(self) -> dict[str, fields.Field]:
         """Return a field for every switch."""
         return {name: serializers.BooleanField() for name in SWITCHES}
 
@@ -203,9 +194,12 @@ class VotesView(ApiView):
         n, outcome = params.pop("n"), OUTCOMES[params.pop("outcome")]
         marks = params.pop("faults")
         params["faults"] = [
-            FaultMark(SIDES[mark["side"]].value, mark["object"], mark["fault"]) for mark in marks
+            casting.FaultMark(SIDES[mark["side"]].value, mark["object"], mark["fault"])
+            for mark in marks
         ]
-        received = receive_vote(expert=self.user, decision=Decision(outcome=outcome, **params))
+        received = casting.receive_vote(
+            expert=self.user, decision=casting.Decision(outcome=outcome, **params)
+        )
         progress = received.progress
         coming = upcoming(study=received.study, expert=self.user, n=n)
         return Response(

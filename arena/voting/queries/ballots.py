@@ -8,20 +8,7 @@ from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db import connection
-from django.db.models import (
-    BooleanField,
-    Case,
-    Count,
-    Exists,
-    ExpressionWrapper,
-    F,
-    Max,
-    OuterRef,
-    Q,
-    QuerySet,
-    When,
-)
+from django.db import connection, models
 from django.db.models.expressions import RawSQL
 from django.db.models.fields import IntegerField
 from django.utils import timezone
@@ -90,24 +77,24 @@ def hold_matchup(*, expert: User, code: UUID) -> Matchup:
         raise NotYours("This matchup is not yours.") from error
 
 
-def of_skipped_pair() -> Q:
+def of_skipped_pair() -> models.Q:
     """Votes on pairs that are skipped whole, the skips themselves among them."""
     skips = Vote.objects.filter(outcome=Vote.Outcome.SKIP, superseded_by=None)
-    return Q(Exists(skips.filter(matchup=OuterRef("matchup"))))
+    return models.Q(models.Exists(skips.filter(matchup=models.OuterRef("matchup"))))
 
 
-def current_votes(study: Study) -> QuerySet[Vote]:
+def current_votes(study: Study) -> models.QuerySet[Vote]:
     """Return the votes of a study that no later vote supersedes, of every kind."""
     return Vote.objects.filter(matchup__study=study, superseded_by=None)
 
 
-def own_votes(study: Study, expert: User) -> QuerySet[Vote]:
+def own_votes(study: Study, expert: User) -> models.QuerySet[Vote]:
     """Return an expert's current votes with what is shown of them, in the order of asking."""
     votes = current_votes(study).filter(expert=expert)
     votes = votes.select_related("matchup__scenario__follows")
-    turns = [When(question=key, then=turn) for turn, key in enumerate(study.questions)]
+    turns = [models.When(question=key, then=turn) for turn, key in enumerate(study.questions)]
     unread = "matchup__scenario__reference", "matchup__scenario__follows__reference"
-    return votes.defer(*unread).order_by("matchup__position", Case(*turns))
+    return votes.defer(*unread).order_by("matchup__position", models.Case(*turns))
 
 
 def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
@@ -118,17 +105,19 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """
     if study.state != Study.State.OPEN:
         return []
-    waits = RawSQL(_WAITS, (study.questions[-1],), output_field=BooleanField())
+    waits = RawSQL(_WAITS, (study.questions[-1],), output_field=models.BooleanField())
     matchups = _PAIRS.filter(waits, study=study, expert=expert)[:n]
     for matchup in matchups:
         matchup.asked = study.questions[matchup.answered]
-    drawn: list[Matchup] = list(takewhile(_is_drawn, matchups))
+    drawn: list[Matchup] = list(
+        takewhile(lambda pair: pair.view is None or "px_per_m" in pair.view, matchups)
+    )
     if study.ask_why:
         note_objects(drawn)
     return drawn
 
 
-def find_undrawn(study: Study) -> QuerySet[Matchup]:
+def find_undrawn(study: Study) -> models.QuerySet[Matchup]:
     """Return the matchups whose pictures workers have yet to draw."""
     planned = study.matchups.filter(view__isnull=False)
     return planned.exclude(view__has_key="px_per_m")
@@ -141,10 +130,6 @@ def is_being_drawn(study: Study) -> bool:
     return recent.exists()
 
 
-def _is_drawn(matchup: Matchup) -> bool:
-    return matchup.view is None or "px_per_m" in matchup.view
-
-
 # Written out: thousands of votes ask this, and building it anew cost as much as asking it.
 _SAW_NO_RESULTS = RawSQL(
     """
@@ -153,7 +138,7 @@ NOT EXISTS (
     WHERE look.study_id = arena_matchup.study_id AND look.user_id = arena_matchup.expert_id)
 """,
     (),
-    output_field=BooleanField(),
+    output_field=models.BooleanField(),
 )
 _SKIPS = """
 (vote.outcome = 'skip' AND NOT EXISTS (
@@ -235,7 +220,7 @@ WHERE study.id = %(study)s
 
 
 def count_votes(
-    matchups: QuerySet[Matchup], by: str
+    matchups: models.QuerySet[Matchup], by: str
 ) -> Callable[[int, Sequence[str]], dict[str, int]]:
     """Count matchups, and those with a vote or skipped, by their study or expert; three queries.
 
@@ -243,11 +228,11 @@ def count_votes(
         From a key and the questions that are asked the values of a VotingProgress.
     """
     current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
-    totals = dict(matchups.order_by().values_list(by).annotate(n=Count("pk")))
+    totals = dict(matchups.order_by().values_list(by).annotate(n=models.Count("pk")))
     answers = current.exclude(of_skipped_pair()).values_list(f"matchup__{by}", "question")
-    voted = {(key, question): n for key, question, n in answers.annotate(n=Count("pk"))}
+    voted = {(key, question): n for key, question, n in answers.annotate(n=models.Count("pk"))}
     skips = current.filter(outcome=Vote.Outcome.SKIP).values_list(f"matchup__{by}")
-    skipped = dict(skips.annotate(n=Count("pk")))
+    skipped = dict(skips.annotate(n=models.Count("pk")))
     return lambda key, questions: {
         "total": totals.get(key, 0),
         "voted": voted.get((key, questions[-1]), 0),
@@ -262,7 +247,7 @@ def tallies(study: Study) -> list[ExpertTally]:
     return [ExpertTally(expert=one, **count(one.pk, study.questions)) for one in experts]
 
 
-Voters = QuerySet[Any]
+Voters = models.QuerySet[Any]
 """Of EnrolledVoter, with what is counted about each."""
 
 
@@ -272,21 +257,21 @@ def list_voters(study: Study) -> Voters:
     Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well),
     `last_vote_at` and `is_done`.
     """
-    mine = Q(expert__matchups__study=study)
-    skipped = mine & Q(
+    mine = models.Q(expert__matchups__study=study)
+    skipped = mine & models.Q(
         expert__matchups__votes__outcome="skip", expert__matchups__votes__superseded_by=None
     )
-    answered = skipped | (mine & Q(expert__matchups__votes__question=study.questions[-1]))
-    is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
+    answered = skipped | (mine & models.Q(expert__matchups__votes__question=study.questions[-1]))
+    is_done = models.Q(dropped_at=None, planned__gt=0, answered__gte=models.F("planned"))
     return (
         EnrolledVoter.objects.filter(enrolment__study=study)
         .select_related("expert__person", "enrolment")
         .annotate(
-            planned=Count("expert__matchups", filter=mine, distinct=True),
-            answered=Count("expert__matchups", filter=answered, distinct=True),
-            skipped=Count("expert__matchups", filter=skipped, distinct=True),
-            last_vote_at=Max("expert__matchups__votes__at", filter=mine),
+            planned=models.Count("expert__matchups", filter=mine, distinct=True),
+            answered=models.Count("expert__matchups", filter=answered, distinct=True),
+            skipped=models.Count("expert__matchups", filter=skipped, distinct=True),
+            last_vote_at=models.Max("expert__matchups__votes__at", filter=mine),
         )
-        .annotate(is_done=ExpressionWrapper(is_done, output_field=BooleanField()))
+        .annotate(is_done=models.ExpressionWrapper(is_done, output_field=models.BooleanField()))
         .order_by("enrolled_at", "pk")
     )

@@ -113,10 +113,10 @@ def cast_vote(*, expert: User, decision: Decision) -> Vote:
         Conflict: The key belongs to another vote, or `supersedes` names none on this question.
         InvalidVote: The study does not allow it, or asks another question first.
     """
-    return _store(expert, decision, is_paced=False).vote
+    return receive_vote(expert=expert, decision=decision, is_paced=False).vote
 
 
-def receive_vote(*, expert: User, decision: Decision) -> VoteResult:
+def receive_vote(*, expert: User, decision: Decision, is_paced: bool = True) -> VoteResult:
     """Store what an expert's browser sent, at a pace that a person can keep.
 
     The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
@@ -127,7 +127,13 @@ def receive_vote(*, expert: User, decision: Decision) -> VoteResult:
         DatabaseBusy: It could not be written within VOTE_WAIT_S; nothing was stored.
         AugmentError: As in `cast_vote`.
     """
-    return _store(expert, decision, is_paced=True)
+    with in_turn(within_s=settings.VOTE_WAIT_S if is_paced else None):
+        try:
+            return _write(expert, decision, is_paced)
+        except IntegrityError:
+            # Another request stored the same key or decided the same matchup in between. That
+            # one counts; looked at again, this one is its replay or too late.
+            return _write(expert, decision, is_paced)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -166,16 +172,6 @@ def _find_fault_of_marks(decision: Decision) -> str:
     if any(mark.side not in PREFERENCES or mark.fault not in FAULT_CLASSES for mark in marks):
         return f"Each mark is of left or right, and one of: {', '.join(FAULT_CLASSES)}."
     return ""
-
-
-def _store(expert: User, decision: Decision, *, is_paced: bool) -> VoteResult:
-    with in_turn(within_s=settings.VOTE_WAIT_S if is_paced else None):
-        try:
-            return _write(expert, decision, is_paced)
-        except IntegrityError:
-            # Another request stored the same key or decided the same matchup in between. That
-            # one counts; looked at again, this one is its replay or too late.
-            return _write(expert, decision, is_paced)
 
 
 @transaction.atomic

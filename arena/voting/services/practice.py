@@ -26,8 +26,11 @@ def is_due(study: Study, expert: User) -> bool:
     """Return whether the expert practises now: nothing is voted yet and a pair is unanswered."""
     if not study.practice or Vote.objects.filter(matchup__study=study, expert=expert).exists():
         return False
-    if study.rules.get("practice_for") == OF_LINKS and not _came_by_link(expert):
-        return False
+    if study.rules.get("practice_for") == OF_LINKS:
+        # An invitation has let the expert in, or the link of a study for everybody.
+        invited = Invitation.objects.filter(expert=expert, used_at__isnull=False)
+        if not (invited.exists() or EnrolledVoter.objects.filter(expert=expert).exists()):
+            return False
     return any(not pair.answer for pair in practice_pairs(study, expert))
 
 
@@ -79,12 +82,6 @@ def skip_practice(*, study: Study, expert: User) -> None:
 def has_practice() -> bool:
     """Return whether there is something to practise on."""
     return bool(latest_pairs(Scenario.objects.all()))
-
-
-def _came_by_link(expert: User) -> bool:
-    """Return whether an invitation has let the expert in, or the link of a study for everybody."""
-    invited = Invitation.objects.filter(expert=expert, used_at__isnull=False)
-    return invited.exists() or EnrolledVoter.objects.filter(expert=expert).exists()
 
 
 def _open_practice(study: Study, expert: User) -> QuerySet[PracticePair]:

@@ -7,7 +7,7 @@ from django.contrib.auth.models import User
 from django.db import IntegrityError
 
 from arena.errors import InvalidVote, NotYours
-from arena.models import Matchup, Report
+from arena.models import Report
 from arena.voting.queries.ballots import own_matchup, require_open
 from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
@@ -62,22 +62,18 @@ def report(*, expert: User, complaint: Complaint) -> Report:
         require_open(matchup.study)
         if matchup.reports.count() >= MOST_REPORTS:
             raise Conflict(f"This pair has {MOST_REPORTS} reports already.")
-        stored = _insert(matchup, expert, complaint)
+        values = {
+            "matchup": matchup,
+            "expert": expert,
+            "reason": complaint.reason,
+            "side": complaint.side,
+            "comment": make_storable(complaint.comment.strip()),
+        }
+        try:
+            stored, _ = Report.objects.get_or_create(key=complaint.key, defaults=values)
+        except IntegrityError:  # the pair was handed over at this moment
+            raise NotYours("This matchup is not yours.") from None
     content = (matchup.pk, complaint.reason, complaint.side)
     if (stored.matchup_id, stored.reason, stored.side) != content:
         raise Conflict("This key belongs to another report; make a new key for every report.")
     return stored
-
-
-def _insert(matchup: Matchup, expert: User, complaint: Complaint) -> Report:
-    values = {
-        "matchup": matchup,
-        "expert": expert,
-        "reason": complaint.reason,
-        "side": complaint.side,
-        "comment": make_storable(complaint.comment.strip()),
-    }
-    try:
-        return Report.objects.get_or_create(key=complaint.key, defaults=values)[0]
-    except IntegrityError:  # the pair was handed over at this moment
-        raise NotYours("This matchup is not yours.") from None

@@ -5,13 +5,12 @@ reference, misjudges distances a little, calls close ones equal, and now and the
 key, as people do. Every question of a study is answered so, each with noise of its own.
 """
 
-from collections.abc import Iterable, Mapping
 from uuid import uuid5
 
 import numpy as np
 from django.db import transaction
 
-from arena.models import Matchup, Study, Vote
+from arena.models import Study, Vote
 from arena.voting.services.casting import Decision, cast_vote
 from augment.errors import Conflict
 from augment.services import log_change
@@ -48,30 +47,25 @@ def simulate_votes(*, study: Study, seed: int) -> int:
         for measured in of_rows(sides)
         if measured.displacement is not None
     }
+    rng, cast = np.random.default_rng(seed), 0
     with transaction.atomic():
-        return _cast_all(study, waiting, errors_m, seed)
-
-
-def _cast_all(
-    study: Study, waiting: Iterable[Matchup], errors_m: Mapping[int, float], seed: int
-) -> int:
-    """Vote on matchups; a change whose error nobody knows has none."""
-    rng = np.random.default_rng(seed)
-    cast = 0
-    for matchup in waiting:
-        left_m, right_m = (errors_m.get(key, 0.0) for key in (matchup.left_id, matchup.right_id))
-        for question in study.questions:
-            is_primary = question == study.questions[0]
-            decision = Decision(
-                matchup=matchup.code,
-                key=uuid5(matchup.code, "simulated" if is_primary else f"simulated {question}"),
-                outcome=_judge(right_m - left_m, rng),
-                question=question,
-            )
-            cast_vote(expert=matchup.expert, decision=decision)
-            cast += 1
-    if cast:
-        log_change(study, "simulate votes", after={"votes": cast, "seed": seed})
+        for matchup in waiting:
+            # A change whose error nobody knows has none.
+            shown = matchup.left_id, matchup.right_id
+            left_m, right_m = (errors_m.get(key, 0.0) for key in shown)
+            for question in study.questions:
+                is_primary = question == study.questions[0]
+                name = "simulated" if is_primary else f"simulated {question}"
+                decision = Decision(
+                    matchup=matchup.code,
+                    key=uuid5(matchup.code, name),
+                    outcome=_judge(right_m - left_m, rng),
+                    question=question,
+                )
+                cast_vote(expert=matchup.expert, decision=decision)
+                cast += 1
+        if cast:
+            log_change(study, "simulate votes", after={"votes": cast, "seed": seed})
     return cast
 
 
