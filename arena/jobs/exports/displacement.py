@@ -281,7 +281,12 @@ def _draw_boxes(axes: Axes, table: DisplacementTable, summaries: Sequence[Summar
         for group, summary in zip(table.groups, summaries, strict=True)
     ]
     name_lines(axes, names, [group.contestant.is_simulated for group in table.groups])
-    _scale(axes, list(boxes.values()))
+    # Logarithmic beyond 1 m where outliers would squeeze all boxes.
+    longest = max([LINEAR_UP_TO_M, *(box["whishi"] for box in boxes.values())])
+    if any(outlier > FAR * longest for box in boxes.values() for outlier in box["fliers"]):
+        axes.set_xscale("symlog", linthresh=LINEAR_UP_TO_M, subs=[2.0, 5.0])
+        axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlim(left=0.0)
 
 
 def _stats(box: BoxSummary) -> dict[str, Any]:
@@ -306,15 +311,6 @@ def _name(table: DisplacementTable, group: Group, summary: Summary) -> str:
         f"{word} {number}" for word, number in counts.items() if number or word == "n"
     )
     return f"{heading}{name} ({remark})"
-
-
-def _scale(axes: Axes, boxes: Sequence[dict[str, Any]]) -> None:
-    """Scale the axis logarithmically beyond 1 m where outliers would squeeze all boxes."""
-    longest = max([LINEAR_UP_TO_M, *(box["whishi"] for box in boxes)])
-    if any(outlier > FAR * longest for box in boxes for outlier in box["fliers"]):
-        axes.set_xscale("symlog", linthresh=LINEAR_UP_TO_M, subs=[2.0, 5.0])
-        axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlim(left=0.0)
 
 
 _BOX_PLOTS = formats.drawings(draw_once(box_plot, group_sheet))

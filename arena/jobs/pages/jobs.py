@@ -180,23 +180,20 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             jobs.cancel(job=job, actor=get_user(request))
             messages.success(request, "Cancelled. What is done stays.")
     elif job.state in jobs.OPEN:
-        return ask(request, _cancelling(job))
+        counts = progress.count_rows(job)
+        question = Confirmation(
+            title=f"Cancel “{job.name}”?",
+            facts=(
+                f"Augmentations that wait and are never made: {counts.by_state[State.QUEUED]}.",
+                f"Settled, which stay as they are: {counts.settled}. What runs ends and is kept.",
+                "A cancelled job can’t go on; what is missing takes a new one.",
+            ),
+            button="Cancel the job",
+            back=reverse("job", args=[job.code]),
+            crumbs=job_crumbs(job),
+        )
+        return ask(request, question)
     return redirect("job", code=code)
-
-
-def _cancelling(job: GenerationJob) -> Confirmation:
-    counts = progress.count_rows(job)
-    return Confirmation(
-        title=f"Cancel “{job.name}”?",
-        facts=(
-            f"Augmentations that wait and are never made: {counts.by_state[State.QUEUED]}.",
-            f"Settled, which stay as they are: {counts.settled}. What runs ends and is kept.",
-            "A cancelled job can’t go on; what is missing takes a new one.",
-        ),
-        button="Cancel the job",
-        back=reverse("job", args=[job.code]),
-        crumbs=job_crumbs(job),
-    )
 
 
 def job_crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:

@@ -19,21 +19,13 @@ from arena.results.exports.votes import judge_answers_csv
 from arena.results.pages.ratings import get_readable_study
 from arena.results.queries.judges import WITHOUT_FAMILY, JudgeLine, judge_lines
 from arena.results.services.agreement import estimate_study_judge, judge_agreement, start_judge
+from arena.shell import acts
 from arena.shell.access import ADMIN, STAFF, act_for, get_user, page_for
-from arena.shell.acts import (
-    Confirmation,
-    ask,
-    is_sure,
-    send_later,
-    tell_errors,
-    wait_for_workers,
-    wants_to_change,
-)
 from arena.shell.forms import RequestForm, offer
 from arena.voting.queries.blinding import is_imported
 from augment.models import EndpointModel, JudgeRun
 from augment.services import read_request, to_inputs
-from augment.services.running import JudgeEstimate, JudgeRequest, cancel_judge
+from augment.services.running import JudgeRequest, cancel_judge
 from augment.tasks import enqueue_judge
 
 MOVING = JudgeRun.State.RUNNING
@@ -83,7 +75,7 @@ def judges_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         ],
         "form": JudgeForm(study),
         "imported": is_imported(study),
-        **wait_for_workers(waits=is_moving),
+        **acts.wait_for_workers(waits=is_moving),
     }
     return render(request, "results/judges.html", context)
 
@@ -94,17 +86,37 @@ def judge_start(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     study = get_readable_study(request, code)
     form = JudgeForm(study, request.POST)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return None
     wanted = form.read()
     expected = estimate_study_judge(study, wanted)
-    if wants_to_change(request):
+    if acts.wants_to_change(request):
         return None
-    if not is_sure(request):
-        return ask(request, _starting(study, wanted, expected))
+    if not acts.is_sure(request):
+        money = "unknown: nobody entered the model’s price"
+        if expected.most_usd is not None:
+            money = f"at most {expected.most_usd:.2f} USD"
+            if expected.usd is not None:
+                money = f"about {expected.usd:.4f} USD by its earlier answers, {money}"
+        back = reverse("results-judges", args=[study.code])
+        question = acts.Confirmation(
+            title=f"Ask {wanted.model} about {expected.pairs} pairs?",
+            facts=(
+                f"Calls: {expected.calls}, each pair in both orders. Calls that break and are "
+                "sent again come on top.",
+                f"Cost: {money}. What it was asked before, in just these words, costs nothing.",
+                "It sees the instruction and the two pictures, and no name. What it says is no "
+                "vote.",
+            ),
+            button="Start the judge",
+            back=back,
+            is_final=False,
+            crumbs=(("Judges", back),),
+        )
+        return acts.ask(request, question)
     with transaction.atomic():
         run = start_judge(study, wanted, get_user(request))
-        send_later(request, enqueue_judge, run.pk)
+        acts.send_later(request, enqueue_judge, run.pk)
     messages.success(request, f"{run} is asked about {expected.pairs} pairs.")
     return None
 
@@ -149,24 +161,3 @@ def _with_agreement(
         shown |= {key} if is_measured else set()
         rows.append((line, shares[0], shares[1]))
     return rows
-
-
-def _starting(study: Study, wanted: JudgeRequest, expected: JudgeEstimate) -> Confirmation:
-    money = "unknown: nobody entered the model’s price"
-    if expected.most_usd is not None:
-        money = f"at most {expected.most_usd:.2f} USD"
-        if expected.usd is not None:
-            money = f"about {expected.usd:.4f} USD by its earlier answers, {money}"
-    return Confirmation(
-        title=f"Ask {wanted.model} about {expected.pairs} pairs?",
-        facts=(
-            f"Calls: {expected.calls}, each pair in both orders. Calls that break and are sent "
-            "again come on top.",
-            f"Cost: {money}. What it was asked before, in just these words, costs nothing.",
-            "It sees the instruction and the two pictures, and no name. What it says is no vote.",
-        ),
-        button="Start the judge",
-        back=reverse("results-judges", args=[study.code]),
-        is_final=False,
-        crumbs=(("Judges", reverse("results-judges", args=[study.code])),),
-    )
