@@ -43,12 +43,6 @@ from arena.exports.written_files import FOLDERS
 from arena.results.exports.closure import TRAVELLING
 from arena.results.exports.study_folder import FORMAT as STUDY
 from arena.results.services import stored_rows
-from arena.results.services.stored_rows import (
-    check_row,
-    check_votes,
-    end_restored_work,
-    is_unfinished,
-)
 from arena.serving.readiness import find_unapplied_migrations
 from arena.shell.access import EXPERT
 from augment.models import Endpoint, Simulation
@@ -293,8 +287,8 @@ def restore_backup(path: Path, *, say: Say) -> Manifest:
         def write() -> None:
             for label in stored_rows.MADE_BY_MIGRATING:
                 apps.get_model(label)._base_manager.all().delete()
-            _write_rows(source, manifest, tables, check_row)
-            end_restored_work()
+            _write_rows(source, manifest, tables, stored_rows.check_row)
+            stored_rows.end_restored_work()
             if SECRET_KEY in manifest.members:
                 with source[SECRET_KEY]() as key:
                     write_whole(settings.VAR_DIR / SECRET_KEY, key.read(), mode=0o600)
@@ -337,8 +331,8 @@ def import_study(folder: Path, *, say: Say) -> Manifest:
 
 def _check_of_study(row: models.Model) -> None:
     """Refuse what a study's folder must not hold: work to be done, and code to be loaded."""
-    check_row(row)
-    if is_unfinished(row):
+    stored_rows.check_row(row)
+    if getattr(row, "state", None) in stored_rows.UNFINISHED.get(type(row), ()):
         raise ValueError(
             f"state: {getattr(row, 'state', '')!r} is not over; a study's folder holds what has "
             "ended"
@@ -424,7 +418,7 @@ def _write_rows(
         connection.check_constraints()
     except IntegrityError as error:
         raise BackupUnreadable(f"Its rows don't fit each other: {error}") from error
-    check_votes()
+    stored_rows.check_votes()
     with connection.cursor() as cursor:  # the next row of each table gets a key that none has
         for statement in connection.ops.sequence_reset_sql(no_style(), list(tables)):
             cursor.execute(statement)

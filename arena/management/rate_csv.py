@@ -14,23 +14,12 @@ from typing import Any
 from arena.exports.cells import csv_text
 from arena.exports.latex import PLACES_LEFT, align_cells, caption_text, escape, latex_table
 from arena.exports.leaderboard import VOTES_FILE, list_columns, print_lines
+from arena.rating import rules
 from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.lines import count_text, notes_by_reason, votes_text
 from arena.rating.ranking import Separation
 from arena.rating.remarks import remark_on_ignored
-from arena.rating.rules import (
-    BOOTSTRAP_ROUNDS,
-    FEWEST_DRAWS,
-    MANY_CONTESTANTS,
-    MANY_VOTES,
-    METHOD_TEXTS,
-    MOST_DRAWS,
-    ROUNDS,
-    ROUNDS_OF_MANY,
-    Unit,
-    unit_for,
-)
 from arena.rating.votes_file import OPTIONAL, as_comparisons, read_table
 from augment.escaping import escape_controls
 
@@ -43,10 +32,10 @@ _COLUMN_OF_KIND = {"expert": "judge", "scenario": "item"}
 COLUMNS = {column.name: str(column.field) for column in list_columns(VOTES_FILE)}
 """Those of CSV and JSON, by the fields of a line."""
 _CLUSTERED = {
-    Unit.VOTE: "single votes",
-    Unit.EXPERT: "clustered by judge",
-    Unit.SCENARIO: "clustered by item",
-    Unit.TWO_WAY: "clustered by judge and item",
+    rules.Unit.VOTE: "single votes",
+    rules.Unit.EXPERT: "clustered by judge",
+    rules.Unit.SCENARIO: "clustered by item",
+    rules.Unit.TWO_WAY: "clustered by judge and item",
 }
 
 
@@ -77,7 +66,7 @@ def add_arguments(parser: ArgumentParser) -> None:
             "help": "bt is Bradley-Terry, davidson its model of ties",
         },
         "--resample": {
-            "choices": [unit.value for unit in Unit],
+            "choices": [unit.value for unit in rules.Unit],
             "help": "clusters of dependent votes: by expert (judge), by scenario (item), or "
             "two-way; two-way where judge and item are there, else what there is; vote is the "
             "paper's resampling of single votes",
@@ -89,8 +78,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         },
         "--rounds": {
             "type": int,
-            "help": f"{BOOTSTRAP_ROUNDS} of the bootstrap, {ROUNDS} of resamples; "
-            f"{ROUNDS_OF_MANY} above {MANY_VOTES} votes or {MANY_CONTESTANTS} models",
+            "help": f"{rules.BOOTSTRAP_ROUNDS} of the bootstrap, {rules.ROUNDS} of resamples; "
+            f"{rules.ROUNDS_OF_MANY} above {rules.MANY_VOTES} votes or "
+            f"{rules.MANY_CONTESTANTS} models",
         },
         "--seed": {"type": int, "default": 0},
         "--format": {"choices": FORMATS, "default": "table"},
@@ -114,8 +104,10 @@ def run(
     Raises:
         CsvNotRated: The file can't be read or the options don't fit it.
     """
-    if rounds is not None and not FEWEST_DRAWS <= rounds <= MOST_DRAWS:
-        raise CsvNotRated(f"rounds go from {FEWEST_DRAWS} to {MOST_DRAWS}, not {rounds}.")
+    if rounds is not None and not rules.FEWEST_DRAWS <= rounds <= rules.MOST_DRAWS:
+        raise CsvNotRated(
+            f"rounds go from {rules.FEWEST_DRAWS} to {rules.MOST_DRAWS}, not {rounds}."
+        )
     if seed < 0:
         raise CsvNotRated(f"a seed is 0 or more, not {seed}.")
     try:
@@ -164,15 +156,15 @@ def _notes(board: Leaderboard, there: Sequence[str], unseen: Sequence[str]) -> l
     return notes + remark_on_ignored(unseen)
 
 
-def _choose_unit(there: Sequence[str], method: Method, wanted: str | None) -> Unit:
+def _choose_unit(there: Sequence[str], method: Method, wanted: str | None) -> rules.Unit:
     if wanted is None:
         if method is Method.ELO:
-            return Unit.VOTE
-        return unit_for(judges="judge" in there, items="item" in there)
-    for name in (_COLUMN_OF_KIND[kind] for kind in Unit(wanted).kinds):
+            return rules.Unit.VOTE
+        return rules.unit_for(judges="judge" in there, items="item" in there)
+    for name in (_COLUMN_OF_KIND[kind] for kind in rules.Unit(wanted).kinds):
         if name not in there:
             raise ValueError(f"there is no column {name!r}, which --resample {wanted} needs")
-    return Unit(wanted)
+    return rules.Unit(wanted)
 
 
 # --- What is printed -----------------------------------------------------------------------------
@@ -202,7 +194,7 @@ class RatedCsv:
             Intervals.RESAMPLES: f"95 % intervals by {board.rounds} resamples "
             f"({board.unit.value}), seed {board.seed}",
         }
-        return f"{METHOD_TEXTS[board.method]}; {intervals[board.intervals]}"
+        return f"{rules.METHOD_TEXTS[board.method]}; {intervals[board.intervals]}"
 
     @property
     def missing(self) -> list[str]:
@@ -308,8 +300,8 @@ def _write_latex(rated: RatedCsv) -> str:
             rated.method,
             votes=board.votes,
             settled=0,
-            experts=board.experts if Unit.EXPERT in board.unit.kinds else 0,
-            scenarios=board.scenarios if Unit.SCENARIO in board.unit.kinds else 0,
+            experts=board.experts if rules.Unit.EXPERT in board.unit.kinds else 0,
+            scenarios=board.scenarios if rules.Unit.SCENARIO in board.unit.kinds else 0,
             more=PLACES_LEFT if has_places else "",
         ),
     )

@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit, logit
@@ -229,13 +228,13 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
         return Estimate(value=None)
     value = float(hits.mean())
     # One expert on one scenario: in both kinds of clusters, so taken off once.
-    cells = _variance(hits, expert * (scenario.max() + 1) + scenario)
+    of_cells, _ = _variance(hits, expert * (scenario.max() + 1) + scenario)
     sides = [_variance(hits, of) for of in (expert, scenario) if len(np.unique(of)) > 1]
-    fewest = min((side.clusters for side in sides), default=1)
+    fewest = min((clusters for _, clusters in sides), default=1)
     if fewest > 1 and value in (0.0, 1.0):
         return wilson(round(value) * fewest, fewest)
-    variance = sum(side.value for side in sides) - cells.value * (len(sides) - 1)
-    variance = max(variance, LEAST * cells.value)
+    variance = sum(of_side for of_side, _ in sides) - of_cells * (len(sides) - 1)
+    variance = max(variance, LEAST * of_cells)
     if fewest == 1 or variance < _NOTHING:
         return Estimate(value=value)
     # The derivative of the logit of p is 1 / (p (1 - p)).
@@ -248,21 +247,13 @@ def two_way_share(hits: FloatArray, expert: IntArray, scenario: IntArray) -> Est
 # --- Private -------------------------------------------------------------------------------------
 
 
-class _Variance(NamedTuple):
-    """Variance of a mean, with its number of clusters."""
-
-    value: float
-    clusters: int
-
-
-def _variance(hits: FloatArray, cluster_of: IntArray) -> _Variance:
+def _variance(hits: FloatArray, cluster_of: IntArray) -> tuple[float, int]:
+    """The variance of a mean, and the number of clusters."""
     _, cluster_of = np.unique(cluster_of, return_inverse=True)
     # (G,) hits above the mean, added up before they are squared.
     sums = np.bincount(cluster_of, weights=hits - hits.mean())
     clusters = len(sums)
-    return _Variance(
-        float((sums**2).sum()) * clusters / max(clusters - 1, 1) / len(hits) ** 2, clusters
-    )
+    return float((sums**2).sum()) * clusters / max(clusters - 1, 1) / len(hits) ** 2, clusters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

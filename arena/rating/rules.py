@@ -65,13 +65,6 @@ class TooManyContestants(ValueError):
     """More contestants than `MOST_CONTESTANTS`; the text says so."""
 
 
-def default_intervals(method: Method, unit: Unit) -> Intervals:
-    """By effects of clusters where votes have some; single votes are resampled as in the paper."""
-    if method is Method.ELO or unit is Unit.VOTE:
-        return Intervals.RESAMPLES
-    return Intervals.BOOTSTRAP
-
-
 def usual_rounds(intervals: Intervals, *, contestants: int = 0, votes: int = 0) -> int:
     """Return the number of rounds where nobody says how many."""
     is_slow = intervals is not Intervals.CLOSED_FORM and contestants > MANY_CONTESTANTS
@@ -126,7 +119,9 @@ def choose_rules(
         ValueError: The choices do not go together; the text says what does.
     """
     unit = unit or (Unit.VOTE if method is Method.ELO else Unit.TWO_WAY)
-    intervals = intervals or default_intervals(method, unit)
+    # By effects of clusters where votes have some; single votes are resampled as in the paper.
+    is_resampled = method is Method.ELO or unit is Unit.VOTE
+    intervals = intervals or (Intervals.RESAMPLES if is_resampled else Intervals.BOOTSTRAP)
     if rounds is None:
         rounds = usual_rounds(intervals, **numbers)
     refusals = {

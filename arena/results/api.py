@@ -12,17 +12,9 @@ from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
 
+from arena.api import views
 from arena.api.access import STAFF
 from arena.api.fields import RequestBody
-from arena.api.views import (
-    ApiView,
-    FileView,
-    Params,
-    RowDocument,
-    file_operation,
-    keep_and_send,
-    operation,
-)
 from arena.errors import NoSnapshot
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
@@ -80,7 +72,7 @@ class TableDocument(serializers.Serializer[Any]):
     rows = StandingDocument(many=True)
 
 
-class SnapshotDocument(RowDocument[Snapshot]):
+class SnapshotDocument(views.RowDocument[Snapshot]):
     """A rating with its table, which is null until it is ready."""
 
     study = serializers.UUIDField(source="study.code")
@@ -115,13 +107,13 @@ class SnapshotBody(RequestBody):
     request = RatingRequest
 
 
-class SnapshotsView(ApiView):
+class SnapshotsView(views.ApiView):
     """The ratings of a study."""
 
     writers = STAFF
 
-    @operation(SnapshotDocument, takes=SnapshotBody, status=201, name="rateStudy")
-    def post(self, code: uuid.UUID, params: Params) -> Snapshot:
+    @views.operation(SnapshotDocument, takes=SnapshotBody, status=201, name="rateStudy")
+    def post(self, code: uuid.UUID, params: views.Params) -> Snapshot:
         """Rate the votes as they are now.
 
         A worker rates large studies: poll the rating until its state is ready.
@@ -132,20 +124,20 @@ class SnapshotsView(ApiView):
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
             snapshot = rate(study=study, **choices)
-            keep_and_send(lambda: snapshot, sending.send_charts)
+            views.keep_and_send(lambda: snapshot, sending.send_charts)
             return snapshot
         plan = partial(plan_snapshot, study=study, **choices)
-        planned, warnings = keep_and_send(plan, sending.send_snapshot)
+        planned, warnings = views.keep_and_send(plan, sending.send_snapshot)
         planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
 
 
-class SnapshotView(ApiView):
+class SnapshotView(views.ApiView):
     """One rating."""
 
     readers = STAFF
 
-    @operation(SnapshotDocument, name="getSnapshot")
+    @views.operation(SnapshotDocument, name="getSnapshot")
     def get(self, code: uuid.UUID) -> Snapshot:
         """A rating with its table.
 
@@ -154,7 +146,7 @@ class SnapshotView(ApiView):
         return get_snapshot(self, code)
 
 
-def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
+def get_snapshot(view: views.ApiView, code: uuid.UUID) -> Snapshot:
     """Return the rating with that code, for whoever may read the results of its study.
 
     Raises:
@@ -166,12 +158,12 @@ def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
     return snapshot
 
 
-class SnapshotExportView(FileView):
+class SnapshotExportView(views.FileView):
     """A rating as a file."""
 
     readers = STAFF
 
-    @file_operation(name="exportSnapshot", exports=RATING_FILES)
+    @views.file_operation(name="exportSnapshot", exports=RATING_FILES)
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
         """A rating as a file.
 

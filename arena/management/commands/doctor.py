@@ -72,15 +72,12 @@ class Command(TerminalCommand):
             self.stdout.write_data("\n")
         else:
             for finding in findings:
-                self._tell(finding)
+                self.stdout.write(f"{finding.level:9}{finding.part}: {finding.text}")
+                if finding.remedy:
+                    self.stdout.write(f"         -> {finding.remedy}")
         broken = sum(finding.level is Level.BROKEN for finding in findings)
         if broken:
             raise CommandError(f"{broken} broken." if broken > 1 else "One part is broken.")
-
-    def _tell(self, finding: Ailment) -> None:
-        self.stdout.write(f"{finding.level:9}{finding.part}: {finding.text}")
-        if finding.remedy:
-            self.stdout.write(f"         -> {finding.remedy}")
 
 
 def examine() -> list[Ailment]:

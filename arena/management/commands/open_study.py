@@ -4,7 +4,6 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.models import Study
 from arena.studies.queries import usual_checks
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
@@ -34,7 +33,15 @@ class Command(TerminalCommand):
             "checks": self._checks(options["checks"]),
         }
         study = open_study(StudyPlan.read(values))
-        self._say(study)
+        rules, sha256 = study.rules, preregistration_sha256(study)
+        self.stdout.write(
+            f"Opened {study.name!r} ({study.code}): {study.matchups.count()} matchups for "
+            f"{len(rules['experts'])} experts."
+        )
+        self.stdout.write(f"Preregistration: sha256 {sha256}.")
+        names = ", ".join(repr(job["name"]) for job in rules["jobs"])
+        samples = SAMPLES[rules["samples"]]
+        self.stdout.write(f"It shows augmentations of {names}, of several samples {samples}.")
         self.stdout.write("The pictures of its pairs are drawn now; voters see what is ready.")
         while draw_pictures(study, within_s=10.0):
             self.stdout.write(f"{find_undrawn(study).count()} of {study.matchups.count()} wait.")
@@ -49,14 +56,3 @@ class Command(TerminalCommand):
                 "No attention checks: nobody has drawn pictures for them (manage.py draw_checks)."
             )
         return usual
-
-    def _say(self, study: Study) -> None:
-        rules = study.rules
-        self.stdout.write(
-            f"Opened {study.name!r} ({study.code}): {study.matchups.count()} matchups for "
-            f"{len(rules['experts'])} experts."
-        )
-        self.stdout.write(f"Preregistration: sha256 {preregistration_sha256(study)}.")
-        names = ", ".join(repr(job["name"]) for job in rules["jobs"])
-        samples = SAMPLES[rules["samples"]]
-        self.stdout.write(f"It shows augmentations of {names}, of several samples {samples}.")

@@ -49,19 +49,15 @@ class Command(TerminalCommand):
                 self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")
                 for line in login_lines():
                     self.stdout.write(line)
-                self._offer_first_link(web)
+                if token := make_first_link_token():
+                    address = f"{web.address.rstrip('/')}/first/{token}/"
+                    self.stdout.write(
+                        f"Nobody is admin yet. Make the first one here, within a day:\n{address}\n"
+                    )
                 supervisor.watch(stack.missing_stand_ins)
             finally:
                 self.stdout.write("Stopping ...")
                 supervisor.stop()
-
-    def _offer_first_link(self, web: stack.Web) -> None:
-        token = make_first_link_token()
-        if token is not None:
-            address = f"{web.address.rstrip('/')}/first/{token}/"
-            self.stdout.write(
-                f"Nobody is admin yet. Make the first one here, within a day:\n{address}\n"
-            )
 
     def _say(self, name: str, line: str) -> None:
         self.stdout.write(f"{name:8} | {line}")

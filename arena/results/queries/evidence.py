@@ -187,27 +187,21 @@ def _list_votes(
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
     ties = [entry for entry in entries if isinstance(entry, RatedVote)]
-    keys = [entry for entry in entries if not isinstance(entry, RatedVote)]
-    rows = Vote.objects.select_related(*related).defer(*unread).in_bulk([pk for pk, _ in keys])
+    marks = dict(entry for entry in entries if not isinstance(entry, RatedVote))
+    rows = Vote.objects.select_related(*related).defer(*unread).in_bulk(list(marks))
+    listed = []
+    for pk, mark in marks.items():
+        vote, person = rows[pk], rows[pk].expert.person
+        sample = vote.shown_right.sample if snapshot.study.shows_all_samples else 0
+        contestants = vote.shown_left.contestant_id, vote.shown_right.contestant_id
+        pair = scores.get(Pair.of(vote.matchup.scenario_id, sample, *contestants))
+        judge = snapshot.results.judges.get(str(person.code), person.pseudonym)
+        listed.append(ListedVote(given=vote, mark=mark, judge=judge, pair=pair))
     names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
-    return [
-        *(_list_vote(rows[pk], mark, snapshot, scores) for pk, mark in keys),
-        *(
-            ListedVote(given=tie, mark=tie.mark, names=(names[tie.left], names[tie.right]))
-            for tie in ties
-        ),
-    ]
-
-
-def _list_vote(
-    vote: Vote, mark: str, snapshot: Snapshot, scores: Mapping[Pair, VoteScore]
-) -> ListedVote:
-    sample = vote.shown_right.sample if snapshot.study.shows_all_samples else 0
-    contestants = vote.shown_left.contestant_id, vote.shown_right.contestant_id
-    pair = scores.get(Pair.of(vote.matchup.scenario_id, sample, *contestants))
-    person = vote.expert.person
-    judge = snapshot.results.judges.get(str(person.code), person.pseudonym)
-    return ListedVote(given=vote, mark=mark, judge=judge, pair=pair)
+    for tie in ties:
+        both = names[tie.left], names[tie.right]
+        listed.append(ListedVote(given=tie, mark=tie.mark, names=both))
+    return listed
 
 
 def _sample(snapshot: Snapshot) -> F | Value:

@@ -78,7 +78,11 @@ class VoteSearch:
 
 def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     """The rows of a study of matchups, each with its `mark`; no order."""
-    rows: QuerySet[Vote] = _by_mark(votes.mark_votes(snapshot), search.mark)
+    rows: QuerySet[Any] = votes.mark_votes(snapshot)
+    if search.mark == LEFT_OUT:
+        rows = rows.exclude(Q(mark=votes.COUNTED))
+    elif search.mark != EVERY:
+        rows = rows.filter(Q(mark=search.mark))
     if search.expert == votes.AUTOMATIC:
         return rows.none()
     if search.expert:
@@ -118,12 +122,6 @@ _OUTCOMES: dict[str, list[str]] = {
     "decided": ["left", "right"],
     "skip": ["skip"],
 }
-
-
-def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
-    if mark == LEFT_OUT:
-        return rows.exclude(Q(mark=votes.COUNTED))
-    return rows if mark == EVERY else rows.filter(Q(mark=mark))
 
 
 def _shows(search: VoteSearch) -> Q:

@@ -254,11 +254,6 @@ UNFINISHED: Mapping[type[models.Model], tuple[str, ...]] = {
 """The states of each table in which something is still done with a row."""
 
 
-def is_unfinished(row: models.Model) -> bool:
-    """Return whether something would still be done with a row."""
-    return getattr(row, "state", None) in UNFINISHED.get(type(row), ())
-
-
 def end_restored_work() -> None:
     """Leave nothing for workers to pick up: jobs are paused, all else has failed.
 

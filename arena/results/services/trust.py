@@ -8,13 +8,8 @@ import numpy as np
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.pairing.rules import scenario_at
+from arena.rating import influence
 from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_votes, tally
-from arena.rating.influence import (
-    bradley_terry,
-    rank_changes,
-    votes_behind_first,
-    without_each_expert,
-)
 from arena.rating.leaderboard import Leaderboard
 from arena.rating.lines import count_text, whole_percent
 from arena.rating.models import to_elo
@@ -58,7 +53,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
         repeats=repeats if repeats.number else None,
         raters=_panel(arrays, inner, by_hand, votes, repeats),
         strength=_check_strength(inner, votes),
-        fragility=votes_behind_first(inner, is_cast),
+        fragility=influence.votes_behind_first(inner, is_cast),
     )
 
 
@@ -140,7 +135,7 @@ def _check_strength(inner: Comparisons, votes: VoteSet) -> StrengthCheck | None:
         clear=strengths.count(Vote.Strength.CLEARLY.value),
     )
     is_slight = np.array(strengths) == Vote.Strength.SLIGHTLY.value
-    plain, weighed = bradley_terry(inner), bradley_terry(inner, is_slight)
+    plain, weighed = influence.bradley_terry(inner), influence.bradley_terry(inner, is_slight)
     if plain is None or weighed is None:
         return check
     before, after = (np.argsort(-ratings, kind="stable").tolist() for ratings in (plain, weighed))
@@ -171,12 +166,12 @@ def _panel(
 ) -> tuple[PanelRater, ...]:
     """A line an expert, by the votes that people gave (V,)."""
     experts = len(arrays.judges)
-    strengths = bradley_terry(inner)
+    strengths = influence.bradley_terry(inner)
     without = np.full((experts, len(inner.names)), np.nan)
     changes: list[int | None] = [None] * experts
     if strengths is not None and experts > 1:
-        without = without_each_expert(inner, strengths)
-        changes = rank_changes(strengths, without)
+        without = influence.without_each_expert(inner, strengths)
+        changes = influence.rank_changes(strengths, without)
     names = {vote.judge: vote.judge_name for vote in votes.counted}
     panel = []
     lines = raters(select_votes(inner, chosen), ms=arrays.ms[chosen], without=without)
