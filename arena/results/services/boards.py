@@ -16,7 +16,7 @@ from arena.exports.files import sha256_hex
 from arena.models import Board, BoardTable, Question, Study
 from arena.models.people import fresh_token
 from arena.rating import board_table
-from arena.rating.leaderboard import rate
+from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.lines import Line, hide_ranks, says_no_order
 from arena.rating.remarks import NOT_RANKED
 from arena.rating.rules import METHOD_TEXTS, text_of_intervals
@@ -202,7 +202,6 @@ def make_document(
     arrays = vote_arrays([by_slug[slug] for slug in sorted(by_slug)], votes)
     rated = rate(arrays.comparisons, founders=founders)
     remarks = board_remarks(rated, arrays)
-    intervals = text_of_intervals(rated.intervals, rated.unit, rated.rounds)
     made_at = now.astimezone(UTC).isoformat(timespec="seconds")
     settled = count_settled_ties(votes)
     not_ranked = [NOT_RANKED] if says_no_order(rated.standings) else []
@@ -221,7 +220,7 @@ def make_document(
         benchmark=str(board.benchmark or ""),
         benchmark_sha256=board.benchmark.checksum if board.benchmark else "",
         question=str(Question(studies[0].questions[0]).label),
-        method=f"{METHOD_TEXTS[rated.method]}, {intervals}",
+        method=_method_text(rated),
         answer=remarks.answer(lines, [line.slug for line in lines], cast),
         lines=lines,
         studies=tuple(map(_pool, studies, sets)),
@@ -239,6 +238,11 @@ def make_document(
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _method_text(rated: Leaderboard) -> str:
+    intervals = text_of_intervals(rated.intervals, rated.unit, rated.rounds)
+    return f"{METHOD_TEXTS[rated.method]}, {intervals}"
 
 
 _SHOWN = ("slug", "type", "instruction")
