@@ -30,7 +30,7 @@ from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.simulation.expected import expect_recording
 from augment.variants.pose_tool import PoseTool
-from augment.variants.recipes import Keep, Recipe
+from augment.variants.recipes import Recipe
 from augment.variants.respondents import (
     ModelRole,
     NoteKind,
@@ -306,10 +306,11 @@ class _Work:
     def _choose_round(self, rounds: list[_Round], fault: str) -> tuple[_Round, str]:
         """Return the round that counts, and a remark about it.
 
-        An unreviewed last round came after all the feedback and counts.
+        That is the best reviewed one, of equals the last. An unreviewed last round came after all
+        the feedback and counts.
         """
         best = rounds[-1]
-        if self.recipe.keep is Keep.BEST and best.verdict is not None:
+        if best.verdict is not None:
             best = max(
                 rounds,
                 key=lambda draft: (draft.verdict.score if draft.verdict else (), draft.number),

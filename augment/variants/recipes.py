@@ -6,7 +6,6 @@ our own: they are named so and never counted among the four.
 """
 
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 
 from augment.errors import UnknownName
 from augment.prompts.calls import Tools
@@ -21,16 +20,6 @@ SPELLING = {
 """The variants as the paper spells and orders them, then ours."""
 
 
-class Keep(StrEnum):
-    """Round whose modification counts: the best reviewed (of equals the last), or the last.
-
-    A review that is content ends the rounds, so the last is the accepted one if there is one.
-    """
-
-    BEST = "best"
-    LAST = "last"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe:
     """One variant: lane format x tools x review.
@@ -43,7 +32,6 @@ class Recipe:
     lane_format: LaneFormat = LaneFormat.POLYLINE
     tools: Tools = Tools.NONE
     review: Review | None = None
-    keep: Keep = Keep.LAST
     limits: Limits = field(default_factory=Limits)
 
     @property
@@ -65,9 +53,9 @@ FC = Recipe(
 FC_PLUS = replace(
     FC, slug="fc-plus", title="Function calling, our function", tools=Tools.POSE_ON_LANE
 )
-TQA = Recipe(slug="tqa", title="Text QA", review=TEXT_REVIEW, keep=Keep.BEST)
+TQA = Recipe(slug="tqa", title="Text QA", review=TEXT_REVIEW)
 VQA = Recipe(slug="vqa", title="Visual QA", review=VISUAL_REVIEW)
-GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIEW, keep=Keep.BEST)
+GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIEW)
 
 PAPER: tuple[Recipe, ...] = (OTM, FC, TQA, VQA)
 _WITH_CALLS = tuple(
@@ -76,7 +64,6 @@ _WITH_CALLS = tuple(
         slug=f"{calling.slug}+{reviewed.slug}",
         title=f"{calling.title} + {reviewed.title[0].lower()}{reviewed.title[1:]}",
         review=reviewed.review,
-        keep=reviewed.keep,
     )
     for calling in (FC, FC_PLUS)
     for reviewed in (TQA, VQA, GEO)

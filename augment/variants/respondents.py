@@ -10,11 +10,10 @@ from augment import errors
 from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
 from augment.llm.costs import find_cut
-from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
+from augment.llm.messages import DEFAULT_MAX_TOKENS, Reply, Request, Tool, ToolChoice
 from augment.prompts.blocks import only_thinks
-from augment.prompts.fill import prompt_version, review_re_ask_messages
+from augment.prompts.fill import Messages, prompt_version, review_re_ask_messages
 
-Messages = tuple[Message, ...]
 _Read = TypeVar("_Read")
 
 

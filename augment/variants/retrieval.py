@@ -19,7 +19,6 @@ import pydantic
 from pydantic import Field
 
 from augment.errors import ToolError
-from augment.geometry.frames import Pose
 from augment.prompts import vectors
 from augment.prompts.blocks import Strict
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
@@ -116,26 +115,14 @@ class _Call(Strict):
 class RetrievalTool(LaneTool):
     """The paper's function for one scene."""
 
-    def retrieve_suitable_pose(self, lane: object, dist_m: float) -> Pose:
-        """Return the pose on a lane's centreline; it is the same for agents of every type.
-
-        Args:
-            lane: The short id of a lane, connector or piece, or the control points of a piece.
-            dist_m: Along the direction of travel from the beginning of what `lane` names.
-
-        Raises:
-            ToolError: Nobody knows the lane, or it ends before the distance does.
-        """
-        curve, begins_m = self.find_line(lane)
-        length_m = curve.length_m - begins_m
-        if dist_m > length_m + _ROUNDING_M:
-            raise ToolError(f"this lane ends after {length_m:.2f}: dist is 0 to that")
-        return curve.pose_at(begins_m + min(dist_m, length_m))
-
     def answer_call(self, arguments: object) -> list[float]:
-        """Return [x, y, heading] as the prompt rounds."""
+        """Return [x, y, heading] on a lane's centreline as the prompt rounds, for every type."""
         call = _Call.model_validate(arguments)
-        pose = self.retrieve_suitable_pose(call.lane, call.dist)
+        curve, begins_m = self.find_line(call.lane)
+        length_m = curve.length_m - begins_m
+        if call.dist > length_m + _ROUNDING_M:
+            raise ToolError(f"this lane ends after {length_m:.2f}: dist is 0 to that")
+        pose = curve.pose_at(begins_m + min(call.dist, length_m))
         # 0.0 is added since JSON would tell minus zero.
         return [
             round(value, digits) + 0.0

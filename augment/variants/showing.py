@@ -7,7 +7,6 @@ counts them too.
 
 import json
 import math
-from collections import Counter
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
@@ -49,21 +48,6 @@ class ShownPrompt:
         return math.ceil(characters / CHARACTERS_PER_TOKEN)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CallRange:
-    """Calls of one role in one augmentation.
-
-    Attributes:
-        least: Where nothing goes wrong and no function is called.
-        usual: A guess: one answer with calls where there is a function, and one round.
-        most: Every round, every re-ask, every call of the function in an answer of its own.
-    """
-
-    least: int
-    usual: int
-    most: int
-
-
 def build_prompt(
     recipe: Recipe,
     role: ModelRole,
@@ -100,16 +84,19 @@ def build_prompt(
     )
 
 
-def call_ranges(recipe: Recipe) -> dict[ModelRole, CallRange]:
-    """Return the calls of every role that a recipe has."""
+def count_calls(recipe: Recipe) -> tuple[int, int, int]:
+    """Return the least, the usual and the most calls of all roles in one augmentation.
+
+    The least where nothing goes wrong and no function is called. The usual number is a guess: one
+    answer with calls where there is a function, and one round. The most are every round, every
+    re-ask, and every call of the function in an answer of its own.
+    """
     limits, rounds = recipe.limits, recipe.rounds
     again = 1 + limits.re_asks
     has_tool = recipe.tools is not Tools.NONE
-    # The answer with the first call too many, and the one that it is asked for.
     by_schema = limits.block is BlockForm.SCHEMA
+    # The answer with the first call too many, and the one that it is asked for.
     a_round = again + (limits.calls + 1 if has_tool else 0) + by_schema
+    reviews = len(recipe.review.asks) if recipe.review else 0
     usual = 1 + has_tool + by_schema
-    calls = {ModelRole.MODIFIER: CallRange(least=1, usual=usual, most=rounds * a_round)}
-    for role, number in Counter(recipe.review.asks if recipe.review else ()).items():
-        calls[role] = CallRange(least=number, usual=number, most=number * rounds * again)
-    return calls
+    return 1 + reviews, usual + reviews, rounds * (a_round + reviews * again)

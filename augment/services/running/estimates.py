@@ -13,7 +13,7 @@ from augment.services.running.jobs import JobScope, with_followed
 from augment.variants.options import recipe_with
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import call_ranges
+from augment.variants.showing import count_calls
 
 State = Augmentation.State
 
@@ -114,11 +114,8 @@ def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEst
 
 
 def _line(row: Contestant, cells: int) -> ContestantEstimate:
-    calls = call_ranges(recipe_with(find_recipe(row.variant), read_options(row))).values()
-    least, usual, most = (
-        cells * sum(getattr(call_range, name) for call_range in calls)
-        for name in ("least", "usual", "most")
-    )
+    calls = count_calls(recipe_with(find_recipe(row.variant), read_options(row)))
+    least, usual, most = (cells * number for number in calls)
     seen, used = _average_use(row)
     if not used:
         return ContestantEstimate(
