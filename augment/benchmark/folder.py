@@ -8,14 +8,14 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from importlib import resources
 from pathlib import Path, PurePath
 from typing import Annotated, Any, TypeVar
 
 from pydantic import Field, TypeAdapter
 
-from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Day, Split, Stratum
+from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Day, Slug, Split, TaskFacts
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.documents import read_json
 from augment.formats.writers import WRITERS, writer_named
@@ -23,7 +23,7 @@ from augment.formats.writing import Cell
 from augment.scene import codec
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.planned_mover import check_motions
-from augment.scene.schema import CLOSED, Codec, Text, Whole, Yes, path
+from augment.scene.schema import CLOSED, Codec, Text, Whole, path
 
 Read = TypeVar("Read")
 
@@ -39,13 +39,11 @@ FORMATS = tuple(name for name in WRITERS if name != "json")
 MOST_TASKS = 2_000
 
 
-_Slug = Annotated[Text, Field(max_length=80, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 _Line = Annotated[Text, Field(min_length=1, max_length=200)]
-_Type = Annotated[Text, Field(max_length=40, pattern=r"^[a-z0-9]+([_-][a-z0-9]+)*$")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _TaskLine:
+class _TaskLine(TaskFacts):
     """A task as `benchmark.json` tells of it.
 
     Attributes:
@@ -53,14 +51,6 @@ class _TaskLine:
         files: Names in the folder, by kind of document and by format.
     """
 
-    name: _Slug
-    instruction: Annotated[Text, Field(min_length=1, max_length=2_000)]
-    type: _Type
-    language: Annotated[Text, Field(pattern=r"^[a-z]{2}$")]
-    split: Split
-    stratum: Stratum
-    keeps_traffic: Yes
-    paraphrase_of: Annotated[Text, Field(max_length=80)] = ""
     provenance: Text
     files: dict[Text, tuple[Text, ...]]
 
@@ -71,7 +61,7 @@ class _Manifest:
 
     __pydantic_config__ = CLOSED
 
-    name: _Slug
+    name: Slug
     title: _Line
     set_version: Annotated[Whole, Field(ge=1)]
     made_on: Day
@@ -193,7 +183,7 @@ def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
         recording=documents.get(RECORDING),
         reference=documents.get(REFERENCE),
         intent=documents.get(INTENT),
-        **_describe_task(line),
+        **_list_facts(line),
     )
 
 
@@ -252,16 +242,15 @@ def _make_manifest(benchmark: BenchmarkSet) -> _Manifest:
         made_on=benchmark.made_on,
         checksum="",
         tasks=tuple(
-            _TaskLine(provenance=task.scene.provenance, files={}, **_describe_task(task))
+            _TaskLine(provenance=task.scene.provenance, files={}, **_list_facts(task))
             for task in benchmark.tasks
         ),
     )
 
 
-def _describe_task(task: BenchmarkTask | _TaskLine) -> dict[str, Any]:
+def _list_facts(task: TaskFacts) -> dict[str, Any]:
     """Return the fields that a task shares with its line in `benchmark.json`."""
-    names = ("name", "instruction", "type", "language", "split", "stratum", "keeps_traffic")
-    return {name: getattr(task, name) for name in (*names, "paraphrase_of")}
+    return {field.name: getattr(task, field.name) for field in fields(TaskFacts)}
 
 
 def task_cell(task: BenchmarkTask) -> Cell:

@@ -31,34 +31,47 @@ class Stratum(StrEnum):
     HARD = "hard"
 
 
+Slug = Annotated[Text, Field(max_length=80, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
+_Type = Annotated[Text, Field(max_length=40, pattern=r"^[a-z0-9]+([_-][a-z0-9]+)*$")]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BenchmarkTask:
-    """One scenario as entrants get it. Frame: the ego frame of its scene.
+class TaskFacts:
+    """What a task and its line in `benchmark.json` both say.
 
     Attributes:
         name: The slug of the scenario.
         type: The scenario's type, as a slug.
         language: Of the instruction.
-        scene: Before the change, with the traffic that stays.
-        recording: What was recorded after t0, None where nothing was.
         keeps_traffic: Whether the recorded vehicles stay.
         paraphrase_of: The task that asks for the same in other words, empty for none.
+    """
+
+    name: Slug
+    instruction: Annotated[Text, Field(min_length=1, max_length=2_000)]
+    type: _Type
+    language: Annotated[Text, Field(pattern=r"^[a-z]{2}$")]
+    split: Split
+    stratum: Stratum
+    keeps_traffic: Yes
+    paraphrase_of: Annotated[Text, Field(max_length=80)] = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchmarkTask(TaskFacts):
+    """One scenario as entrants get it. Frame: the ego frame of its scene.
+
+    Attributes:
+        scene: Before the change, with the traffic that stays.
+        recording: What was recorded after t0, None where nothing was.
         reference: None where it is not known here: in a folder that was handed out, of all tasks
             of the test split. An empty one says that the wish can't be met.
         intent: What the instruction asks for, known where the reference is; None where nobody has
             said it.
     """
 
-    name: str
-    type: str
-    instruction: str
-    language: str
-    split: Split
-    stratum: Stratum
     scene: Scene
     recording: Recording | None = None
-    keeps_traffic: bool = True
-    paraphrase_of: str = ""
     reference: Modification | None = None
     intent: Intent | None = None
 

@@ -33,6 +33,7 @@ def task(name: str, **changes: Any) -> BenchmarkTask:
         "language": "en",
         "split": Split.TEST,
         "stratum": Stratum.HARD,
+        "keeps_traffic": True,
         "scene": scene(name=f"{name}-scene", agents=(CAR,)),
         "reference": Modification(added=(vehicle("Agent3", SECRET_M, 0.25, 0.1),)),
     }
