@@ -114,25 +114,20 @@ def place(scene: Scene, intent: wish.Intent | None, *, seed: int = 0) -> rule_pl
         ):
             raise CannotPlace("The code knows vehicles alone, and something else is asked for.")
     right = rule_placer.place(scene, intent, seed=seed).modification
-    moved = {agent.id for agent in right.moved}
-    standing = [agent for agent in scene.everyone if agent.id not in {*right.removed, *moved}]
+    standing = [agent for agent in scene.everyone if agent.id not in right.replaced]
     rng = np.random.default_rng(seed)
     places = _Places(scene)
-    added: list[TrafficAgent] = []
+    placed: list[TrafficAgent] = []
     notes = []
     for agent in right.changed:
-        drawn = places.draw(quantise(agent), [*standing, *added], rng)
+        drawn = places.draw(quantise(agent), [*standing, *placed], rng)
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
-            added.append(replace(drawn, id=agent.id))
-    if right.changed and not added:
+            placed.append(replace(drawn, id=agent.id))
+    if right.changed and not placed:
         raise CannotPlace("Every place that the code allows is taken.")
-    changes = replace(
-        right,
-        added=tuple(agent for agent in added if agent.id not in moved),
-        moved=tuple(agent for agent in added if agent.id in moved),
-    )
+    changes = right.with_changed(placed)
     return rule_placer.Placement(modification=changes, notes=" ".join(notes))
 
 

@@ -57,9 +57,7 @@ def break_reference(reference: Modification) -> Modification | None:
     if not reference.changed:
         return None
     across: dict[str, Any] = {"y_m": 0.0, "heading_rad": math.pi / 2, "lane_id": None}
-    heaped = tuple(
+    return reference.with_changed(
         replace(agent, x_m=SPACING_M * index, walk_to_m=None, **across)
         for index, agent in enumerate(reference.changed)
     )
-    added = len(reference.added)
-    return replace(reference, added=heaped[:added], moved=heaped[added:])

@@ -104,7 +104,7 @@ def place(scene: Scene, intent: intents.Intent | None, *, seed: int = 0) -> Plac
         sentences.append(sentence)
     if intent.beyond:
         sentences.append(f"Not placed, for no field holds it: {', '.join(intent.beyond)}.")
-    changes = replace(changes, added=_number_agents(fitting.added, scene))
+    changes = replace(changes, added=number_agents(fitting.added, scene))
     return Placement(modification=changes, notes=" ".join(sentences))
 
 
@@ -278,7 +278,7 @@ class _Fitting:
                 name = "the ego" if other is self._scene.ego else other.id or "what was added"
                 where = f"{abs(distance_m):.1f} m from the ego it" if distance_m else "It"
                 return f"{where} would stand in {name}.", 0
-        everyone = _number_agents((*self.added, *agents), self._scene)
+        everyone = number_agents((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
         if before:
@@ -297,7 +297,7 @@ def _make_car(
     return named[request.spot.anchor or ""][0]
 
 
-def _number_agents(agents: _Agents, scene: Scene) -> _Agents:
+def number_agents(agents: _Agents, scene: Scene) -> _Agents:
     """Return the agents with the ids that follow the highest AgentN of the scene."""
     names = [agent.id.removeprefix("Agent") for agent in scene.everyone]
     first = max((int(name) for name in names if name.isdecimal()), default=0) + 1

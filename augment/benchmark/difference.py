@@ -8,7 +8,7 @@ Frame: the ego frame of the source. Notation: S agents of the source, C of the c
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from augment.formats.reading import place_on_lanes
 from augment.geometry import frames
-from augment.geometry.polyline import FloatArray
 from augment.metrics.displacement import CLASS_OF
 from augment.scene.entities import Modification, Origin, Point, Scene, TrafficAgent
 from augment.scene.planned_motion import AtPlace, PointPath
@@ -98,11 +97,7 @@ def number_added(scene: Scene, modification: Modification) -> Modification:
     """
     fresh = _free_ids({agent.id for agent in scene.everyone})
     names = {agent.id: next(fresh) for agent in modification.added}
-    added, moved = (
-        tuple(_rename(agent, names) for agent in agents)
-        for agents in (modification.added, modification.moved)
-    )
-    return replace(modification, added=added, moved=moved)
+    return modification.with_changed(_rename(agent, names) for agent in modification.changed)
 
 
 # Private
@@ -122,24 +117,20 @@ def _align(before: Scene, after: Scene, view: SourceView) -> tuple[list[TrafficA
     notes = []
     agents, frame = list(after.agents), after.origin.frame
     origins = [origin for origin in (before.origin, view.origin) if origin.frame == frame]
-    if origins:
-        seen = origins[0].pose.pose_to_local(after.origin.pose)
-        away_m = float(np.hypot(seen.x_m, seen.y_m))
-        if away_m > NEAR_M or abs(seen.heading_rad) > NEAR_RAD:
-            agents = [_view_from(agent, seen) for agent in agents]
-            notes.append(
-                f"Its ego stands {away_m:.2f} m from the source's; all others were brought into "
-                "the source's frame, and the ego stays."
-            )
-    elif not _is_zero(after.origin.pose):
+    seen = origins[0].pose.pose_to_local(after.origin.pose) if origins else after.origin.pose
+    away_m = float(np.hypot(seen.x_m, seen.y_m))
+    is_elsewhere = away_m > NEAR_M or abs(seen.heading_rad) > NEAR_RAD
+    if is_elsewhere and origins:
+        agents = [_view_from(agent, seen) for agent in agents]
+        notes.append(
+            f"Its ego stands {away_m:.2f} m from the source's; all others were brought into the "
+            "source's frame, and the ego stays."
+        )
+    elif is_elsewhere:
         notes.append(f"Its frame, {frame!a}, is not known here: its ego is taken for the source's")
     if abs(after.ego.speed_mps - before.ego.speed_mps) > NEAR_MPS:
         notes.append("Its ego has another speed; the ego stays as it is.")
     return agents, notes
-
-
-def _is_zero(pose: frames.Pose) -> bool:
-    return max(abs(pose.x_m), abs(pose.y_m)) <= NEAR_M and abs(pose.heading_rad) <= NEAR_RAD
 
 
 def _view_from(agent: TrafficAgent, seen: frames.Pose) -> TrafficAgent:
@@ -202,31 +193,28 @@ def _match(
 ) -> Iterator[tuple[int, int, bool]]:
     """Rows of S and columns of C that belong together, and whether others might."""
     from scipy.optimize import linear_sum_assignment
+    from scipy.spatial.distance import cdist
 
     if not left or not rest:
         return
-    apart_m = np.hypot(*_difference(left, rest, lambda agent: (agent.x_m, agent.y_m)))
-    sizes_m = np.abs(_difference(left, rest, lambda agent: (agent.length_m, agent.width_m)))
-    classes = np.array([CLASS_OF[agent.type] for agent in left])[:, None] == np.array(
-        [CLASS_OF[agent.type] for agent in rest]
+    # (S, 4) and (C, 4) in metres: place and size.
+    ours, theirs = (
+        np.array([(agent.x_m, agent.y_m, *agent.size_m) for agent in agents])
+        for agents in (left, rest)
     )
-    fits = (apart_m <= reach_m) & (sizes_m <= SAME_BOX_M).all(axis=0) & classes
+    classes, other_classes = (
+        np.array([CLASS_OF[agent.type] for agent in agents]) for agents in (left, rest)
+    )
+    apart_m = cdist(ours[:, :2], theirs[:, :2])
+    is_alike = cdist(ours[:, 2:], theirs[:, 2:], "chebyshev") <= SAME_BOX_M
+    is_alike &= classes[:, None] == other_classes
+    fits = (apart_m <= reach_m) & is_alike
     cost = np.where(fits, apart_m, 1e6)
     for row, column in zip(*linear_sum_assignment(cost), strict=True):
         if fits[row, column]:
             within = cost[row, column] + CLOSE_CALL_M
             others = (cost[row] <= within).sum() + (cost[:, column] <= within).sum() - 2
             yield int(row), int(column), bool(others)
-
-
-def _difference(
-    left: list[TrafficAgent],
-    rest: list[TrafficAgent],
-    values: Callable[[TrafficAgent], tuple[float, float]],
-) -> FloatArray:
-    """Return the difference of two values of each agent, (2, S, C)."""
-    ours, theirs = (np.array([values(agent) for agent in some]) for some in (left, rest))
-    return np.asarray((ours[:, None] - theirs[None]).transpose(2, 0, 1))
 
 
 def _merge_state(

@@ -301,16 +301,23 @@ class ChangedScene:
             done.add(agent.id)
             yield from ((agent, other) for other in self.everyone if other.id not in done)
 
+    def measure_gaps(
+        self, agents: Sequence[entities.TrafficAgent], others: Sequence[entities.TrafficAgent]
+    ) -> FloatArray:
+        """Return metres between boxes, (agents, others); infinite from one to itself."""
+        boxes, other_boxes = (
+            np.array([shapely.Polygon(self.boxes[agent.id].corners_m) for agent in some])
+            for some in (agents, others)
+        )
+        gaps_m = np.asarray(shapely.distance(boxes[:, None], other_boxes), dtype=np.float64)
+        names, other_names = (np.array([agent.id for agent in some]) for some in (agents, others))
+        return np.where(names[:, None] == other_names, np.inf, gaps_m)
+
     @cached_property
     def crashed(self) -> frozenset[str]:
         """Changed vehicles that stand so close to another changed one that they look crashed."""
         cars = [agent for agent in self.changed if agent.type in VEHICLES and agent.is_stopped]
         if len(cars) < 2:
             return frozenset()
-        corners_m = np.array([self.boxes[car.id].corners_m for car in cars])
-        boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
-        # (cars, cars), itself left out by infinity.
-        gaps = np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
-        np.fill_diagonal(gaps, np.inf)
-        near = gaps.min(axis=1) <= CRASH_GAP_M
+        near = self.measure_gaps(cars, cars).min(axis=1) <= CRASH_GAP_M
         return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from augment.checks.ground import Ground
+from augment.checks.ground import VEHICLES, Ground
 from augment.geometry.frames import difference
 from augment.scene import entities
 from augment.scene import intent as intents
@@ -34,14 +34,10 @@ _MOST_BANDS = 20_000
 """So many stations of a scene are kept."""
 _MISSED_M = 0.1
 """A place that leads further from its point than this does not tell where the point is."""
-_VEHICLES = (entities.AgentType.VEHICLE, entities.AgentType.BUS)
 _SIGHTS = {
-    **dict.fromkeys(
-        (intents.Sight.VEHICLE, intents.Sight.PARKED, intents.Sight.MOVING), _VEHICLES
-    ),
-    intents.Sight.BUS: (entities.AgentType.BUS,),
-    intents.Sight.BICYCLE: (entities.AgentType.BICYCLE,),
-    intents.Sight.PEDESTRIAN: (entities.AgentType.PEDESTRIAN,),
+    intents.Sight.BUS: {entities.AgentType.BUS},
+    intents.Sight.BICYCLE: {entities.AgentType.BICYCLE},
+    intents.Sight.PEDESTRIAN: {entities.AgentType.PEDESTRIAN},
 }
 
 
@@ -356,7 +352,7 @@ def _fits(
     lanes: LanesAcross, pick: intents.Pick, agent: entities.TrafficAgent, place: RoutePosition
 ) -> bool:
     stands = agent.is_stopped
-    if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
+    if agent.type not in _SIGHTS.get(pick.kind, VEHICLES) or abs(place.left_m) > _BESIDE_M:
         return False
     if stands is not {intents.Sight.PARKED: True, intents.Sight.MOVING: False}.get(
         pick.kind, stands

@@ -159,7 +159,7 @@ def motion_off_road(situation: ChangedScene) -> Iterator[Finding]:
             # (T,) metres to where it leaves the map; within its length the nose is past the edge.
             left_m = np.hypot(*(there[:, :2] - there[-1, :2]).T)
             steps = [step for step in steps if left_m[step] > agent.length_m]
-        strays = [(stray(ground, agent.type, _box_at(box, there[step])), step) for step in steps]
+        strays = [(stray(ground, agent.type, box_at(box, there[step])), step) for step in steps]
         worst, step = max(
             strays, key=lambda entry: (entry[0].over, entry[0].off), default=(None, 0)
         )
@@ -244,7 +244,8 @@ def measure_bends(states: FloatArray) -> tuple[float, float]:
     return float((curvature * states[inside, 3] ** 2).max()), float(curvature.max())
 
 
-def _box_at(box: Box, state: FloatArray) -> Box:
+def box_at(box: Box, state: FloatArray) -> Box:
+    """Return a box moved to a state of its movement."""
     x_m, y_m, heading_rad, _ = state.tolist()
     return replace(box, pose=Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
 
@@ -274,5 +275,5 @@ def _contact(movement: Movement, other: Movement, until: int) -> int | None:
 
 
 def _depth_m(movement: Movement, other: Movement, step: int) -> float:
-    boxes = (_box_at(way.agent.box, way.states[step]) for way in (movement, other))
+    boxes = (box_at(way.agent.box, way.states[step]) for way in (movement, other))
     return frames.overlap(*boxes).depth_m

@@ -255,7 +255,8 @@ class Case:
         if agent.motion is not None or self.ground.scene.options.interplan is None:
             planned = replace(agent, motion=agent.motion or PlannedMotion())
             return carry_out(planned, self.route.graph, times_s)
-        change = self.modification.with_changed(agent)
+        every = [agent if one.id == agent.id else one for one in self.modification.changed]
+        change = self.modification.with_changed(every)
         movements = self.ground.motion_after(change, of_all=False).others
         (states,) = (one.states for one in movements if one.agent.id == agent.id)
         steps = np.round(np.array(times_s) / STEP_S).astype(int)

@@ -11,17 +11,14 @@ import shapely
 from shapely.ops import substring
 
 from augment.checks.finding import Finding, FindingKind, find
-from augment.checks.ground import ChangedScene
+from augment.checks.ground import VEHICLES, ChangedScene
+from augment.checks.motions import box_at
 from augment.checks.parties import Bounds, Case, hold
-from augment.geometry.frames import Pose, corners
-from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType
 from augment.scene.intent_parts import Amount, Purpose
 from augment.scene.motion import Motion, Movement
 
-HIDING = (AgentType.VEHICLE, AgentType.BUS)
-"""Who hides a pedestrian; all else is too low or too slim."""
 WIDEST_M, LONGEST_TTC_S = 8.0, 3.0
 """Wider ways and longer times are not told apart."""
 # Beside the route; before the ego and past the furthest change; ahead where nothing changed.
@@ -159,17 +156,18 @@ def _gets_in_way(walker: Movement, ego: Movement, route: EgoRoute) -> bool:
 
 def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
     """Return the first step at which the ego sees any of its corners or its middle."""
-    screens = [movement for movement in motion.others if movement.agent.type in HIDING]
+    # All but vehicles is too low or too slim to hide a pedestrian.
+    screens = [movement for movement in motion.others if movement.agent.type in VEHICLES]
     for step, ((x_m, y_m), state) in enumerate(
         zip(motion.ego.states[:, :2].tolist(), walker.states, strict=True)
     ):
         if not walker.is_present[step]:
             continue
-        points = np.vstack([_corners(walker, state), state[:2]])
+        points = np.vstack([box_at(walker.agent.box, state).corners_m, state[:2]])
         eye = np.broadcast_to((x_m, y_m), points.shape)
         lines = np.asarray(shapely.linestrings(np.stack([eye, points], axis=1)))  # (5,)
         boxes = [
-            _corners(movement, movement.states[step])
+            box_at(movement.agent.box, movement.states[step]).corners_m
             for movement in screens
             if movement.is_present[step]
         ]
@@ -178,8 +176,3 @@ def _find_first_sight(walker: Movement, motion: Motion) -> int | None:
         if not shapely.intersects(lines[:, None], bodies[None, :]).any(axis=1).all():
             return step
     return None
-
-
-def _corners(movement: Movement, state: FloatArray) -> FloatArray:
-    pose = Pose(x_m=float(state[0]), y_m=float(state[1]), heading_rad=float(state[2]))
-    return corners(pose, movement.agent.length_m, movement.agent.width_m)

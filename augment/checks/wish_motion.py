@@ -18,6 +18,7 @@ from augment.checks.asked_motions import BRAKES, DOOR, SLOWS, check_path
 from augment.checks.lanes_across import find_mark
 from augment.checks.motions import LIMITS, measure_bends
 from augment.checks.parties import Case
+from augment.checks.wish_places import Span
 from augment.errors import CannotPlace
 from augment.scene import planned_motion as planned
 from augment.scene import presets
@@ -45,7 +46,6 @@ _WIDER = 1.0, 1.005, 1.01, 1.02, 1.05
 """Bends are measured by chords, so as little more as helps than what is needed."""
 
 Speeds = tuple[tuple[float, float], ...]
-Span = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

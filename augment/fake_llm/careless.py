@@ -80,9 +80,9 @@ def bend(
         outcomes |= {name: agents} if agents != shaky else {}
     possible = sorted(outcomes)
     if not possible or rng.random() < _RIGHT_SHARE:
-        return _with(right, shaky), "none"
+        return right.with_changed(shaky), "none"
     name = rng.choice(possible)
-    return _with(right, outcomes[name]), name
+    return right.with_changed(outcomes[name]), name
 
 
 def straight_line(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
@@ -242,16 +242,6 @@ def _moving_otherwise(
 def _shift_path(path: PointPath, step_m: tuple[float, float]) -> PointPath:
     points_m = tuple((x_m + step_m[0], y_m + step_m[1]) for x_m, y_m in path.points_m)
     return replace(path, points_m=points_m)
-
-
-def _with(right: Modification, agents: Agents) -> Modification:
-    """Return the modification with its added and moved agents as they are now."""
-    moved = {agent.id for agent in right.moved}
-    return replace(
-        right,
-        added=tuple(agent for agent in agents if agent.id not in moved),
-        moved=tuple(agent for agent in agents if agent.id in moved),
-    )
 
 
 def _shift(agents: Agents, route: EgoRoute, along_m: float, left_m: float = 0.0) -> Agents:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from augment.baselines.rule_placer import place
-from augment.checks import Ground
+from augment.checks.ground import VEHICLES, Ground
 from augment.checks.parties import apart_m
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
@@ -46,7 +46,6 @@ UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list 
 _MOST_CALLS = 8
 _FAR_M, _BESIDE_M = 3.0, 1.0
 _TURNED_RAD = math.radians(20.0)
-_VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 _RATINGS = ("compliance", "realism", "logical_consistency")
 
 Problem = dict[str, str]
@@ -161,11 +160,8 @@ def review_problems(task: Task) -> list[Problem]:
 
 
 def _purpose_problems(task: Task, changed: Sequence[TrafficAgent]) -> list[Problem]:
-    names = {agent.id for agent in task.scene.agents}
-    change = Modification(
-        added=tuple(agent for agent in changed if agent.id not in names),
-        moved=tuple(agent for agent in changed if agent.id in names),
-    )
+    # Whoever is none of the scene's agents is added.
+    change = Modification(moved=task.scene.agents).with_changed(changed)
     findings = check_against_intent(Ground.of(task.scene), change, task.intent)
     faults = [finding for finding in findings if finding.is_fault]
     return [_problem(fault.sentence(), "Place it otherwise.") for fault in faults]
@@ -248,7 +244,7 @@ def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
     if gap_m > _FAR_M:
         action = f"Move it to ({meant.x_m:.1f}, {meant.y_m:.1f})."
         return _problem(f"{agent.id} is {gap_m:.1f} m from where it belongs.", action)
-    if agent.type in _VEHICLES and turned > _TURNED_RAD:
+    if agent.type in VEHICLES and turned > _TURNED_RAD:
         text = f"{agent.id} is turned by {math.degrees(turned):.0f} degrees."
         return _problem(text, f"Turn it to {meant.heading_rad:.3f} rad.")
     return None

@@ -10,13 +10,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 
+from augment.baselines.placing_ground import build_agent
+from augment.baselines.rule_placer import number_agents
 from augment.checks import Finding, FindingKind, Ground
 from augment.checks.purpose import check_drive
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
-from augment.geometry.frames import wrap
+from augment.geometry.frames import Pose, wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent, Purpose
 from augment.scene.planned_motion import MotionPreset, NearEgo
 from augment.scene.presets import PresetNumbers, with_preset
@@ -90,10 +92,7 @@ def _draw_changes(route: EgoRoute, purpose: Purpose, rng: random.Random) -> Iter
             drawn = draw(route, rng)
         except CannotPlace:
             continue
-        first = len(route.scene.everyone) + 1
-        yield Modification(
-            added=tuple(replace(agent, id=f"Agent{n}") for n, agent in enumerate(drawn, first))
-        )
+        yield Modification(added=number_agents(tuple(drawn), route.scene))
 
 
 def _hide(route: EgoRoute, rng: random.Random) -> Iterable[TrafficAgent]:
@@ -145,14 +144,5 @@ def _put(
 ) -> TrafficAgent:
     x_m, y_m = route.position(ahead_m, left_m)
     heading_rad = wrap(route.heading_at(ahead_m) + turn_rad)
-    length_m, width_m = size_m or LENGTH_WIDTH_M[kind]
-    return TrafficAgent(
-        id="drawn",
-        type=kind,
-        x_m=round(x_m, 2),
-        y_m=round(y_m, 2),
-        heading_rad=heading_rad,
-        length_m=length_m,
-        width_m=width_m,
-        lane_id=route.graph.under(x_m, y_m, heading_rad),
-    )
+    pose = Pose(x_m=round(x_m, 2), y_m=round(y_m, 2), heading_rad=heading_rad)
+    return build_agent(kind, pose, route.graph.under(x_m, y_m, heading_rad), size_m)

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-import shapely
 
 from augment.checks.bodies import USUAL_MPS, overlap
 from augment.checks.ground import ChangedScene, Ground
@@ -95,14 +94,19 @@ class Realism:
         return float(np.mean(list(self.scores.values()))) if self.judged else None
 
 
-def measure_objects(situation: ChangedScene) -> list[PlacedObject]:
-    """Measure everything that was changed."""
+def measure_change(ground: Ground, change: Modification) -> list[PlacedObject]:
+    """Measure what a change adds and moves.
+
+    Raises:
+        InvalidModification: It does not fit the scene.
+    """
+    situation = ChangedScene.of(ground, change)
     if not situation.changed:
         return []
     collided = {
         name for finding in overlap(situation) if finding.is_fault for name in finding.agents
     }
-    gaps_m = _gaps_m(situation)
+    gaps_m = situation.measure_gaps(situation.changed, situation.everyone).min(axis=1).tolist()
     return [
         PlacedObject(
             object_class=CLASS_OF[agent.type],
@@ -118,22 +122,9 @@ def measure_objects(situation: ChangedScene) -> list[PlacedObject]:
     ]
 
 
-def measure_change(ground: Ground, change: Modification) -> list[PlacedObject]:
-    """Measure what a change adds and moves.
-
-    Raises:
-        InvalidModification: It does not fit the scene.
-    """
-    return measure_objects(ChangedScene.of(ground, change))
-
-
 def measure_recorded(ground: Ground) -> list[PlacedObject]:
     """Measure all of a scene as it was but its ego."""
-    scene = ground.scene
-    every = Modification(moved=scene.agents)
-    return measure_objects(
-        ChangedScene(ground=ground, modification=every, everyone=scene.everyone)
-    )
+    return measure_change(ground, Modification(moved=ground.scene.agents))
 
 
 def count_recorded(objects: Iterable[PlacedObject]) -> RecordedCounts:
@@ -193,8 +184,7 @@ def place_at_random(
             walk_to_m=None,
         )
 
-    added, moved = (tuple(map(throw, part)) for part in (change.added, change.moved))
-    return replace(change, added=added, moved=moved)
+    return change.with_changed(map(throw, change.changed))
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -214,19 +204,6 @@ def _measure(
         Feature.GAP: gap_m,
         Feature.EDGE: situation.ground.road.edge_m(agent.x_m, agent.y_m),
     }
-
-
-def _gaps_m(situation: ChangedScene) -> list[float]:
-    """Return how far each changed object is from the nearest other; infinite where it is alone."""
-    names = list(situation.boxes)
-    # (everybody, 4, 2).
-    corners_m = np.array([situation.boxes[name].corners_m for name in names])
-    boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
-    own = [names.index(agent.id) for agent in situation.changed]
-    # (changed, everybody), itself left out by infinity.
-    gaps = np.asarray(shapely.distance(boxes[own, None], boxes[None, :]), dtype=np.float64)
-    gaps[np.arange(len(own)), own] = np.inf
-    return [float(gap) for gap in gaps.min(axis=1)]
 
 
 def _share(

@@ -21,12 +21,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from augment.geometry.polyline import Polyline
+from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Area, Lane, LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 BESIDE_M = 15.0

@@ -339,13 +339,13 @@ class Modification:
         """True if an agent has a motion after t0."""
         return any(agent.motion is not None for agent in self.changed)
 
-    def with_changed(self, agent: TrafficAgent) -> Modification:
-        """Return the same with a changed agent in another state."""
-        added, moved = (
-            tuple(agent if other.id == agent.id else other for other in part)
-            for part in (self.added, self.moved)
-        )
-        return replace(self, added=added, moved=moved)
+    def with_changed(self, agents: Iterable[TrafficAgent]) -> Modification:
+        """Return the same with other changed agents; those that are moved here stay so."""
+        names = {agent.id for agent in self.moved}
+        added, moved = list[TrafficAgent](), list[TrafficAgent]()
+        for agent in agents:
+            (moved if agent.id in names else added).append(agent)
+        return replace(self, added=tuple(added), moved=tuple(moved))
 
 
 def apply(scene: Scene, modification: Modification) -> Scene:

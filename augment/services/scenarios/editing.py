@@ -155,10 +155,9 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
     graph = editable_ground(scenario).graph
-    for agent in modification.changed:
-        if agent.id == agent_id:
-            modification = modification.with_changed(_snap(agent, graph))
-    return modification
+    return modification.with_changed(
+        _snap(agent, graph) if agent.id == agent_id else agent for agent in modification.changed
+    )
 
 
 def give_preset(scenario: Scenario, change: Modification, document_part: object) -> Modification:
