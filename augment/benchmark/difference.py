@@ -193,7 +193,6 @@ def _match(
 ) -> Iterator[tuple[int, int, bool]]:
     """Rows of S and columns of C that belong together, and whether others might."""
     from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
 
     if not left or not rest:
         return
@@ -205,8 +204,9 @@ def _match(
     classes, other_classes = (
         np.array([CLASS_OF[agent.type] for agent in agents]) for agents in (left, rest)
     )
-    apart_m = cdist(ours[:, :2], theirs[:, :2])
-    is_alike = cdist(ours[:, 2:], theirs[:, 2:], "chebyshev") <= SAME_BOX_M
+    differences_m = ours[:, None] - theirs  # (S, C, 4)
+    apart_m = np.hypot(differences_m[..., 0], differences_m[..., 1])
+    is_alike = (np.abs(differences_m[..., 2:]) <= SAME_BOX_M).all(axis=2)
     is_alike &= classes[:, None] == other_classes
     fits = (apart_m <= reach_m) & is_alike
     cost = np.where(fits, apart_m, 1e6)
