@@ -99,9 +99,13 @@ def answer_once(
 
 
 def digest_body(body: object) -> str:
-    """Return the hash of a body: JSON, or the fields and files of a form."""
+    """Return the hash of a body: JSON, or the fields and files of a form.
+
+    With another secret key it is another one: an answer that can't be opened is not returned.
+    """
     fields = dict(body.lists()) if isinstance(body, MultiValueDict) else body
-    return _digest(json.dumps(fields, sort_keys=True, default=_describe))
+    text = json.dumps(fields, sort_keys=True, default=_describe)
+    return salted_hmac("arena.receipt", text, algorithm="sha256").hexdigest()
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from django.apps import apps
 from django.core.files.base import ContentFile
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.db import IntegrityError, connection
-from django.test import Client
+from django.test import Client, override_settings
 from django.urls import reverse
 from django.utils import timezone
 
@@ -364,6 +364,8 @@ def test_a_key_is_kept_a_day_and_its_answer_sealed(cast: Cast) -> None:
     assert send("people", person).content == made.content
     error_of(send("people", person | {"role": "admin"}), 422, "key_reused")
     error_of(send("jobs", cast.job()), 422, "key_reused")
+    with override_settings(SECRET_KEY="another"):
+        error_of(send("people", person), 422, "key_reused")
     Receipt.objects.update(received_at=timezone.now() - timedelta(hours=25))
     assert send("people", person).status_code != 201, "the name is taken"
     assert not Receipt.objects.exists(), "what made nothing may be sent again"
