@@ -54,7 +54,7 @@ def order_units(
     gap: int,
     distance: int,
     rng: np.random.Generator,
-    bases: IntArray | None = None,
+    bases: IntArray,
 ) -> tuple[list[list[Slot]], int]:
     """Each expert's units and extras in order, and the gap that all orders keep.
 
@@ -65,51 +65,36 @@ def order_units(
         distance: Places wanted between a unit and its repeat.
         rng: Shuffles.
         bases: (S,) columns with the same number are samples of one scenario, which are kept apart
-            like one column; None for all different.
+            like one column.
     """
     # (E, S) showings of each scenario, units first, then repeats and checks.
     counts = chosen.sum(axis=1)
-    if bases is None:
-        bases = np.arange(counts.shape[1])
     for row, more in zip(counts, extras, strict=True):
         for scenario in [scenario for _, scenario in more.repeated] + list(more.checks):
             row[scenario] += 1
     # One gap for all experts: what the plan promises holds for each of them.
     best_gap = min(largest_gap(_sum_samples(row, bases), gap) for row in counts)
-    return [
-        _order(mine, more, row, best_gap, distance, rng, bases)
-        for mine, more, row in zip(chosen, extras, counts, strict=True)
-    ], best_gap
-
-
-def _order(
-    mine: BoolArray,
-    more: Extras,
-    counts: IntArray,
-    gap: int,
-    distance: int,
-    rng: np.random.Generator,
-    bases: IntArray,
-) -> list[Slot]:
-    """One expert's order; where a repeat comes too early, others are tried and the best kept."""
-    waiting = [
-        [int(pair) for pair in rng.permutation(np.flatnonzero(column))] for column in mine.T
-    ]
-    for pair, scenario in more.repeated:
-        # Repeats and what they show get places of their own, before the others are filled in.
-        waiting[scenario].remove(pair)
-    best: list[Slot] = []
-    nearest = -1
-    for _ in range(TRIES if more.repeated else 1):
-        columns = _columns(sequence(_sum_samples(counts, bases), gap, rng), counts, bases, rng)
-        slots = _fill_places(waiting, more, columns, distance, rng)
-        # Of the best order its nearest repeat is furthest from what it shows.
-        gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
-        if min(gaps, default=distance) > nearest:
-            best, nearest = slots, min(gaps, default=distance)
-        if nearest >= distance:
-            break
-    return best
+    orders = []
+    for mine, more, row in zip(chosen, extras, counts, strict=True):
+        waiting = [rng.permutation(np.flatnonzero(column)).tolist() for column in mine.T]
+        for pair, scenario in more.repeated:
+            # Repeats and what they show get places of their own, before the others are filled in.
+            waiting[scenario].remove(pair)
+        best: list[Slot] = []
+        nearest = -1
+        # Where a repeat comes too early, other orders are tried and the best kept.
+        for _ in range(TRIES if more.repeated else 1):
+            scenarios = sequence(_sum_samples(row, bases), best_gap, rng)
+            columns = _columns(scenarios, row, bases, rng)
+            slots = _fill_places(waiting, more, columns, distance, rng)
+            # Of the best order its nearest repeat is furthest from what it shows.
+            gaps = [index - slot.of for index, slot in enumerate(slots) if slot.of is not None]
+            if min(gaps, default=distance) > nearest:
+                best, nearest = slots, min(gaps, default=distance)
+            if nearest >= distance:
+                break
+        orders.append(best)
+    return orders, best_gap
 
 
 def _sum_samples(counts: IntArray, bases: IntArray) -> IntArray:
@@ -124,10 +109,7 @@ def _columns(
     if len(set(bases.tolist())) == len(bases):
         return scenarios
     waiting = {
-        int(base): [
-            int(c)
-            for c in rng.permutation(np.repeat(np.arange(len(bases)), counts * (bases == base)))
-        ]
+        base: rng.permutation(np.repeat(np.arange(len(bases)), counts * (bases == base))).tolist()
         for base in set(bases.tolist())
     }
     return [waiting[scenario].pop() for scenario in scenarios]
