@@ -89,7 +89,27 @@ def list_judged_pairs(study: Study, question: str) -> list[ShownPair]:
 
 def judge_lines(study: Study) -> list[JudgeLine]:
     """Return a line for each judge of a study, the newest first."""
-    return [_line(study, run) for run in study.judges.select_related("endpoint").order_by("-pk")]
+    lines = []
+    for run in study.judges.select_related("endpoint").order_by("-pk"):
+        rows = list_answered_pairs(run)
+        became = Counter(exchange(row.first, row.second) for row in rows)
+        single = Counter(answer for row in rows for answer in (row.first, row.second))
+        states = run.judgements.order_by().values_list("state").annotate(Count("pk"))
+        line = JudgeLine(
+            run=run,
+            name=judge_name(run),
+            states=dict(states),
+            kept=became[Exchange.KEPT],
+            lost=became[Exchange.LOST],
+            equal=became[Exchange.EQUAL],
+            unreadable=became[Exchange.UNREADABLE],
+            answers=single["A"] + single["B"],
+            first=single["A"],
+            usd=_usd_per_pair(run, len(rows)),
+            own_family=tuple(_own_family(study, run).values()),
+        )
+        lines.append(line)
+    return lines
 
 
 def judge_preferences(study: Study, question: str) -> dict[str, Preferences]:
@@ -141,26 +161,6 @@ def list_answered_pairs(run: JudgeRun) -> list[PairJudgement]:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _line(study: Study, run: JudgeRun) -> JudgeLine:
-    rows = list_answered_pairs(run)
-    became = Counter(exchange(row.first, row.second) for row in rows)
-    single = Counter(answer for row in rows for answer in (row.first, row.second))
-    states = run.judgements.order_by().values_list("state").annotate(Count("pk"))
-    return JudgeLine(
-        run=run,
-        name=judge_name(run),
-        states=dict(states),
-        kept=became[Exchange.KEPT],
-        lost=became[Exchange.LOST],
-        equal=became[Exchange.EQUAL],
-        unreadable=became[Exchange.UNREADABLE],
-        answers=single["A"] + single["B"],
-        first=single["A"],
-        usd=_usd_per_pair(run, len(rows)),
-        own_family=tuple(_own_family(study, run).values()),
-    )
 
 
 def _usd_per_pair(run: JudgeRun, pairs: int) -> float | None:

@@ -83,7 +83,27 @@ class Decision:
     ms_visible: int | None = None
 
     def __post_init__(self) -> None:
-        if faults := _find_faults(self):
+        """Refuse parts that are unknown or contradict the outcome."""
+        outcome, faults = self.outcome, dict[str, str]()
+        if outcome not in Vote.Outcome:
+            faults["outcome"] = f"One of these is needed: {', '.join(Vote.Outcome.values)}."
+        if self.both_miss and outcome != Vote.Outcome.EQUAL:
+            faults["both_miss"] = "Both can only miss the instruction where they are equal."
+        is_strength = self.strength in Vote.Strength and outcome in PREFERENCES
+        if self.strength and not is_strength:
+            allowed = " or ".join(Vote.Strength.values)
+            faults["strength"] = f"Only a preference has a strength: {allowed}."
+        if outcome == Vote.Outcome.SKIP and self.reason not in Vote.SkipReason.values:
+            faults["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
+        if outcome != Vote.Outcome.SKIP and self.reason:
+            faults["reason"] = "Only a skip has a reason."
+        if len(self.comment) > LONGEST_COMMENT:
+            faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+        if unknown := sorted(set(self.aids) - set(AIDS)):
+            faults["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
+        if fault := _find_fault_of_marks(self):
+            faults["faults"] = fault
+        if faults:
             raise InvalidVote(faults)
 
 
@@ -137,30 +157,6 @@ def receive_vote(*, expert: User, decision: Decision, is_paced: bool = True) -> 
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _find_faults(decision: Decision) -> dict[str, str]:
-    """Return faults of a decision: parts that are unknown or contradict its outcome."""
-    outcome, faults = decision.outcome, {}
-    if outcome not in Vote.Outcome:
-        faults["outcome"] = f"One of these is needed: {', '.join(Vote.Outcome.values)}."
-    if decision.both_miss and outcome != Vote.Outcome.EQUAL:
-        faults["both_miss"] = "Both can only miss the instruction where they are equal."
-    is_strength = decision.strength in Vote.Strength and outcome in PREFERENCES
-    if decision.strength and not is_strength:
-        allowed = " or ".join(Vote.Strength.values)
-        faults["strength"] = f"Only a preference has a strength: {allowed}."
-    if outcome == Vote.Outcome.SKIP and decision.reason not in Vote.SkipReason.values:
-        faults["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
-    if outcome != Vote.Outcome.SKIP and decision.reason:
-        faults["reason"] = "Only a skip has a reason."
-    if len(decision.comment) > LONGEST_COMMENT:
-        faults["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
-    if unknown := sorted(set(decision.aids) - set(AIDS)):
-        faults["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
-    if fault := _find_fault_of_marks(decision):
-        faults["faults"] = fault
-    return faults
 
 
 def _find_fault_of_marks(decision: Decision) -> str:
