@@ -51,36 +51,27 @@ class DatabaseBusy(ArenaError):
     """The database is locked or its disk is full. Nothing was written; send it again later."""
 
     retry_after_s = 2
-
-    def __init__(self) -> None:
-        super().__init__(
-            "The database can't be written just now: it is busy, or its disk is full."
-        )
+    sentence = "The database can't be written just now: it is busy, or its disk is full."
 
 
 class StillUnderWay(ArenaError):
     """The same request came before and is not answered yet; nothing was done for this one."""
 
     retry_after_s = 2
-
-    def __init__(self) -> None:
-        super().__init__("The same request came before and is not answered yet.")
+    sentence = "The same request came before and is not answered yet."
 
 
 class BeingDrawn(ArenaError):
     """Workers still draw the pictures of the pairs that come next."""
 
     retry_after_s = 2
-
-    def __init__(self) -> None:
-        super().__init__("The next pictures are being drawn. Ask again in a moment.")
+    sentence = "The next pictures are being drawn. Ask again in a moment."
 
 
 class KeyReused(ArenaError):
     """The key of a request was used for another one; nothing was done."""
 
-    def __init__(self) -> None:
-        super().__init__("This Idempotency-Key came with another request before: send a new one.")
+    sentence = "This Idempotency-Key came with another request before: send a new one."
 
 
 class InvalidVote(ArenaError):
@@ -107,7 +98,6 @@ class StudyStillOpen(ArenaError):
     """
 
     def __init__(self, name: str) -> None:
-        self.name = name
         super().__init__(
             f"The study '{name}' is still open. Close it first, or look early on purpose: "
             "that is written to the log."

@@ -4,7 +4,16 @@ from collections.abc import Iterable
 
 
 class AugmentError(Exception):
-    """The root of augment's own errors: its text is a sentence for the person who caused it."""
+    """The root of augment's own errors: its text is a sentence for the person who caused it.
+
+    Attributes:
+        sentence: The text of one that is raised without any.
+    """
+
+    sentence = ""
+
+    def __init__(self, *texts: object) -> None:
+        super().__init__(*(texts or [self.sentence]))
 
 
 # --- What is wrong with an input ---------------------------------------------------------------
@@ -70,13 +79,8 @@ class CannotDrive(AugmentError):
 class CannotPlace(AugmentError):
     """A contestant without a language model refuses rather than guesses. An outcome, no retry.
 
-    Args:
-        reason: What is open that it needs, or why the map or the traffic leaves no room.
+    The text says what is open that it needs, or why the map or the traffic leaves no room.
     """
-
-    def __init__(self, reason: str) -> None:
-        self.reason = reason
-        super().__init__(reason)
 
 
 # --- What goes wrong when a model is asked -----------------------------------------------------
@@ -141,18 +145,7 @@ class NotSent(ModelFault):
 
 
 class EndpointBusy(NotSent):
-    """No place was free at the endpoint; nothing was sent. Raise its limits or wait.
-
-    Args:
-        endpoint: Its label.
-        waited_s: How long the call waited.
-    """
-
-    def __init__(self, endpoint: str, waited_s: float) -> None:
-        super().__init__(
-            f"no place was free at endpoint {endpoint!r} for {waited_s:g} s: "
-            "raise its limits or run fewer workers"
-        )
+    """No place was free at the endpoint; nothing was sent. Raise its limits or wait."""
 
 
 class ContextTruncated(ModelFault):
@@ -183,32 +176,11 @@ class QueueFault(AugmentError):
 
 
 class QueueRefused(QueueFault):
-    """There is a broker and it takes no messages: its memory is full, it is read only.
-
-    Args:
-        address: Where it is, free of passwords.
-        answer: What it answered.
-    """
-
-    def __init__(self, address: str, answer: str) -> None:
-        super().__init__(
-            f"Redis at {address} takes no messages: {answer.rstrip('.')}. What was queued is "
-            "kept and runs as soon as Redis takes messages again."
-        )
+    """There is a broker and it takes no messages: its memory is full, it is read only."""
 
 
 class QueueUnreachable(QueueFault):
-    """No broker takes messages. The rows wait and are sent by the next worker that starts.
-
-    Args:
-        address: Where a broker was looked for, free of passwords.
-    """
-
-    def __init__(self, address: str) -> None:
-        super().__init__(
-            f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. What was "
-            "queued is kept and runs as soon as a worker starts."
-        )
+    """No broker takes messages. The rows wait and are sent by the next worker that starts."""
 
 
 class NotNeeded(AugmentError):
@@ -222,15 +194,13 @@ class WorkerStopping(NotNeeded):
 class LeaseLost(NotNeeded):
     """Another worker has this row now. Drop the result; the new holder brings its own."""
 
-    def __init__(self) -> None:
-        super().__init__("the row was taken back")
+    sentence = "the row was taken back"
 
 
 class JobCancelled(NotNeeded):
     """The job was cancelled while one of its rows was worked on. The row is cancelled with it."""
 
-    def __init__(self) -> None:
-        super().__init__("The job was cancelled.")
+    sentence = "The job was cancelled."
 
 
 class QuestionInFlight(AugmentError):
@@ -250,41 +220,15 @@ class CallDropped(ModelFault):
 
 
 class KeyMissing(AugmentError):
-    """The environment variable that should hold an endpoint's key is not set. Set and retry.
-
-    Args:
-        variable: The name of the variable; its value is never part of any text.
-        endpoint: The label of the endpoint that needs it.
-    """
-
-    def __init__(self, variable: str, endpoint: str) -> None:
-        super().__init__(
-            f"The environment variable {variable}, which holds the key of endpoint "
-            f"{endpoint!r}, is not set where the worker runs."
-        )
+    """The environment variable that should hold an endpoint's key is not set. Set and retry."""
 
 
 class KeyNotAllowed(AugmentError):
-    """An endpoint may not be sent the variable that it names. Nothing was read.
-
-    Args:
-        endpoint: The label of the endpoint.
-        obstacle: The variable's name, and why.
-    """
-
-    def __init__(self, endpoint: str, obstacle: str) -> None:
-        super().__init__(f"The key of endpoint {endpoint!r} is not sent: {obstacle}.")
+    """An endpoint may not be sent the variable that it names. Nothing was read."""
 
 
 class DatabaseLocked(AugmentError):
-    """The database took nothing for longer than anybody waits. Try again when it is less busy.
-
-    Args:
-        what: What could not be stored or read.
-    """
-
-    def __init__(self, what: str) -> None:
-        super().__init__(f"The database was locked for too long: {what}.")
+    """The database took nothing for longer than anybody waits. Try again when it is less busy."""
 
 
 class MediaFault(AugmentError):

@@ -7,6 +7,7 @@ a connection that is tried once: where no broker answers, there is a sentence in
 
 import logging
 import os
+import socket
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import timedelta
@@ -21,11 +22,11 @@ from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import OuterRef, Q, QuerySet, Subquery
+from django.db.models import Model, OuterRef, Q, QuerySet, Subquery
 from kombu.exceptions import OperationalError
 
 from augment.errors import QueueFault, QueueRefused, QueueUnreachable
-from augment.models import Augmentation, GenerationJob, Scenario
+from augment.models import Augmentation, BaseScene, GenerationJob, JudgeRun, Scenario, Sweep
 from augment.services.benchmarks.submissions import SUBMISSIONS
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.driving.simulations import DRIVES
@@ -134,9 +135,15 @@ def open_broker(*, within_s: float = 5) -> Iterator[Any]:
             cause: BaseException | None = error
             while cause is not None:
                 if isinstance(cause, REFUSALS):
-                    raise QueueRefused(address, str(cause)) from error
+                    raise QueueRefused(
+                        f"Redis at {address} takes no messages: {str(cause).rstrip('.')}. "
+                        "What was queued is kept and runs as soon as Redis takes messages again."
+                    ) from error
                 cause = cause.__cause__
-            raise QueueUnreachable(address) from error
+            raise QueueUnreachable(
+                f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. What was "
+                "queued is kept and runs as soon as a worker starts."
+            ) from error
 
 
 def check_broker(*, within_s: float = 5) -> None:
@@ -199,19 +206,25 @@ enqueue_job = sender_of(AUGMENTATIONS, "job")
 enqueue_judge = sender_of(JUDGEMENTS, "run")
 enqueue_moments = sender_of(MOMENTS, "upload")
 enqueue_sweep = sender_of(DRIVES, "swept__sweep")
+SENDERS: dict[type[Model], Callable[[int], object]] = {
+    BaseScene: partial(send, draw, "scene"),
+    GenerationJob: enqueue_job,
+    JudgeRun: enqueue_judge,
+    Scenario: partial(send, draw, "scenario"),
+    Sweep: enqueue_sweep,
+}
+"""What is sent for a row that is no work itself: its work, or that its pictures are drawn."""
 
 
-def sender(kind: WorkKind[Any]) -> Callable[[int], int]:
-    """Return a function that sends the message of one row; as `enqueue`."""
-    return lambda pk: enqueue(kind, [pk])
+def enqueue_row(row: Model) -> None:
+    """Send what a new or changed row needs of workers; as `enqueue`."""
+    kind = KINDS.get(str(row._meta.model_name))
+    if kind is None:
+        SENDERS[type(row)](row.pk)
+    else:
+        enqueue(kind, [row.pk])
 
 
-enqueue_augmentation = sender(AUGMENTATIONS)
-enqueue_moment = sender(MOMENTS)
-enqueue_probe = sender(PROBES)
-enqueue_reading = sender(READINGS)
-enqueue_submission = sender(SUBMISSIONS)
-enqueue_upload = sender(UPLOADS)
 enqueue_simulations = partial(enqueue, DRIVES)
 
 
@@ -224,8 +237,6 @@ def enqueue_measures(jobs: QuerySet[GenerationJob]) -> None:
 
 
 enqueue_measure = partial(send, measure)
-enqueue_scenario = partial(send, draw, "scenario")
-enqueue_scene = partial(send, draw, "scene")
 
 
 # --- Recovering lost work ----------------------------------------------------------------------
@@ -260,7 +271,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 def start_recovering(**_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
     workers.stopping.clear()
-    presence = workers.Presence(workers.worker_name(os.getpid()))
+    presence = workers.Presence(f"{socket.gethostname()} {os.getpid()}")
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
 

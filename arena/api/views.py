@@ -4,12 +4,12 @@ import inspect
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial, wraps
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 from urllib.parse import urlencode
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Model, QuerySet
+from django.db.models import QuerySet
 from django.http.response import HttpResponseBase
 from django.urls import include, path
 from django.views.decorators.cache import never_cache
@@ -32,9 +32,8 @@ from arena.api.access import STAFF, RoleAllowed
 from arena.api.fields import SoundJSONParser, StrictSerializer
 from arena.exports.formats import Export
 from arena.shell.receipts import StoredAnswer, answer_once, digest_body
-from augment.errors import QueueFault
+from arena.shell.sending import Row, send_on_commit
 
-Row = TypeVar("Row", bound=Model)
 Params = dict[str, Any]
 """The validated body or query of a request."""
 
@@ -139,12 +138,14 @@ class WarnedDocument(serializers.Serializer[Any]):
         return warnings
 
 
-def keep_and_send(keep: Callable[[], Row], send: Callable[[int], object]) -> tuple[Row, list[str]]:
+def keep_and_send(
+    keep: Callable[[], Row], send: Callable[[Row], object] | None = None
+) -> tuple[Row, list[str]]:
     """Write a row and, once that is committed, queue its work.
 
     Args:
         keep: Writes the row.
-        send: Queues the row with this primary key; a missing broker becomes a warning.
+        send: Queues its work, by default by its kind; a missing broker becomes a warning.
 
     Returns:
         The row, and the warnings.
@@ -152,18 +153,11 @@ def keep_and_send(keep: Callable[[], Row], send: Callable[[int], object]) -> tup
     warnings: list[str] = []
     with transaction.atomic():
         row = keep()
-        transaction.on_commit(partial(_send, warnings, send, row.pk))
+        send_on_commit(row, warnings.append, send)
     return row, warnings
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _send(warnings: list[str], send: Callable[[int], object], pk: int) -> None:
-    try:
-        send(pk)
-    except QueueFault as error:
-        warnings.append(str(error))
 
 
 JSON = "application/json"

@@ -24,10 +24,6 @@ def _like(pattern: str, allowed: str) -> AfterValidator:
     return AfterValidator(check)
 
 
-def _split(text: Any) -> Any:
-    return [part.strip() for part in text.split(",") if part.strip()]
-
-
 def _open_folder(path: Path) -> Path:
     """Return an absolute folder that is there, or can be made."""
     path = path.expanduser().resolve()
@@ -91,7 +87,7 @@ KeyVariable = Annotated[
         "use NAME=HOST|HOST with the name of a variable that is no secret of the product itself",
     ),
 ]
-Comma = BeforeValidator(_split)
+Comma = BeforeValidator(lambda text: [part.strip() for part in text.split(",") if part.strip()])
 
 
 class Environment(BaseModel):

@@ -21,20 +21,14 @@ class LoginLimit(AxesDatabaseHandler):  # type: ignore[misc] # untyped
     def get_failures(self, request: HttpRequest, credentials: dict[str, Any] | None = None) -> int:
         """Return the failures of the account here; the limit if the address reached its own."""
         failures = int(super().get_failures(request, credentials))
-        if _of_address(request) < settings.ADDRESS_FAILURE_LIMIT:
+        address = getattr(request, "axes_ip_address", None)
+        recent = AccessAttempt.objects.filter(
+            ip_address=address, attempt_time__gt=get_cool_off_threshold(request)
+        )
+        total = recent.aggregate(total=Sum("failures_since_start"))["total"] or 0
+        if address is None or total < settings.ADDRESS_FAILURE_LIMIT:
             return failures
         return max(failures, int(get_failure_limit(request, credentials)))
-
-
-def _of_address(request: HttpRequest) -> int:
-    """Failures from there within the time of a lock, 0 where no address is known."""
-    address = getattr(request, "axes_ip_address", None)
-    if address is None:
-        return 0
-    recent = AccessAttempt.objects.filter(
-        ip_address=address, attempt_time__gt=get_cool_off_threshold(request)
-    )
-    return int(recent.aggregate(total=Sum("failures_since_start"))["total"] or 0)
 
 
 def client_address(request: HttpRequest) -> str | None:

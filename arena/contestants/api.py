@@ -15,7 +15,6 @@ from arena.api.fields import RequestBody, StrictSerializer, TextField
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services import endpoints
-from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 
@@ -154,7 +153,7 @@ class ModelsView(views.ApiView):
         """
         row = get_object_or_404(Endpoint, code=code)
         plan = partial(endpoints.add_model, row, model=params["model"], actor=self.user)
-        return views.keep_and_send(plan, enqueue_probe)[0].model
+        return views.keep_and_send(plan)[0].model
 
 
 class ProbeView(views.ApiView):
@@ -179,9 +178,7 @@ class ProbeView(views.ApiView):
 
         Poll it until its state is done or failed.
         """
-        return views.keep_and_send(
-            partial(endpoints.plan_probe, _model(code), actor=self.user), enqueue_probe
-        )
+        return views.keep_and_send(partial(endpoints.plan_probe, _model(code), actor=self.user))
 
 
 def _model(code: uuid.UUID) -> EndpointModel:

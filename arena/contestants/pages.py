@@ -38,7 +38,6 @@ from augment.services.endpoints import (
 )
 from augment.services.running import workforce
 from augment.services.running.matrix import SEPARATOR
-from augment.tasks import enqueue_probe
 
 CONTESTANTS_AT_ONCE = 50
 
@@ -269,7 +268,7 @@ def new_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Note a model of an endpoint with its listed price, and have a worker probe it."""
     endpoint = get_object_or_404(Endpoint, code=code)
     probe = add_model(endpoint, model=request.POST.get("model", ""), actor=get_user(request))
-    send_later(request, enqueue_probe, probe.pk)
+    send_later(request, probe)
     return redirect("endpoint-model", code=probe.model.code)
 
 
@@ -300,4 +299,4 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def probe_model(request: HttpRequest, code: uuid.UUID) -> None:
     """Have a worker ask the model what it can do."""
     row = get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)
-    send_later(request, enqueue_probe, plan_probe(row, actor=get_user(request)).pk)
+    send_later(request, plan_probe(row, actor=get_user(request)))

@@ -21,7 +21,6 @@ from augment.models import Augmentation, GenerationJob
 from augment.services import running
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import launch
-from augment.tasks import enqueue_augmentation, enqueue_job
 
 
 class JobQuery(views.PageQuery):
@@ -138,7 +137,7 @@ class JobsView(views.ApiView):
         Workers begin at once.
         """
         job, warnings = views.keep_and_send(
-            partial(launch, running.JobRequest(**params), self.user), enqueue_job
+            partial(launch, running.JobRequest(**params), self.user)
         )
         return running.count_rows(job), warnings
 
@@ -261,7 +260,7 @@ class FollowUpsView(views.ApiView):
         ask = partial(
             running.ask_follow_up, _augmentation(code), running.FollowUpRequest(**params)
         )
-        return views.keep_and_send(partial(ask, actor=self.user), enqueue_augmentation)
+        return views.keep_and_send(partial(ask, actor=self.user))
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

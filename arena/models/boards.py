@@ -5,11 +5,10 @@ from functools import cached_property
 
 from django.db import models
 
-from arena.models.people import CodedModel
 from arena.models.studies import Study
 from arena.rating.board_table import PROVISIONAL_ABOVE, BoardTableDocument
 from arena.rating.snapshot_document import read_document
-from augment.models import AppendOnly, Benchmark
+from augment.models import AppendOnly, Benchmark, CodedModel
 
 
 class Board(CodedModel):

@@ -11,17 +11,7 @@ from django.db.models import Q
 from django.db.models.signals import post_save
 from django.dispatch import receiver
 
-
-class CodedModel(models.Model):
-    """A row that addresses name by a random code."""
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
-
-    class Meta:
-        abstract = True
-
-    def __str__(self) -> str:
-        return str(self.code)
+from augment.models import CodedModel, user_column
 
 
 class Person(models.Model):
@@ -78,9 +68,7 @@ class ApiToken(CodedModel):
 
     ROLES: ClassVar = ("admin", "researcher", "expert", "entrant")
 
-    owner = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="api_tokens"
-    )
+    owner = user_column("api_tokens", on_delete=models.CASCADE)
     name = models.CharField(max_length=80, help_text="what it is for")
     role = models.CharField(max_length=10, choices=[(role, role) for role in ROLES])
     token_sha256 = models.CharField(max_length=64, unique=True, editable=False)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 from django.utils.functional import cached_property
@@ -15,7 +14,7 @@ from arena.models.studies import Study
 from arena.models.votes import Question
 from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
-from augment.models import AppendOnly, Contestant, Work, account_column
+from augment.models import AppendOnly, Contestant, Work, account_column, user_column
 
 if TYPE_CHECKING:
     _JSONField = models.JSONField[Results, Results]
@@ -190,9 +189,7 @@ class EarlyLook(AppendOnly):
     """Somebody opened the results of an open study on purpose; it ends their voting in it."""
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="early_looks")
-    user = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="early_looks"
-    )
+    user = user_column("early_looks")
     at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

@@ -6,9 +6,9 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
-from arena.models.people import CodedModel, fresh_token
+from arena.models.people import fresh_token
 from arena.pairing import order
-from augment.models import Augmentation, Contestant, JudgeRun, Scenario
+from augment.models import Augmentation, CodedModel, Contestant, JudgeRun, Scenario, user_column
 
 
 def one_question() -> list[str]:
@@ -100,9 +100,7 @@ class Matchup(CodedModel):
         CHECK = order.CHECK, "Attention check"
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="matchups")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="matchups"
-    )
+    expert = user_column("matchups")
     position = models.PositiveIntegerField(help_text="place in the expert's own order, from 1")
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="matchups")
     left = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="shown_left")

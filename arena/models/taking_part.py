@@ -9,9 +9,16 @@ from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
-from arena.models.people import CodedModel, fresh_token
+from arena.models.people import fresh_token
 from arena.models.studies import Study
-from augment.models import Augmentation, Contestant, Scenario, account_column
+from augment.models import (
+    Augmentation,
+    CodedModel,
+    Contestant,
+    Scenario,
+    account_column,
+    user_column,
+)
 
 
 class Invitation(CodedModel):
@@ -30,9 +37,7 @@ class Invitation(CodedModel):
     ALIVE: ClassVar = frozenset({State.UNUSED, State.USED})
 
     study = models.ForeignKey(Study, models.CASCADE, related_name="invitations", null=True)
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="invitations"
-    )
+    expert = user_column("invitations", on_delete=models.CASCADE)
     token_sha256 = models.CharField(max_length=64, unique=True, editable=False)
     invited_by = account_column(
         on_delete=models.SET_NULL, help_text="none for a link that was made by the command"
@@ -152,9 +157,7 @@ class Authorship(CodedModel):
     """
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="authorships")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="authorships"
-    )
+    expert = user_column("authorships", on_delete=models.CASCADE)
     contestant = models.ForeignKey(
         Contestant, on_delete=models.CASCADE, related_name="authorships"
     )
@@ -184,9 +187,7 @@ class PracticePair(models.Model):
         SKIPPED = "skipped", "Skipped"
 
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="practice_pairs")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="practice_pairs"
-    )
+    expert = user_column("practice_pairs", on_delete=models.CASCADE)
     position = models.PositiveIntegerField(help_text="place in the expert's round, from 1")
     scenario = models.ForeignKey(Scenario, on_delete=models.CASCADE, related_name="+")
     good = models.ForeignKey(Augmentation, on_delete=models.CASCADE, related_name="+")

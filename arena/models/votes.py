@@ -7,9 +7,9 @@ from django.db import models
 from django.db.models import F, Q
 from django.utils.translation import gettext_lazy as _
 
-from arena.models.people import CodedModel, fresh_token
+from arena.models.people import fresh_token
 from arena.models.studies import Matchup
-from augment.models import AppendOnly, Augmentation, GenerationJob
+from augment.models import AppendOnly, Augmentation, CodedModel, GenerationJob, user_column
 
 AID_LABELS = {
     "zoom": _("zoom"),
@@ -73,9 +73,7 @@ class Vote(AppendOnly):
 
     key = models.UUIDField(unique=True, help_text="made by the browser; the same key is one vote")
     matchup = models.ForeignKey(Matchup, on_delete=models.PROTECT, related_name="votes")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="votes"
-    )
+    expert = user_column("votes")
     shown_left = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
     shown_right = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
     question = models.CharField(
@@ -178,9 +176,7 @@ class Report(AppendOnly):
 
     key = models.UUIDField(unique=True, help_text="made by the browser; one key is one report")
     matchup = models.ForeignKey(Matchup, on_delete=models.PROTECT, related_name="reports")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="reports"
-    )
+    expert = user_column("reports")
     reason = models.CharField(max_length=20, choices=Reason.choices)
     side = models.CharField(
         max_length=10,
@@ -236,9 +232,7 @@ class LabelTask(CodedModel):
     """One planned showing of one augmentation to one expert."""
 
     labelling = models.ForeignKey(LabellingRound, on_delete=models.CASCADE, related_name="tasks")
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="label_tasks"
-    )
+    expert = user_column("label_tasks")
     position = models.PositiveIntegerField(help_text="place in the expert's own order, from 1")
     augmentation = models.ForeignKey(
         Augmentation, on_delete=models.PROTECT, related_name="label_tasks"
@@ -271,9 +265,7 @@ class FaultLabel(AppendOnly):
     augmentation = models.ForeignKey(
         Augmentation, on_delete=models.PROTECT, related_name="fault_labels"
     )
-    expert = models.ForeignKey(
-        settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="fault_labels"
-    )
+    expert = user_column("fault_labels")
     task = models.OneToOneField(LabelTask, on_delete=models.PROTECT, related_name="label")
     position = models.BooleanField()
     heading = models.BooleanField()

@@ -6,9 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from rest_framework import serializers
 
-from arena.api.access import ADMINS, make_api_token
-from arena.api.fields import StrictSerializer, TextField
-from arena.api.views import ApiView, Params, operation
+from arena.api import access, fields, views
 from arena.people.links import accept, find_invitation, make_link_path
 from arena.people.services import accept_welcome, create_person, end_of_link, make_first_admin
 from arena.shell.accounts import ROLES, role_given, top_role
@@ -36,29 +34,29 @@ class NewPersonDocument(serializers.Serializer[Any]):
         return role_given(user)
 
 
-class PersonBody(StrictSerializer):
+class PersonBody(fields.StrictSerializer):
     """A new account."""
 
-    username = TextField(max_length=150)
+    username = fields.TextField(max_length=150)
     role = serializers.ChoiceField(choices=list(ROLES))
-    pseudonym = TextField(
+    pseudonym = fields.TextField(
         max_length=60, required=False, default=None, help_text="What others see."
     )
 
 
-class FirstBody(StrictSerializer):
+class FirstBody(fields.StrictSerializer):
     """The first admin."""
 
-    link = TextField(max_length=2000, help_text="As `serve` printed it, or the end of it.")
-    username = TextField(max_length=150)
-    password = TextField(max_length=500, trim_whitespace=False)
+    link = fields.TextField(max_length=2000, help_text="As `serve` printed it, or the end of it.")
+    username = fields.TextField(max_length=150)
+    password = fields.TextField(max_length=500, trim_whitespace=False)
 
 
-class WelcomeBody(StrictSerializer):
+class WelcomeBody(fields.StrictSerializer):
     """The link of an account, and its password unless it is an expert's."""
 
-    link = TextField(max_length=2000, help_text="As it was given, or the end of it.")
-    password = TextField(
+    link = fields.TextField(max_length=2000, help_text="As it was given, or the end of it.")
+    password = fields.TextField(
         max_length=500, trim_whitespace=False, required=False, help_text="Experts need none."
     )
 
@@ -71,13 +69,13 @@ class TokenDocument(serializers.Serializer[Any]):
     expires_at = serializers.DateTimeField()
 
 
-class PeopleView(ApiView):
+class PeopleView(views.ApiView):
     """Accounts."""
 
-    writers = ADMINS
+    writers = access.ADMINS
 
-    @operation(NewPersonDocument, takes=PersonBody, status=201, name="createPerson")
-    def post(self, params: Params) -> User:
+    @views.operation(NewPersonDocument, takes=PersonBody, status=201, name="createPerson")
+    def post(self, params: views.Params) -> User:
         """Make an account and the link that lets its owner in.
 
         The link is shown this once.
@@ -88,14 +86,14 @@ class PeopleView(ApiView):
         return made
 
 
-class FirstView(ApiView):
+class FirstView(views.ApiView):
     """The first admin of an empty installation."""
 
     authentication_classes = ()
     permission_classes = ()
 
-    @operation(TokenDocument, takes=FirstBody, status=201, name="makeFirstAdmin")
-    def post(self, params: Params) -> dict[str, Any]:
+    @views.operation(TokenDocument, takes=FirstBody, status=201, name="makeFirstAdmin")
+    def post(self, params: views.Params) -> dict[str, Any]:
         """Make the first admin by the link that `serve` prints.
 
         Answers with a token of the new admin.
@@ -106,14 +104,14 @@ class FirstView(ApiView):
         return _token(user, "first start")
 
 
-class WelcomeView(ApiView):
+class WelcomeView(views.ApiView):
     """The owner of a new account, who has a link."""
 
     authentication_classes = ()
     permission_classes = ()
 
-    @operation(TokenDocument, takes=WelcomeBody, status=201, name="acceptWelcome")
-    def post(self, params: Params) -> dict[str, Any]:
+    @views.operation(TokenDocument, takes=WelcomeBody, status=201, name="acceptWelcome")
+    def post(self, params: views.Params) -> dict[str, Any]:
         """Exchange the link of an account for a token in its role.
 
         Anybody but an expert sets a password by it.
@@ -131,5 +129,5 @@ class WelcomeView(ApiView):
 
 def _token(user: User, name: str) -> dict[str, Any]:
     role = top_role(user) or ""
-    fresh = make_api_token(owner=user, name=name, role=role, days=DAYS)
+    fresh = access.make_api_token(owner=user, name=name, role=role, days=DAYS)
     return {"token": fresh.secret, "role": role, "expires_at": fresh.token.expires_at}

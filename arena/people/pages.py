@@ -33,23 +33,8 @@ from arena.errors import LinkOver
 from arena.models import ApiToken, Invitation, Study
 from arena.people import links, services
 from arena.people.queries import by_pseudonym, has_admin, is_forgotten
-from arena.shell.access import (
-    ADMIN,
-    BACKEND,
-    CREATED,
-    ENTRANT,
-    EXPERT,
-    FORM_METHODS,
-    GONE,
-    RESEARCHER,
-    STAFF,
-    act_for,
-    form_for,
-    get_user,
-    keep_secret,
-)
+from arena.shell import access, acts
 from arena.shell.accounts import ROLES, TOKEN_ROLES, Language, find_language, role_given, top_role
-from arena.shell.acts import refusals_in
 from arena.shell.forms import offer
 
 ROLE_NAMES = {
@@ -164,13 +149,13 @@ def link_page(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
 
     @login_not_required
     @never_cache
-    @require_http_methods(FORM_METHODS)
+    @require_http_methods(access.FORM_METHODS)
     @wraps(view)
     def answer(request: HttpRequest, **named: Any) -> HttpResponse:
         try:
-            return keep_secret(view(request, **named))
+            return access.keep_secret(view(request, **named))
         except LinkOver:
-            return keep_secret(render(request, "people/link_over.html", status=GONE))
+            return access.keep_secret(render(request, "people/link_over.html", status=access.GONE))
 
     return answer
 
@@ -182,9 +167,9 @@ def first_page(request: HttpRequest, token: str = "") -> HttpResponse:
         services.check_first_link(token)
     form = FirstForm(request.POST or None, initial={"code": token})
     if form.is_valid():
-        with refusals_in(form):
+        with acts.refusals_in(form):
             user = services.make_first_admin(**form.cleaned_data)
-            login(request, user, backend=BACKEND)
+            login(request, user, backend=access.BACKEND)
             return redirect("home")
     return render(request, "people/first.html", {"form": form, "token": token})
 
@@ -197,16 +182,16 @@ def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
     if form.is_valid():
         password = form.cleaned_data["new_password1"]
         user = services.accept_welcome(token=token, password=password)
-        login(request, user, backend=BACKEND)
+        login(request, user, backend=access.BACKEND)
         return redirect("home")
     return render(request, "people/welcome.html", {"form": form, "welcomed": user})
 
 
 @never_cache
-@require_http_methods(FORM_METHODS)
+@require_http_methods(access.FORM_METHODS)
 def password_page(request: HttpRequest) -> HttpResponse:
     """One's own password; other devices are signed out by a new one."""
-    user = get_user(request)
+    user = access.get_user(request)
     form = PasswordChangeForm(user, request.POST or None)
     if not user.has_usable_password():
         messages.info(request, _("You sign in by a link, not by a password."))
@@ -221,14 +206,14 @@ def password_page(request: HttpRequest) -> HttpResponse:
 # --- People ------------------------------------------------------------------------------------
 
 
-@form_for(ADMIN)
+@access.form_for(access.ADMIN)
 @never_cache
 def people_page(request: HttpRequest) -> HttpResponse:
     """Every account, and a form for new ones, all or none, which ends at their links."""
     form = AccountForm(request.POST or None)
     if form.is_valid():
-        role, actor = form.cleaned_data["role"], get_user(request)
-        with refusals_in(form, "username"), transaction.atomic():
+        role, actor = form.cleaned_data["role"], access.get_user(request)
+        with acts.refusals_in(form, "username"), transaction.atomic():
             users = [
                 services.create_person(
                     username=name, pseudonym=pseudonym, role=role, password=None, actor=actor
@@ -257,17 +242,17 @@ def _list_accounts() -> list[dict[str, Any]]:
     ]
 
 
-@act_for(ADMIN, back="people")
+@access.act_for(access.ADMIN, back="people")
 @never_cache
 def make_link(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """A link for who is new, has forgotten the password or can't come in any more."""
     return show_new_links(request, [find_account(code)])
 
 
-@act_for(ADMIN, back="people")
+@access.act_for(access.ADMIN, back="people")
 def change_person(request: HttpRequest, code: uuid.UUID) -> None:
     """Pause, resume, take links back, or give another role: what the pressed button says."""
-    user, actor = find_account(code), get_user(request)
+    user, actor = find_account(code), access.get_user(request)
     act = request.POST.get("act", "")
     if act in ("pause", "resume"):
         services.set_active(user=user, is_active=act == "resume", actor=actor)
@@ -290,25 +275,25 @@ def show_new_links(
     """Make a link for each of these accounts of one role, and show them this once."""
     lines = []
     for owner in owners:
-        path = links.make_link_path(owner, study=study, actor=get_user(request))
+        path = links.make_link_path(owner, study=study, actor=access.get_user(request))
         lines.append((owner, request.build_absolute_uri(path)))
-    context = {"study": study, "lines": lines, "is_expert": role_given(owners[0]) == EXPERT}
-    return render(request, "people/links.html", context, status=CREATED)
+    context = {"study": study, "lines": lines, "is_expert": role_given(owners[0]) == access.EXPERT}
+    return render(request, "people/links.html", context, status=access.CREATED)
 
 
 # --- One's own tokens --------------------------------------------------------------------------
 
 
-@form_for(ADMIN, RESEARCHER, EXPERT, ENTRANT)
+@access.form_for(access.ADMIN, access.RESEARCHER, access.EXPERT, access.ENTRANT)
 @never_cache
 def tokens_page(request: HttpRequest) -> HttpResponse:
     """One's own tokens, and a form for a new one, which is shown this once."""
-    user, now = get_user(request), timezone.now()
+    user, now = access.get_user(request), timezone.now()
     roles = TOKEN_ROLES.get(top_role(user) or "", ())
     form = TokenForm(request.POST or None, roles=roles)
     fresh = None
     if form.is_valid():
-        with refusals_in(form):
+        with acts.refusals_in(form):
             fresh = make_api_token(owner=user, **form.cleaned_data)
             form = TokenForm(roles=roles)
     context = {
@@ -319,17 +304,17 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
             for token in ApiToken.objects.filter(owner=user)
         ],
         "limits": [(ROLE_NAMES[role], REQUESTS[role]) for role in roles],
-        "is_staff": roles and roles[0] in STAFF,
-        "is_admin": ADMIN in roles,
+        "is_staff": roles and roles[0] in access.STAFF,
+        "is_admin": access.ADMIN in roles,
     }
-    status = 422 if form.errors else CREATED if fresh else 200
+    status = 422 if form.errors else access.CREATED if fresh else 200
     return render(request, "api/tokens.html", context, status=status)
 
 
-@act_for(ADMIN, RESEARCHER, EXPERT, ENTRANT, back="api-tokens")
+@access.act_for(access.ADMIN, access.RESEARCHER, access.EXPERT, access.ENTRANT, back="api-tokens")
 def revoke_token(request: HttpRequest, code: uuid.UUID) -> None:
     """Revoke one of one's own tokens."""
-    user = get_user(request)
+    user = access.get_user(request)
     token = get_object_or_404(ApiToken, owner=user, code=code)
     revoke_api_token(token=token, actor=user)
     messages.success(request, _("“%(name)s” opens nothing any more.") % {"name": token.name})

@@ -24,7 +24,7 @@ from arena.results.exports.writers import RATING_FILES, download_rating
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
-from arena.shell import sending
+from arena.shell.sending import send_charts
 from arena.studies.api import get_study
 from arena.voting.queries.blinding import must_read_results
 from augment.services import read_request
@@ -124,10 +124,10 @@ class SnapshotsView(views.ApiView):
         choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
             snapshot = rate(study=study, **choices)
-            views.keep_and_send(lambda: snapshot, sending.send_charts)
+            views.keep_and_send(lambda: snapshot, lambda row: send_charts(row.pk))
             return snapshot
         plan = partial(plan_snapshot, study=study, **choices)
-        planned, warnings = views.keep_and_send(plan, sending.send_snapshot)
+        planned, warnings = views.keep_and_send(plan)
         planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
 

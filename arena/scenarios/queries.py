@@ -4,7 +4,6 @@ import math
 import uuid
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -161,32 +160,20 @@ def list_benchmarks() -> QuerySet[Benchmark]:
     return rows.order_by("slug", "-version")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StratumCount:
-    """Number of tasks in each split, of one stratum or of all."""
-
-    label: str
-    practice: int
-    test: int
-
-
-def count_tasks(tasks: Iterable[tuple[str, str]]) -> list[StratumCount]:
-    """Return a line for each stratum, and one for all.
+def count_tasks(tasks: Iterable[tuple[str, str]]) -> dict[str, dict[str, int]]:
+    """Return how many tasks each split has, by stratum and of all.
 
     Args:
         tasks: Split and stratum of each.
     """
     counts = Counter(tasks)
-    lines = [
-        StratumCount(
-            label=stratum.value.capitalize(),
-            practice=counts[Split.PRACTICE, stratum],
-            test=counts[Split.TEST, stratum],
-        )
+    lines = {
+        stratum.value.capitalize(): {split.value: counts[split, stratum] for split in Split}
         for stratum in Stratum
-    ]
-    practice, test = (sum(getattr(line, name) for line in lines) for name in ("practice", "test"))
-    return [*lines, StratumCount(label="All", practice=practice, test=test)]
+    }
+    return lines | {
+        "All": {split.value: sum(line[split.value] for line in lines.values()) for split in Split}
+    }
 
 
 # --- Submissions -------------------------------------------------------------------------------

@@ -115,11 +115,9 @@ def _answer_once(request: HttpRequest, act: Callable[[], HttpResponseBase]) -> H
     if answer.status == CREATED:
         return HttpResponse(answer.content, status=CREATED)
     made = answer.content.decode()
-    return (
-        render(request, "sent.html", context | {"made": made})
-        if answer.is_late
-        else redirect(made)
-    )
+    if answer.is_late:
+        return render(request, "sent.html", context | {"made": made})
+    return redirect(made)
 
 
 def _pack(answer: HttpResponseBase) -> tuple[int, bytes] | None:

@@ -3,17 +3,18 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from django.contrib import messages
 from django.core.exceptions import NON_FIELD_ERRORS
-from django.db import transaction
 from django.forms import BaseForm
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.utils.text import capfirst, slugify
 
-from augment.errors import AugmentError, InvalidDocument, QueueFault
+from arena.shell.sending import Row, send_on_commit
+from augment.errors import AugmentError, InvalidDocument
 from augment.services.running import workforce
 
 SURE = "sure"
@@ -120,16 +121,11 @@ def ask(request: HttpRequest, question: Confirmation) -> HttpResponse:
     return render(request, "ask.html", context, status=422 if is_mistyped else 200)
 
 
-def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:
-    """Send a worker the key of a row on commit; a fault of the queue is only told."""
-
-    def send_now() -> None:
-        try:
-            send(pk)
-        except QueueFault as error:
-            messages.warning(request, str(error))
-
-    transaction.on_commit(send_now)
+def send_later(
+    request: HttpRequest, row: Row, send: Callable[[Row], object] | None = None
+) -> None:
+    """Send workers what a row needs on commit; a fault of the queue becomes a message."""
+    send_on_commit(row, partial(messages.warning, request), send)
 
 
 def wait_for_workers(*, waits: bool) -> dict[str, Any]:

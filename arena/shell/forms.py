@@ -1,7 +1,6 @@
 """Forms and fields that several subjects share."""
 
 import json
-import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, cast
@@ -188,11 +187,3 @@ def read_json(text: str | bytes, *, otherwise: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError):
         raise Conflict(otherwise) from None
-
-
-def read_code(text: str) -> uuid.UUID:
-    """Return the code of a row; for any other text one that no row has."""
-    try:
-        return uuid.UUID(text)
-    except ValueError:
-        return uuid.UUID(int=0)

@@ -1,30 +1,42 @@
-"""Messages to workers about arena's rows; for transaction.on_commit, as `augment.tasks.enqueue`.
+"""Messages to workers, sent on commit; `arena.tasks` says how each kind of picture is drawn."""
 
-They name the kind of a row alone: `arena.tasks`, above all subjects, says what is done with it.
-"""
-
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from typing import TypeVar
 
 from django.db import transaction
+from django.db.models import Model
 
 from augment.errors import QueueFault
-from augment.services import KINDS
-from augment.tasks import draw, enqueue, send
+from augment.tasks import draw, enqueue_row, send
 
-
-def _enqueue_row(kind: str, pk: int) -> int:
-    return enqueue(KINDS[kind], [pk])
-
-
-send_snapshot = partial(_enqueue_row, "snapshot")
-send_benchmark_file = partial(_enqueue_row, "benchmarkfile")
-send_scenario_file = partial(_enqueue_row, "scenariofile")
-send_study_file = partial(_enqueue_row, "studyfile")
 send_charts = partial(send, draw, "rating")
+
+Row = TypeVar("Row", bound=Model)
 
 _AT_ONCE = 4
 """So many workers draw the pictures of one study."""
+
+
+def send_on_commit(
+    row: Row, tell: Callable[[str], object], send: Callable[[Row], object] | None = None
+) -> None:
+    """Send workers what a row needs on commit.
+
+    Args:
+        row: Just written.
+        tell: Gets the text of a fault of the queue; the row waits then.
+        send: What is sent; by default what its kind needs.
+    """
+
+    def send_now() -> None:
+        try:
+            (send or enqueue_row)(row)
+        except QueueFault as error:
+            tell(str(error))
+
+    transaction.on_commit(send_now)
 
 
 def send_pictures(study_pk: int) -> None:

@@ -17,15 +17,7 @@ from arena.studies.services.plan import StudyPlan
 from arena.voting.services.simulation import simulate_votes
 from augment.errors import Conflict
 from augment.models import Contestant, Endpoint, GenerationJob, Scenario
-from augment.services.endpoints import (
-    REFERENCE,
-    ContestantRequest,
-    EndpointRequest,
-    add_contestant,
-    ensure_builtin,
-    ensure_endpoint,
-)
-from augment.services.running import JobRequest, resolve_contestants
+from augment.services import endpoints, running
 from augment.services.running.jobs import launch
 from augment.services.scenarios import load_catalogue, resolve_scenarios
 from augment.services.scenarios.choosing import ALL
@@ -38,7 +30,7 @@ SIMULATED = (
     ("sim-careless-fc-plus", "fc-plus", "fake-careless", "Simulated careless FC-plus"),
     ("sim-careless-tqa", "tqa", "fake-careless", "Simulated careless tQA"),
 )
-RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
+RATED = (endpoints.REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
 """Who is voted on: with more, so few votes would leave no intervals."""
 
 SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
@@ -68,21 +60,23 @@ def list_slugs(per_type: int | None, which: str = "paper") -> list[str]:
 def add_stand_in(actor: User | None = None) -> None:
     """Add the endpoint of the stand-in models, which `serve` starts."""
     if not Endpoint.objects.filter(label=STAND_IN).exists():
-        request = EndpointRequest(label=STAND_IN, base_url=free_address(), is_simulated=True)
-        ensure_endpoint(request, actor)
+        request = endpoints.EndpointRequest(
+            label=STAND_IN, base_url=free_address(), is_simulated=True
+        )
+        endpoints.ensure_endpoint(request, actor)
 
 
 def add_contestants(actor: User | None = None) -> None:
     """Add contestants that ask the stand-in models, and those that ask none."""
-    ensure_builtin()
+    endpoints.ensure_builtin()
     add_stand_in(actor)
     for slug, variant, model, name in SIMULATED:
         if Contestant.objects.filter(slug=slug).exists():  # of an earlier version, maybe
             continue
-        request = ContestantRequest(
+        request = endpoints.ContestantRequest(
             slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name
         )
-        add_contestant(request, actor)
+        endpoints.add_contestant(request, actor)
 
 
 def add_experts(actor: User | None = None) -> None:
@@ -102,8 +96,8 @@ def launch_job(
     if job := GenerationJob.objects.filter(name=JOB).first():
         return job
     chosen = scenarios or list_slugs(A_FEW) or resolve_scenarios([ALL])
-    contestants = [slug for slug in resolve_contestants([ALL]) if slug not in leave_out]
-    request = JobRequest(name=JOB, contestants=contestants, scenarios=chosen)
+    contestants = [slug for slug in running.resolve_contestants([ALL]) if slug not in leave_out]
+    request = running.JobRequest(name=JOB, contestants=contestants, scenarios=chosen)
     return launch(request, actor)
 
 

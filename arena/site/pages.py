@@ -33,7 +33,6 @@ from arena.templatetags.results import label_of
 from arena.voting.queries.blinding import ResultsAccess, results_access
 from augment.models import Benchmark, Event, GenerationJob
 from augment.services.running import count_each
-from augment.tasks import enqueue_job
 
 LATEST_JOBS = 5
 ACTS_AT_ONCE = 15
@@ -49,7 +48,9 @@ def home(request: HttpRequest) -> HttpResponse:
             return _expert(request)
         case "entrant":
             use_english(request)
-            return _entrant(request)
+            own = submissions_for(get_user(request))[:5]
+            context = {"own": own, "benchmarks": Benchmark.objects.filter(retired_at=None)}
+            return render(request, "home/entrant.html", context)
         case "researcher":
             use_english(request)
             return render(request, "home/researcher.html", _studies_by_state())
@@ -77,12 +78,6 @@ def _expert(request: HttpRequest) -> HttpResponse:
         },
     }
     return render(request, "home/expert.html", context)
-
-
-def _entrant(request: HttpRequest) -> HttpResponse:
-    own = submissions_for(get_user(request))
-    benchmarks = Benchmark.objects.filter(retired_at=None)
-    return render(request, "home/entrant.html", {"own": own[:5], "benchmarks": benchmarks})
 
 
 def _admin(request: HttpRequest) -> HttpResponse:
@@ -118,7 +113,7 @@ def use_demo(request: HttpRequest, name: str) -> HttpResponse | None:
         actor = User.objects.select_for_update().get(pk=get_user(request).pk)
         made = demo.ACTS[name](actor)
         if isinstance(made, GenerationJob):
-            send_later(request, enqueue_job, made.pk)
+            send_later(request, made)
             return redirect("job", code=made.code)
     return redirect("results", code=made.code) if made else None
 
@@ -129,19 +124,14 @@ def choose(request: HttpRequest, what: str) -> HttpResponse:
 
     The language is kept in this browser as well, for the pages before the login.
     """
-    chosen, answer = request.POST.get(what, ""), _back(request)
+    chosen, back = request.POST.get(what, ""), request.POST.get("next", "")
+    is_ours = url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure())
+    answer = redirect(back if is_ours and "/" in back else "home")  # else it names a view
     if chosen in set(Theme if what == "theme" else Language):
         keep_preference(get_user(request), **{what: chosen})
         if what == "language":
             keep_language(answer, Language(chosen))
     return answer
-
-
-def _back(request: HttpRequest) -> HttpResponse:
-    """Return to where the switch was pressed, if that is a page of ours."""
-    back = request.POST.get("next", "")
-    is_ours = url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure())
-    return redirect(back if is_ours and "/" in back else "home")  # else it names a view
 
 
 # --- The audit log -----------------------------------------------------------------------------

@@ -7,9 +7,7 @@ from django.shortcuts import get_object_or_404
 from rest_framework import serializers
 from rest_framework.response import Response
 
-from arena.api.access import ADMINS, EXPERTS, STAFF
-from arena.api.fields import Field, StrictSerializer, body_field
-from arena.api.views import ApiView, PageQuery, Params, operation, page_serializer
+from arena.api import access, fields, views
 from arena.models import Study
 from arena.shell.accounts import top_role
 from arena.shell.sending import send_pictures
@@ -18,15 +16,15 @@ from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 
 
-class StudyBody(StrictSerializer):
+class StudyBody(fields.StrictSerializer):
     """A new study; its rules are fixed from the moment it opens."""
 
-    def get_fields(self) -> dict[str, Field]:
+    def get_fields(self) -> dict[str, fields.Field]:
         """Return a field for all that a plan asks for."""
-        return {field.name: body_field(field) for field in PLAN_INPUTS}
+        return {field.name: fields.body_field(field) for field in PLAN_INPUTS}
 
 
-class StudyQuery(PageQuery):
+class StudyQuery(views.PageQuery):
     """Filter of a list of studies."""
 
     state = serializers.ChoiceField(choices=Study.State.values, required=False)
@@ -72,7 +70,7 @@ class WholeStudyDocument(StudyDocument):
     votes_per_expert = serializers.IntegerField(source="study.votes_per_expert")
     seed = serializers.IntegerField(source="study.seed")
 
-    def get_fields(self) -> dict[str, Field]:
+    def get_fields(self) -> dict[str, fields.Field]:
         """Return the fields above and the switches of the study."""
         switches = {
             name: serializers.BooleanField(source=f"study.{name}") for name in SWITCH_COLUMNS
@@ -80,18 +78,18 @@ class WholeStudyDocument(StudyDocument):
         return super().get_fields() | switches
 
 
-class StudiesView(ApiView):
+class StudiesView(views.ApiView):
     """Studies."""
 
-    readers, writers = (*STAFF, *EXPERTS), ADMINS
+    readers, writers = (*access.STAFF, *access.EXPERTS), access.ADMINS
 
-    @operation(page_serializer(StudyDocument), query=StudyQuery, name="listStudies")
-    def get(self, params: Params) -> Response:
+    @views.operation(views.page_serializer(StudyDocument), query=StudyQuery, name="listStudies")
+    def get(self, params: views.Params) -> Response:
         """Studies, the youngest first.
 
         An expert gets their own with their own progress, staff all with everybody's.
         """
-        expert = None if top_role(self.user) in STAFF else self.user
+        expert = None if top_role(self.user) in access.STAFF else self.user
         return self.answer_page(
             list_studies(expert),
             params,
@@ -99,8 +97,8 @@ class StudiesView(ApiView):
             lines=lambda page: count_progress(page, expert),
         )
 
-    @operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
-    def post(self, params: Params) -> StudyProgress:
+    @views.operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
+    def post(self, params: views.Params) -> StudyProgress:
         """Plan a study and open it.
 
         Its experts can vote as soon as workers have drawn their first pairs.
@@ -110,12 +108,12 @@ class StudiesView(ApiView):
         return _progress(study)
 
 
-class StudyView(ApiView):
+class StudyView(views.ApiView):
     """One study."""
 
-    readers = STAFF
+    readers = access.STAFF
 
-    @operation(WholeStudyDocument, name="getStudy")
+    @views.operation(WholeStudyDocument, name="getStudy")
     def get(self, code: uuid.UUID) -> StudyProgress:
         """A study.
 
@@ -124,12 +122,12 @@ class StudyView(ApiView):
         return _progress(get_study(code))
 
 
-class CloseStudyView(ApiView):
+class CloseStudyView(views.ApiView):
     """The end of a study."""
 
-    writers = ADMINS
+    writers = access.ADMINS
 
-    @operation(WholeStudyDocument, name="closeStudy")
+    @views.operation(WholeStudyDocument, name="closeStudy")
     def post(self, code: uuid.UUID) -> StudyProgress:
         """Close a study.
 

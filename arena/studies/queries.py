@@ -1,11 +1,9 @@
 """Reads of studies: which there are, how far their experts are, who takes part, drafts."""
 
 from collections.abc import Collection, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TypeVar
-from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db.models import Count, F, Model, Q, QuerySet
@@ -14,15 +12,7 @@ from django.utils import timezone
 from arena.models import Authorship, Enrolment, Invitation, Matchup, Report, Study, StudyDraft
 from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
-from arena.voting.queries.ballots import (
-    ExpertTally,
-    Voters,
-    VotingProgress,
-    count_votes,
-    list_voters,
-    tallies,
-)
-from augment import models
+from arena.voting.queries import ballots
 from augment.errors import UnknownName
 from augment.models import (
     Augmentation,
@@ -32,6 +22,7 @@ from augment.models import (
     GenerationJob,
     Scenario,
 )
+from augment.services import read_code
 from augment.services.benchmarks import Split
 
 Row = TypeVar("Row", bound=Model)
@@ -54,10 +45,7 @@ def find_named(rows: QuerySet[Row], what: str, name_or_code: str) -> Row:
     Raises:
         UnknownName: There is none.
     """
-    wanted = Q(name=name_or_code)
-    with suppress(ValueError):  # most names are not codes
-        wanted |= Q(code=UUID(name_or_code))
-    row = rows.filter(wanted).first()
+    row = rows.filter(Q(name=name_or_code) | Q(code=read_code(name_or_code))).first()
     if row is None:
         raise UnknownName(what, name_or_code, sorted(rows.values_list("name", flat=True)))
     return row
@@ -83,7 +71,7 @@ def list_studies(expert: User | None = None) -> QuerySet[Study]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StudyProgress(VotingProgress):
+class StudyProgress(ballots.VotingProgress):
     """Number of a study's matchups with a vote."""
 
     study: Study
@@ -95,7 +83,7 @@ def count_progress(studies: Iterable[Study], expert: User | None = None) -> list
     matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
     if expert is not None:
         matchups = matchups.filter(expert=expert)
-    count = count_votes(matchups, by="study")
+    count = ballots.count_votes(matchups, by="study")
     return [StudyProgress(study=one, **count(one.pk, one.questions)) for one in studies]
 
 
@@ -135,12 +123,8 @@ def list_offered() -> QuerySet[Contestant]:
 def latest_contestants(job: GenerationJob | None = None) -> list[str]:
     """Return the offered contestants with pictures of a job, by default of the latest with any."""
     made = _with_pictures().filter(contestant__in=list_offered())
-    made = (
-        made.filter(job=job)
-        if job
-        else made.filter(job=made.order_by("-job__created_at").values("job")[:1])
-    )
-    return sorted(set(made.values_list("contestant__slug", flat=True)))
+    latest = [job] if job else made.order_by("-job__created_at").values("job")[:1]
+    return sorted(set(made.filter(job__in=latest).values_list("contestant__slug", flat=True)))
 
 
 def scenario_sources(jobs: Iterable[GenerationJob]) -> dict[str, str]:
@@ -218,7 +202,7 @@ class ExpertLine:
         may_be_invited: Whether a link may be made for this account.
     """
 
-    tally: ExpertTally
+    tally: ballots.ExpertTally
     invitation: Invitation | None
     link: Invitation.State | None
     has_live_link: bool
@@ -237,7 +221,7 @@ def expert_lines(study: Study) -> list[ExpertLine]:
     newest = {row.expert_id: row for row in invitations.prefetch_related("expert__groups")}
     is_cancelled = study.state == Study.State.CANCELLED
     lines = []
-    for tally in tallies(study):
+    for tally in ballots.tallies(study):
         invitation = newest.get(tally.expert.pk)
         lines.append(
             ExpertLine(
@@ -254,12 +238,12 @@ def expert_lines(study: Study) -> list[ExpertLine]:
 # --- Enrolments --------------------------------------------------------------------------------
 
 
-def find_unfinished(study: Study) -> Voters:
+def find_unfinished(study: Study) -> ballots.Voters:
     """Return who has a place and pairs without an answer."""
-    return list_voters(study).filter(dropped_at=None, answered__lt=F("planned"))
+    return ballots.list_voters(study).filter(dropped_at=None, answered__lt=F("planned"))
 
 
-def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
+def find_silent(enrolment: Enrolment, *, now: datetime) -> ballots.Voters:
     """Return who is not done and was not heard for as long as the enrolment allows."""
     unfinished = find_unfinished(enrolment.study)
     if enrolment.drop_out_after_h is None:
@@ -272,7 +256,7 @@ def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
 def state_of(enrolment: Enrolment) -> dict[str, int]:
     """Count places, and what became of them."""
     is_in = Q(dropped_at=None)
-    state: dict[str, int] = list_voters(enrolment.study).aggregate(
+    state: dict[str, int] = ballots.list_voters(enrolment.study).aggregate(
         taken=Count("pk", filter=is_in),
         done=Count("pk", filter=Q(is_done=True)),
         dropped=Count("pk", filter=~is_in),
@@ -285,7 +269,5 @@ CHECK_PERCENT = 2
 
 def usual_checks() -> int:
     """Return the usual share of attention checks in percent: none before any are drawn."""
-    is_drawn = models.Augmentation.objects.filter(
-        contestant__kind=models.Contestant.Kind.CHECK
-    ).exists()
+    is_drawn = Augmentation.objects.filter(contestant__kind=Contestant.Kind.CHECK).exists()
     return CHECK_PERCENT if is_drawn else 0

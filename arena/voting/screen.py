@@ -12,11 +12,11 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Question, Report, Study, Vote
-from arena.shell.forms import read_code
 from arena.voting.queries.ballots import list_voters, own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import as_shown, note_objects
 from arena.voting.services.reports import SIDES
+from augment.services import read_code
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""

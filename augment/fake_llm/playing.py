@@ -106,8 +106,8 @@ class Character:
         except CannotPlace as refused:
             if self.in_prose:
                 rng = careless.dice(task.prompt)
-                return rng.choice(REFUSALS).format(refused.reason), ()
-            return _write_answer(Modification(), f"I can't do it: {refused.reason}"), ()
+                return rng.choice(REFUSALS).format(refused), ()
+            return _write_answer(Modification(), f"I can't do it: {refused}"), ()
         placed = self.bend(task, right, heard)
         if placed is None:
             return "I know where it belongs, but not how to write it down.", ()

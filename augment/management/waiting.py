@@ -1,16 +1,20 @@
-"""Waiting for a job on the command line: what commands offer, show and end with."""
+"""Jobs on the command line: launched and waited for."""
 
 import time
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
 
 from django.core.management.base import CommandError
+from django.db import transaction
+from django.db.models import Model
 
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.budget import describe_caps
-from augment.services.running.progress import count_rows, failure_groups
-from augment.services.running.workers import workforce
+from augment.services.running import budget, progress, workers
 from augment.services.terminal import TerminalCommand
+from augment.tasks import check_broker, enqueue_row
+
+Row = TypeVar("Row", bound=Model)
 
 POLL_S = 0.5
 STOPPED = 3
@@ -21,6 +25,19 @@ WAITING: Mapping[str, Mapping[str, Any]] = {
     "--timeout": {"type": float, "default": 3600.0, "help": "seconds to wait at most"},
 }
 """The options of a command that may wait."""
+
+
+def keep_and_enqueue(keep: Callable[[], Row]) -> Row:
+    """Write a row whose work begins as soon as it is committed.
+
+    Raises:
+        QueueFault: No broker, or it refuses; nothing is written.
+    """
+    check_broker()
+    with transaction.atomic():
+        row = keep()
+        transaction.on_commit(partial(enqueue_row, row))
+    return row
 
 
 def wait_if_asked(
@@ -42,12 +59,12 @@ def wait(command: TerminalCommand, job: GenerationJob, timeout_s: float) -> None
     Raises:
         CommandError: The time is up, or the job was paused or stopped at its cap.
     """
-    if not workforce().works:
+    if not workers.workforce().works:
         command.stderr.write("No worker is at work; `manage.py serve` starts some.")
     ends_at, shown = time.monotonic() + timeout_s, ""
     while True:
         job.refresh_from_db(fields=["state"])
-        counts = count_rows(job)
+        counts = progress.count_rows(job)
         text = f"{counts.settled} of {counts.total}, {counts.running} running"
         if text != shown:
             command.stdout.write(text)
@@ -60,7 +77,7 @@ def wait(command: TerminalCommand, job: GenerationJob, timeout_s: float) -> None
     if counts.under_way:
         raise CommandError(
             f"{job.get_state_display()} with {counts.queued} left, its cap is "
-            f"{describe_caps(job)}; `manage.py resume_job {job.code}` goes on.",
+            f"{budget.describe_caps(job)}; `manage.py resume_job {job.code}` goes on.",
             returncode=STOPPED,
         )
     command.stdout.write("Over.")
@@ -68,10 +85,10 @@ def wait(command: TerminalCommand, job: GenerationJob, timeout_s: float) -> None
 
 def report(command: TerminalCommand, job: GenerationJob) -> None:
     """Print the outcomes and the causes of failure; exit code 1 if any failed."""
-    counts = count_rows(job).by_state
+    counts = progress.count_rows(job).by_state
     states = (*Augmentation.SHOWABLE, Augmentation.State.FAILED)
     command.stdout.write(", ".join(f"{counts[state]} {state}" for state in states))
-    groups = failure_groups(job)
+    groups = progress.failure_groups(job)
     failed = [group for group in groups if group.state == Augmentation.State.FAILED]
     for group in failed:
         command.stdout.write(f"failed x {group.number}: {group.reason}")

@@ -31,6 +31,7 @@ from augment.models.sweeps import Sweep, SweepValue
 from augment.models.work import (
     FAILED,
     AppendOnly,
+    CodedModel,
     Event,
     SentFile,
     Work,
@@ -38,4 +39,5 @@ from augment.models.work import (
     account_column,
     after_migrations,
     before_migrations,
+    user_column,
 )

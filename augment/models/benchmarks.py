@@ -1,18 +1,15 @@
 """Benchmark sets: scenarios that are handed out as a folder, version by version."""
 
-import uuid
-
 from django.db import models
 from django.db.models import Q
 
 from augment.models.scenes import RETIRED_HELP, SLUG_HELP, Scenario
-from augment.models.work import account_column
+from augment.models.work import CodedModel, account_column
 
 
-class Benchmark(models.Model):
+class Benchmark(CodedModel):
     """One version of a benchmark set; its name and version together never change."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, help_text=SLUG_HELP)
     title = models.CharField(max_length=120)
     version = models.PositiveIntegerField(help_text="from 1")

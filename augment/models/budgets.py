@@ -1,14 +1,14 @@
 """Caps of all rows that ask language models."""
 
-import uuid
 from decimal import Decimal
 
 from django.db import models
 
 from augment.llm.costs import to_usd
+from augment.models.work import CodedModel
 
 
-class CappedWork(models.Model):
+class CappedWork(CodedModel):
     """Work at language models, within caps on what it may use.
 
     Money is counted in whole nano-dollars, so that sums are exact on every database. Each call
@@ -16,7 +16,6 @@ class CappedWork(models.Model):
     afterwards; a cap is compared with the sum of both. Null is no cap.
     """
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
     cap_calls = models.PositiveIntegerField(null=True, blank=True)
     cap_tokens = models.PositiveBigIntegerField(null=True, blank=True)

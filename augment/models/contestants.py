@@ -8,14 +8,13 @@ from django.db import models
 from django.db.models import Q
 
 from augment.models.scenes import SLUG_HELP
-from augment.models.work import Work, account_column
+from augment.models.work import CodedModel, DoneState, Work, account_column
 from augment.variants.recipes import spell_variant
 
 
-class Endpoint(models.Model):
+class Endpoint(CodedModel):
     """An OpenAI-compatible address. The key itself is never stored, only where to find it."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     label = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     base_url = models.CharField(max_length=200, help_text="for example https://api.openai.com/v1")
     key_variable = models.CharField(
@@ -64,7 +63,7 @@ class KeyBinding(models.Model):
         return f"{self.variable}={self.server}"
 
 
-class EndpointModel(models.Model):
+class EndpointModel(CodedModel):
     """Facts about one model at one endpoint. Unknown is null, never guessed, never zero."""
 
     class ModelClass(models.TextChoices):
@@ -72,7 +71,6 @@ class EndpointModel(models.Model):
         UTILITY = "utility", "Utility"
         OPEN_WEIGHT = "open_weight", "Open weight"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     endpoint = models.ForeignKey(Endpoint, on_delete=models.CASCADE, related_name="models")
     model = models.CharField(max_length=120, help_text="the model id on the endpoint")
     model_class = models.CharField(max_length=20, choices=ModelClass.choices, blank=True)
@@ -166,7 +164,7 @@ class CallLease(models.Model):
         )
 
 
-class Contestant(models.Model):
+class Contestant(CodedModel):
     """Contestants and the endpoints of their models."""
 
     class Kind(models.TextChoices):
@@ -179,7 +177,6 @@ class Contestant(models.Model):
         SUBMISSION = "submission", "Submission"
         CHECK = "check", "Attention check"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     name = models.CharField(max_length=120)
     kind = models.CharField(max_length=20, choices=Kind.choices)
@@ -282,11 +279,7 @@ class Contestant(models.Model):
 class Probe(Work):
     """One round of questions to a model; its last report is also kept with the model."""
 
-    class State(models.TextChoices):
-        QUEUED = "queued", "Waiting"
-        RUNNING = "running", "Running"
-        DONE = "done", "Done"
-        FAILED = "failed", "Failed"
+    State = DoneState
 
     model = models.ForeignKey(EndpointModel, on_delete=models.CASCADE, related_name="probes")
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)

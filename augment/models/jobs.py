@@ -1,6 +1,5 @@
 """Jobs, their rows, and the tries at each row."""
 
-import uuid
 from decimal import Decimal
 
 from django.db import models
@@ -11,7 +10,7 @@ from augment.models.budgets import CappedWork
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.scenes import Scenario
 from augment.models.sweeps import SweepValue
-from augment.models.work import Work, account_column
+from augment.models.work import CodedModel, DoneState, Work, account_column
 
 
 class GenerationJob(CappedWork):
@@ -70,6 +69,8 @@ class Augmentation(Work):
 
     SHOWABLE = (State.DONE, State.UNREADABLE, State.REFUSED)
     """States with a picture that an expert can judge."""
+    MISSES = (State.UNREADABLE, State.REFUSED)
+    """States of an answer without a change; they count as a miss."""
 
     job = models.ForeignKey(GenerationJob, on_delete=models.CASCADE, related_name="augmentations")
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="augmentations")
@@ -211,7 +212,7 @@ class IntentReading(Work):
         )
 
 
-class ModelCall(models.Model):
+class ModelCall(CodedModel):
     """One request to a language model and its raw answer, stored before anybody reads it.
 
     Unknown is null, never zero. A call with `served_from` was answered from the store: it costs
@@ -219,7 +220,6 @@ class ModelCall(models.Model):
     is part of its job's. Before `sent_at` nothing of it has left this computer.
     """
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     attempt = models.ForeignKey(
         Attempt, null=True, blank=True, on_delete=models.CASCADE, related_name="calls"
     )
@@ -346,11 +346,7 @@ class Simulation(Work):
         AUGMENTATION = "augmentation", "Augmentation"
         SWEPT = "swept", "Value of a sweep"
 
-    class State(models.TextChoices):
-        QUEUED = "queued", "Waiting"
-        RUNNING = "running", "Running"
-        DONE = "done", "Done"
-        FAILED = "failed", "Failed"
+    State = DoneState
 
     OF_SCENES = Q(augmentation=None, swept=None)
     """Drives of scenes as they were and with their references."""

@@ -1,12 +1,11 @@
 """Scenes and scenarios: what contestants are asked to change."""
 
-import uuid
 from typing import Any
 
 from django.db import models
 from django.db.models import Q
 
-from augment.models.work import SentFile, Work, account_column
+from augment.models.work import CodedModel, SentFile, Work, account_column
 from augment.scene.entities import CatalogueSet, ScenarioType, TrafficDensity, TurnType
 from augment.scene.intent import IntentOrigin
 
@@ -16,10 +15,9 @@ RETIRED_HELP = "since when forms offer it no more"
 SLUG_HELP = "lower-case letters, digits and hyphens"
 
 
-class BaseScene(models.Model):
+class BaseScene(CodedModel):
     """A recorded or authored scene at t0, before anybody changed it."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     document = models.JSONField(help_text="the scene in augment.scene.codec's format")
     recording = models.JSONField(null=True, blank=True, help_text="tracks and ego motion after t0")
@@ -49,13 +47,12 @@ class BaseScene(models.Model):
         return self.slug
 
 
-class Scenario(models.Model):
+class Scenario(CodedModel):
     """A scene, its type, the user's instruction; its intent and reference if there are any."""
 
     SETS = tuple(entry.value for entry in CatalogueSet)
     """The parts of the authored catalogue, by name."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     slug = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
     base_scene = models.ForeignKey(BaseScene, on_delete=models.PROTECT, related_name="scenarios")
     type = models.CharField(

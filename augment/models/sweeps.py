@@ -1,18 +1,15 @@
 """Sweeps: one number of a scenario over several values, each driven."""
 
-import uuid
-
 from django.db import models
 from django.db.models import Q
 
 from augment.models.scenes import Scenario
-from augment.models.work import account_column
+from augment.models.work import CodedModel, account_column
 
 
-class Sweep(models.Model):
+class Sweep(CodedModel):
     """A number of a scenario's intent or reference, and the planner that is under test."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="sweeps")
     number = models.CharField(max_length=200, help_text="its path in the intent or reference")
     planner = models.CharField(max_length=120, help_text="under test: pdm-closed, idm, a path")

@@ -33,6 +33,36 @@ def account_column(
     )
 
 
+def user_column(
+    related_name: str, *, on_delete: Any = models.PROTECT
+) -> "models.ForeignKey[User, User]":
+    """Return a column for the account that a row belongs to."""
+    return models.ForeignKey(
+        settings.AUTH_USER_MODEL, on_delete=on_delete, related_name=related_name
+    )
+
+
+class CodedModel(models.Model):
+    """A row that addresses name by a random code."""
+
+    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+
+    class Meta:
+        abstract = True
+
+    def __str__(self) -> str:
+        return str(self.code)
+
+
+class DoneState(models.TextChoices):
+    """State of work that is done or has failed at its end."""
+
+    QUEUED = "queued", "Waiting"
+    RUNNING = "running", "Running"
+    DONE = "done", "Done"
+    FAILED = "failed", "Failed"
+
+
 class Work(models.Model):
     """A row that a worker takes, works on and settles; `augment.services.work` says how.
 

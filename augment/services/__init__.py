@@ -23,5 +23,6 @@ from augment.services.texts import (
     make_storable,
     motion_in_words,
     one_line,
+    read_code,
 )
 from augment.services.work import KINDS, Lease, Settlement, WorkKind, is_passing, register

@@ -13,23 +13,10 @@ from django.db.models import Model
 from augment import models
 from augment.benchmark.report import CARD, report_from_document
 from augment.errors import InvalidDocument
-from augment.scene.codec import (
-    intent_from_document,
-    modification_from_document,
-    recording_from_document,
-    scene_from_document,
-)
+from augment.scene import codec
+from augment.services import texts
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
-from augment.services.scenarios import scenes
-from augment.services.scenarios.choosing import label_for
-from augment.services.scenarios.scene_imports import note_sentences
-from augment.services.texts import (
-    check_picture_name,
-    check_prose,
-    check_slug,
-    check_stored_name,
-    one_line,
-)
+from augment.services.scenarios import choosing, scene_imports, scenes
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import MOST_SAMPLES, options_from_document
 from augment.variants.respondents import ModelRole
@@ -44,58 +31,60 @@ def _check_document(read: Callable[[Any], object], document: Any) -> None:
 
 
 def _check_scene(row: models.BaseScene) -> None:
-    check_slug(row.slug, what="scene")
-    scene_from_document(row.document)
-    note_sentences(row.notes)
-    _check_document(recording_from_document, row.recording)
+    texts.check_slug(row.slug, what="scene")
+    codec.scene_from_document(row.document)
+    scene_imports.note_sentences(row.notes)
+    _check_document(codec.recording_from_document, row.recording)
 
 
 def _check_scenario(row: models.Scenario) -> None:
-    check_slug(row.slug, what="scenario")
-    label_for(row.type)
-    check_prose("instruction", row.instruction, what="scenario", longest=scenes.INSTRUCTION_LENGTH)
-    check_picture_name("original_image", row.original_image)
-    _check_document(intent_from_document, row.intent)
+    texts.check_slug(row.slug, what="scenario")
+    choosing.label_for(row.type)
+    texts.check_prose(
+        "instruction", row.instruction, what="scenario", longest=scenes.INSTRUCTION_LENGTH
+    )
+    texts.check_picture_name("original_image", row.original_image)
+    _check_document(codec.intent_from_document, row.intent)
     if row.reference is not None:
         scene = scenes.LoadedScenario(row).scene
-        scenes.check_reference(scene, modification_from_document(row.reference))
+        scenes.check_reference(scene, codec.modification_from_document(row.reference))
 
 
 def _check_benchmark(row: models.Benchmark) -> None:
-    check_slug(row.slug, what="benchmark")
-    one_line("title", row.title, what="benchmark")
+    texts.check_slug(row.slug, what="benchmark")
+    texts.one_line("title", row.title, what="benchmark")
 
 
 def _check_endpoint(row: models.Endpoint) -> None:
-    check_slug(row.label, what="endpoint")
+    texts.check_slug(row.label, what="endpoint")
     names = [field.name for field in fields(EndpointFacts)]
     facts = EndpointFacts(**{name: getattr(row, name) for name in names})
     check_facts(facts, is_stored=True)  # a call asks what its key is bound to
 
 
 def _check_contestant(row: models.Contestant) -> None:
-    check_slug(row.slug, what="contestant")
-    one_line("name", row.name, what="contestant")
+    texts.check_slug(row.slug, what="contestant")
+    texts.one_line("name", row.name, what="contestant")
     _check_document(CARD.from_parts, row.card)
     options_from_document(row.options)
     for role, chosen in row.roles.items():
         ModelRole(role)
-        one_line(f"roles.{role}", chosen["model"], what="contestant")
+        texts.one_line(f"roles.{role}", chosen["model"], what="contestant")
 
 
 def _check_job(row: models.GenerationJob) -> None:
-    one_line("name", row.name, what="job")
+    texts.one_line("name", row.name, what="job")
     if not 1 <= row.samples <= MOST_SAMPLES:
         raise InvalidDocument("job", [("samples", f"goes from 1 to {MOST_SAMPLES}")])
 
 
 def _check_augmentation(row: models.Augmentation) -> None:
-    check_picture_name("image", row.image)
-    _check_document(modification_from_document, row.modification)
+    texts.check_picture_name("image", row.image)
+    _check_document(codec.modification_from_document, row.modification)
 
 
 def _check_submission(row: models.Submission) -> None:
-    check_stored_name("stored", row.stored)
+    texts.check_stored_name("stored", row.stored)
     _check_document(report_from_document, row.report)
 
 
@@ -120,12 +109,14 @@ RULES: Mapping[type[Model], Callable[[Any], None]] = {
     models.Endpoint: _check_endpoint,
     models.EndpointModel: models.EndpointModel.clean,
     models.GenerationJob: _check_job,
-    models.IntentReading: lambda row: _check_document(intent_from_document, row.document),
+    models.IntentReading: lambda row: _check_document(codec.intent_from_document, row.document),
     models.Scenario: _check_scenario,
-    models.SceneUpload: lambda row: check_stored_name("stored", row.stored),
+    models.SceneUpload: lambda row: texts.check_stored_name("stored", row.stored),
     models.Simulation: _check_drive,
     models.Submission: _check_submission,
-    models.SweepValue: lambda row: _check_document(modification_from_document, row.modification),
-    models.UploadMoment: lambda row: check_stored_name("picture", row.picture),
+    models.SweepValue: lambda row: _check_document(
+        codec.modification_from_document, row.modification
+    ),
+    models.UploadMoment: lambda row: texts.check_stored_name("picture", row.picture),
 }
 """What is raised is an AugmentError, or a ValueError, KeyError or TypeError of a document."""

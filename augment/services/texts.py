@@ -3,6 +3,7 @@
 import re
 from itertools import chain, count
 from typing import Any
+from uuid import UUID
 
 from django.db.models import Manager
 from django.utils.text import slugify
@@ -128,6 +129,14 @@ def free_slug(
     taken = set(rows.filter(**{f"{column}__startswith": stem}).values_list(column, flat=True))
     numbered = (f"{stem}-{number}" for number in count(starts_at or 2))
     return next(slug for slug in chain([] if starts_at else [stem], numbered) if slug not in taken)
+
+
+def read_code(text: str) -> UUID:
+    """Return the code of a row; for any other text one that no row has."""
+    try:
+        return UUID(text)
+    except ValueError:
+        return UUID(int=0)
 
 
 # --- Names of stored files -----------------------------------------------------------------------

@@ -13,8 +13,8 @@ import sqlite3
 import time
 import uuid
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from enum import StrEnum
@@ -26,14 +26,7 @@ from django.conf import settings
 from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q, QuerySet
 
-from augment.errors import (
-    AugmentError,
-    BudgetSpent,
-    DatabaseLocked,
-    JobCancelled,
-    LeaseLost,
-    WorkerStopping,
-)
+from augment import errors
 from augment.llm.messages import shorten
 from augment.models import FAILED, Work
 from augment.services.clock import DATABASE_TIME, Moment, repeating
@@ -111,7 +104,7 @@ class Lease(Generic[Row]):
     def insist(self) -> None:
         """Raise LeaseLost if a heartbeat has found the lease taken back; asks no database."""
         if self._is_lost.is_set():
-            raise LeaseLost
+            raise errors.LeaseLost
 
     def note(self, **columns: Any) -> None:
         """Write what is known before the outcome.
@@ -120,7 +113,7 @@ class Lease(Generic[Row]):
             LeaseLost: Another worker has the row now.
         """
         if not self.row.update(**columns):
-            raise LeaseLost
+            raise errors.LeaseLost
 
     @transaction.atomic
     def settle(self, outcome: Settlement, *, now: Moment = DATABASE_TIME) -> bool:
@@ -144,11 +137,9 @@ class Lease(Generic[Row]):
         self.kind.on_finish(self.pk, end, shorten(make_storable(reason), LONGEST_REASON), now)
         return True
 
-    @contextmanager
-    def keep_alive(self) -> Iterator[None]:
+    def keep_alive(self) -> AbstractContextManager[None]:
         """Send heartbeats until the block is left, or until the lease is lost."""
-        with repeating(self._beat, every_s=settings.HEARTBEAT_S, name="heartbeat"):
-            yield
+        return repeating(self._beat, every_s=settings.HEARTBEAT_S, name="heartbeat")
 
     def _beat(self) -> bool:
         """Renew once; a database that can't take it now gets the next heartbeat."""
@@ -294,15 +285,15 @@ class WorkKind(ABC, Generic[Row]):
                 outcome = self._try(row, held)
                 if outcome is not None and wait_out(partial(held.settle, outcome)):
                     settled = outcome
-        except LeaseLost as error:
+        except errors.LeaseLost as error:
             logger.warning("Stopped work on %s: %s", held, error)
-        except WorkerStopping as error:
+        except errors.WorkerStopping as error:
             logger.info("Gave %s back: %s.", held, error)
             held.release(reason=str(error))
-        except BudgetSpent as error:
+        except errors.BudgetSpent as error:
             held.release(end=TryEnd.STOPPED, reason=str(error))
         except Exception as error:
-            if isinstance(error, DatabaseLocked) or is_passing(error):
+            if isinstance(error, errors.DatabaseLocked) or is_passing(error):
                 logger.warning("Gave %s back: %s", held, error)
                 wait_out(partial(held.release, reason=f"The database was locked: {error}"))
                 return False
@@ -320,10 +311,10 @@ class WorkKind(ABC, Generic[Row]):
         """Run; what went wrong with a sentence is an outcome as well."""
         try:
             outcome = self.run(row, held)
-        except (LeaseLost, WorkerStopping, BudgetSpent):
+        except (errors.LeaseLost, errors.WorkerStopping, errors.BudgetSpent):
             raise
-        except AugmentError as error:
-            state = CANCELLED if isinstance(error, JobCancelled) else FAILED
+        except errors.AugmentError as error:
+            state = CANCELLED if isinstance(error, errors.JobCancelled) else FAILED
             outcome = Settlement(state=state, reason=reason_sentence(error))
         return outcome and replace(outcome, columns={**self.columns(row), **outcome.columns})
 
@@ -373,7 +364,7 @@ def register(*kinds: WorkKind[Any]) -> None:
     KINDS.update({kind.name: kind for kind in kinds})
 
 
-def reason_sentence(error: AugmentError) -> str:
+def reason_sentence(error: errors.AugmentError) -> str:
     """Return the reason of a failure, with the HTTP status if there was one."""
     text, status = str(error), getattr(error, "status", None)
     return text if status is None or str(status) in text else f"HTTP {status}: {text}"
@@ -402,7 +393,9 @@ def wait_out(act: Callable[[], Result], *, sleep: Callable[[float], None] = time
             if not is_passing(error):
                 raise
             if waited_s >= PATIENCE_S:
-                raise DatabaseLocked(str(error)) from error
+                raise errors.DatabaseLocked(
+                    f"The database was locked for too long: {error}."
+                ) from error
             logger.warning("The database takes nothing yet, trying again: %s", error)
             if not connection.in_atomic_block:
                 connection.close_if_unusable_or_obsolete()

@@ -1,7 +1,6 @@
 """Resources of the wire: the services, roles and bytes of pages; studies; lists with ETags."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -71,21 +70,13 @@ CAR = modification_to_document(Modification(added=(vehicle("Added1", 20.0, 0.4),
 
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
-    """Messages to the workers, as task and key; nobody takes them but the test."""
+    """Messages to the workers, as kind and key; nobody takes them but the test."""
     found: list[tuple[str, int]] = []
-    for place, name in (
-        ("scenarios", "enqueue_upload"),
-        ("scenarios", "enqueue_moment"),
-        ("scenarios", "enqueue_scenario"),
-        ("contestants", "enqueue_probe"),
-    ):
-        monkeypatch.setattr(f"arena.{place}.api.{name}", _noting(found, name))
+    monkeypatch.setattr(
+        "arena.shell.sending.enqueue_row", lambda row: found.append((row._meta.model_name, row.pk))
+    )
     monkeypatch.setattr("arena.api.views.transaction.on_commit", lambda done: done())
     return found
-
-
-def _noting(found: list[tuple[str, int]], name: str) -> Callable[[int], None]:
-    return lambda pk: found.append((name, pk))
 
 
 @pytest.fixture
@@ -115,7 +106,7 @@ def test_a_recording_becomes_a_scene(reader: Client, sent: list[tuple[str, int]]
     assert answer.status_code == 202, answer.content
     made = answer.json()
     assert (made["state"], made["tracks"], made["warnings"]) == ("queued", [], [])
-    assert sent == [("enqueue_upload", SceneUpload.objects.get().pk)]
+    assert sent == [("sceneupload", SceneUpload.objects.get().pk)]
     uploads.UPLOADS.perform(sent.pop()[1])
     path = f"uploads/{made['code']}"
     found = reader.get(API + path).json()
@@ -165,7 +156,7 @@ def test_a_scenario_is_added_with_a_reference_that_fits(
     row = Scenario.objects.get(slug="mine")
     assert (row.keep_traffic, row.traffic_density, row.goal) == (False, "low", "left")
     assert row.reference is not None
-    assert sent == [("enqueue_scenario", row.pk)]
+    assert sent == [("scenario", row.pk)]
 
 
 # --- Endpoints and models ----------------------------------------------------------------------
@@ -179,7 +170,7 @@ def test_a_model_of_a_new_endpoint_is_probed(admin: Client, sent: list[tuple[str
     model = send(admin, f"endpoints/{made['code']}/models", model="m").json()
     assert (model["endpoint"], model["price_in_usd"]) == ("here", None)
     there = f"models/{model['code']}/probe"
-    assert sent == [("enqueue_probe", Probe.objects.get().pk)]
+    assert sent == [("probe", Probe.objects.get().pk)]
     error_of(send(admin, there), 409, "conflict")
     Probe.objects.update(state=Probe.State.DONE)
     answer = send(admin, there)

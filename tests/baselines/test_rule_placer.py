@@ -73,7 +73,7 @@ def added(shown: Scene, intent: Intent, *, seed: int = 0) -> tuple[TrafficAgent,
 def refusal(shown: Scene, intent: Intent) -> str:
     with pytest.raises(CannotPlace) as refused:
         place(shown, intent)
-    return refused.value.reason
+    return str(refused.value)
 
 
 def three_lanes(side: TrafficSide = TrafficSide.LEFT) -> Scene:

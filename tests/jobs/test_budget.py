@@ -79,7 +79,7 @@ def test_a_fault_counts_where_it_may_be_billed(fault: ModelFault, is_billed: boo
 
 def test_a_call_that_found_no_place_counts_nothing() -> None:
     job = llama_job(price="1", caps=Caps(cap_usd=Decimal(1)))
-    row = ran(job, Model(EndpointBusy("local", 1800.0)))
+    row = ran(job, Model(EndpointBusy("no place was free")))
     assert row.state == ROW.FAILED
     assert_nothing_is_counted(job)
 

@@ -58,7 +58,7 @@ def test_a_worker_silent_too_long_is_dead_since_its_last_word(silent_s: float, c
 @pytest.mark.parametrize(
     "fault",
     [
-        QueueRefused("redis://here/0", "OOM command not allowed"),
+        QueueRefused("Redis at redis://here/0 takes no messages: OOM."),
         OperationalError("database is locked"),
         KeyError("nobody foresaw this"),
         MemoryError(),

@@ -34,10 +34,10 @@ from pathlib import Path
 from django.core.files.base import ContentFile
 from django.core.management import call_command
 from augment.models import SceneUpload
-from augment.tasks import enqueue_upload
+from augment.tasks import enqueue_row
 from augment.services.scenarios.uploads import keep_upload
 content = ContentFile(Path("{path}").read_bytes())
-enqueue_upload(keep_upload(name="made.pkl", content=content, source="scenarionet").pk)
+enqueue_row(keep_upload(name="made.pkl", content=content, source="scenarionet"))
 while SceneUpload.objects.get().state != "running":
     time.sleep(0.05)
 call_command("generate", *{chosen})

@@ -9,6 +9,7 @@ from tempfile import gettempdir
 import pytest
 from django.conf import LazySettings
 from django.core.files.uploadedfile import SimpleUploadedFile
+from django.db.models import Model
 from django.test import Client
 from django.urls import reverse
 
@@ -50,20 +51,15 @@ STREET = json.dumps(
 @pytest.fixture(autouse=True)
 def working(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is sent to a worker is done at once."""
-    for page, name, work in (
-        ("uploads", "upload", uploads.UPLOADS.perform),
-        ("uploads", "moment", uploads.MOMENTS.perform),
-        *((page, "scene", draw_scene) for page in ("uploads", "editor")),
-        *((page, "scenario", draw_scenario) for page in ("scenarios", "editor")),
-        ("editor", "job", run_job),
-    ):
-        monkeypatch.setattr(f"arena.scenarios.pages.{page}.enqueue_{name}", work)
-    monkeypatch.setattr("arena.shell.acts.transaction.on_commit", lambda done: done())
-
-
-def run_job(job_pk: int) -> None:
-    for row in Augmentation.objects.filter(job=job_pk):
-        runner.AUGMENTATIONS.perform(row.pk)
+    work: dict[type[Model], Callable[[int], object]] = {
+        SceneUpload: uploads.UPLOADS.perform,
+        UploadMoment: uploads.MOMENTS.perform,
+        BaseScene: draw_scene,
+        Scenario: draw_scenario,
+        Augmentation: runner.AUGMENTATIONS.perform,
+    }
+    monkeypatch.setattr("arena.shell.sending.enqueue_row", lambda row: work[type(row)](row.pk))
+    monkeypatch.setattr("arena.shell.sending.transaction.on_commit", lambda done: done())
 
 
 def send_file(client: Client, content: bytes = STREET, name: str = "street.json") -> str:
@@ -161,13 +157,13 @@ def test_a_file_that_is_too_large_is_not_kept(researcher: Client, settings: Lazy
 def test_a_page_that_looks_again_asks_for_no_picture_anew(
     researcher: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    row, asked = add_scenario("street", scene=scenes.scene()).base_scene, list[int]()
-    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", asked.append)
+    row, asked = add_scenario("street", scene=scenes.scene()).base_scene, list[BaseScene]()
+    monkeypatch.setattr("arena.shell.sending.enqueue_row", asked.append)
     page = reverse("scenes")
     researcher.get(page, headers={"X-Looks-Again": "1"})
     assert asked == []
     researcher.get(page)
-    assert asked == [row.pk]
+    assert asked == [row]
 
 
 CHANGE = json.dumps(modification_to_document(Modification(added=(cone("Added1", 9.0, 0.0),))))
@@ -403,13 +399,13 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     scenario = add_scenario("street", intent=None, intent_origin="")
     endpoint = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     reader = EndpointModel.objects.create(endpoint=endpoint, model="m")
-    sent: list[int] = []
-    monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_reading", sent.append)
+    sent: list[IntentReading] = []
     assert "m at here" in page_of(admin, scenario)
+    monkeypatch.setattr("arena.shell.sending.enqueue_row", sent.append)
     with django_capture_on_commit_callbacks(execute=True):
         admin.post(f"/scenarios/{scenario.code}/read/", {"reader": str(reader.code)})
     row = IntentReading.objects.get()
-    assert (sent, row.state, row.model) == ([row.pk], "running", "m")
+    assert (sent, row.state, row.model) == ([row], "running", "m")
     Scenario.objects.update(original_image="drawn.png", reference=None)
     shown = page_of(admin, scenario)
     assert all(word in shown for word in ("m at here reads it now", "data-live"))

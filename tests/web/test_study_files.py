@@ -148,7 +148,10 @@ def test_it_is_counted_made_written_and_got(settings: Settings, tmp_path: Path) 
     cast = people()
     admin, researcher = signed_in(cast["admin"]), signed_in(cast["researcher"])
     counted = admin.post(reverse("benchmark-new"), FORM | {"title": "", "estimate": "1"})
-    counts = {line.label: (line.practice, line.test) for line in counted.context["counts"]}
+    counts = {
+        label: (line["practice"], line["test"])
+        for label, line in counted.context["counts"].items()
+    }
     assert counts == {"Easy": (2, 3), "Medium": (0, 0), "Hard": (0, 0), "All": (2, 3)}
     assert not Benchmark.objects.exists()
     made = admin.post(reverse("benchmark-new"), FORM)

@@ -18,7 +18,6 @@ from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorf
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging import FaultClass
 
-_MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 MARKED = "Marked on ballots, where nobody has to mark: lower bounds; n is what was judged."
 _LABEL = (
     *("augmentation", "position", "heading", "logic", "augmentation__contestant"),
@@ -118,7 +117,7 @@ def _tabulate(
     for own in by_augmentation.values():
         by_contestant[own[0].augmentation.contestant_id].append(own)
     mine = Q(augmentations__job=job)
-    missed = Count("augmentations", filter=mine & Q(augmentations__state__in=_MISSES))
+    missed = Count("augmentations", filter=mine & Q(augmentations__state__in=Augmentation.MISSES))
     contestants = Contestant.objects.filter(mine).annotate(missed=missed)
     lines = [
         _line(who, by_contestant[who.pk], who.missed, judged)

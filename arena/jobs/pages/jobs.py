@@ -22,7 +22,6 @@ from augment.services import read_request
 from augment.services.judging import repeatability
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import Caps, JobCounts, count_unpriced, jobs, progress, workforce
-from augment.tasks import enqueue_job
 
 State = Augmentation.State
 JOBS_AT_ONCE = 25
@@ -145,7 +144,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> None:
     job = get_object_or_404(GenerationJob, code=code)
     with transaction.atomic():
         jobs.retry_failed(job=job, actor=get_user(request))
-        send_later(request, enqueue_job, job.pk)
+        send_later(request, job)
         messages.success(request, "What failed is queued again.")
 
 
@@ -167,7 +166,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> None:
         return
     with transaction.atomic():
         jobs.resume(job, higher=read_request(Caps, form.cleaned_data), actor=get_user(request))
-        send_later(request, enqueue_job, job.pk)
+        send_later(request, job)
         messages.success(request, "What is left is queued again.")
 
 

@@ -15,13 +15,12 @@ from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.shell.access import ADMIN, form_for, get_user
 from arena.shell.acts import refusals_in, send_later
-from arena.shell.forms import ChoiceForm, Offer, offer, read_code
+from arena.shell.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob, Scenario
-from augment.services import read_request, read_values, running, to_inputs
+from augment.services import read_code, read_request, read_values, running, to_inputs
 from augment.services.endpoints import OPTION_INPUTS
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import launch
-from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120
 USUAL_CALLS = 5_000
@@ -38,7 +37,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         super().__init__(*args, **kwargs)
         self.models = models
         self.matrix = running.make_matrix(models)
-        keys = [cell.key for row in self.matrix for cell in row.cells if not cell.obstacle]
+        keys = [cell.key for cells in self.matrix.values() for cell in cells if not cell.obstacle]
         offer(self, "cells", [(key, key) for key in keys])
         self.fields["samples"].required = False
         self.cells_chosen: list[Contestant] = []
@@ -131,7 +130,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
     if form.is_bound and form.is_valid():
         with refusals_in(form), transaction.atomic():
             job = _launch(request, form)
-            send_later(request, enqueue_job, job.pk)
+            send_later(request, job)
             messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
     return render(request, "jobs/new.html", context, status=422 if form.errors else 200)

@@ -24,7 +24,6 @@ from arena.jobs.exports.tables import JOB_FILES
 from arena.jobs.queries import find_unmodified_drive
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
-from arena.shell import sending
 from arena.shell.access import ADMIN, STAFF, allow_only, get_user, page_for
 from arena.shell.acts import looks_again, refusals_told, send_later
 from arena.shell.listing import choice_asked, read_page
@@ -60,7 +59,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     )
     with refusals_told(request), transaction.atomic():
         waiting = simulations.plan_job(job=job, options=options)
-        send_later(request, lambda _pk: enqueue_simulations(waiting), job.pk)
+        send_later(request, job, lambda _job: enqueue_simulations(waiting))
         drives = "drive is" if len(waiting) == 1 else "drives are"
         messages.success(request, f"{len(waiting)} {drives} queued.")
     return redirect("job-tab", code=code, tab="driving")
@@ -222,7 +221,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
         raise Http404
     with refusals_told(request), transaction.atomic():
         row = ask_for_file(job=job, file_format=form, actor=get_user(request))
-        send_later(request, sending.send_scenario_file, row.pk)
+        send_later(request, row)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     return redirect("job-tab", code=code, tab="files")
 
@@ -238,7 +237,7 @@ def ask_to_measure(request: HttpRequest, job: GenerationJob) -> int:
     """Return how many rows are still to be measured, and leave them to a worker."""
     unmeasured = count_unmeasured(job)
     if unmeasured and not looks_again(request):
-        send_later(request, enqueue_measure, job.pk)
+        send_later(request, job, lambda job: enqueue_measure(job.pk))
     return unmeasured
 
 

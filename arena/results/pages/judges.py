@@ -26,7 +26,6 @@ from arena.voting.queries.blinding import is_imported
 from augment.models import EndpointModel, JudgeRun
 from augment.services import read_request, to_inputs
 from augment.services.running import JudgeRequest, cancel_judge
-from augment.tasks import enqueue_judge
 
 MOVING = JudgeRun.State.RUNNING
 
@@ -116,7 +115,7 @@ def judge_start(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
         return acts.ask(request, question)
     with transaction.atomic():
         run = start_judge(study, wanted, get_user(request))
-        acts.send_later(request, enqueue_judge, run.pk)
+        acts.send_later(request, run)
     messages.success(request, f"{run} is asked about {expected.pairs} pairs.")
     return None
 

@@ -33,16 +33,18 @@ from arena.results.services.ratings import (
     rate_now,
     share_rating,
 )
-from arena.shell import access, acts, sending
+from arena.shell import access, acts
 from arena.shell.accounts import top_role
-from arena.shell.forms import RequestForm, offer, read_code
+from arena.shell.forms import RequestForm, offer
 from arena.shell.pictures import charts_for_pages
+from arena.shell.sending import send_charts
 from arena.studies.pages.studies import export_place, study_question
 from arena.studies.queries import count_progress
 from arena.studies.services.opening import close_study
 from arena.voting.queries import blinding
-from augment.services import read_request, to_inputs
+from augment.services import read_code, read_request, to_inputs
 from augment.services.scenarios import type_choices
+from augment.tasks import enqueue_row
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
@@ -147,7 +149,7 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> N
     study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     snapshot.wait_again(progress=0)
-    sending.send_snapshot(snapshot.pk)
+    enqueue_row(snapshot)
 
 
 @access.act_for(*access.STAFF, back="results")
@@ -278,11 +280,12 @@ def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices])
         AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
     """
     if not is_big(study):
-        acts.send_later(request, sending.send_charts, rate_now(study=study, **choices).pk)
+        snapshot = rate_now(study=study, **choices)
+        acts.send_later(request, snapshot, lambda row: send_charts(row.pk))
         return
     with transaction.atomic():
         planned = plan_snapshot(study=study, **choices)
-        transaction.on_commit(partial(sending.send_snapshot, planned.pk))
+        transaction.on_commit(partial(enqueue_row, planned))
     messages.success(request, "The rating is being computed.")
 
 

@@ -8,28 +8,24 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.contestants.queries import show_options
 from arena.scenarios.queries import modification_lines, step_changes
-from arena.shell.access import ADMIN, STAFF, act_for, get_user, page_for
-from arena.shell.acts import send_later, tell_errors, wait_for_workers
-from arena.shell.forms import RequestForm
-from arena.shell.pictures import picture_response, resize_picture
+from arena.shell import access, acts, forms, pictures
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
 from augment.services import read_request, running, scenarios, to_inputs
 from augment.services.judging import check_augmentation
 from augment.services.judging.displacement import of_rows
 from augment.services.running.calls import IMAGES
-from augment.tasks import enqueue_augmentation
 
 State = Augmentation.State
 
 
-class FollowUpForm(RequestForm):
+class FollowUpForm(forms.RequestForm):
     """Next instruction of a conversation, and its caps."""
 
     inputs = to_inputs(running.FollowUpRequest)
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
@@ -38,7 +34,7 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
-        **wait_for_workers(waits=augmentation.state in Augmentation.UNDER_WAY),
+        **acts.wait_for_workers(waits=augmentation.state in Augmentation.UNDER_WAY),
         "steps": _steps(augmentation),
         "follow_ups": augmentation.follow_ups.select_related("scenario"),
         "form": FollowUpForm() if can_go_on else None,
@@ -54,16 +50,16 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "jobs/augmentation.html", context)
 
 
-@act_for(ADMIN, back="augmentation")
+@access.act_for(access.ADMIN, back="augmentation")
 def follow_up(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Have the contestant change its own answer further."""
     form = FollowUpForm(request.POST)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return None
     wish = read_request(running.FollowUpRequest, form.cleaned_data)
-    made = running.ask_follow_up(_augmentation(code), wish, actor=get_user(request))
-    send_later(request, enqueue_augmentation, made.pk)
+    made = running.ask_follow_up(_augmentation(code), wish, actor=access.get_user(request))
+    acts.send_later(request, made)
     return redirect("augmentation", code=made.code)
 
 
@@ -85,7 +81,7 @@ def _augmentation(code: uuid.UUID) -> Augmentation:
     return get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with the whole record of an augmentation as one JSON file."""
     answer = JsonResponse(
@@ -97,15 +93,15 @@ def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def show_asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     """Answer with an image that a language model was shown, by the hash in its request."""
     if not re.fullmatch(r"[0-9a-f]{64}", digest):
         raise Http404
-    return picture_response(f"{IMAGES}/{digest}.png")
+    return pictures.picture_response(f"{IMAGES}/{digest}.png")
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBase:
     """Answer with a picture by what it shows; experts' pictures have other addresses."""
     match kind:
@@ -117,7 +113,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
             name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
         case "change":
             row = _augmentation(code)
-            return resize_picture(request, row.image, row)
+            return pictures.resize_picture(request, row.image, row)
         case "labelled":
             return _draw_labels(code)
         case "moment":
@@ -129,7 +125,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
             name = scenarios.pictures.scene_picture(scene, scenarios.pictures.SceneView(kind))
         case _:
             raise Http404
-    return resize_picture(request, name)
+    return pictures.resize_picture(request, name)
 
 
 def _draw_labels(code: uuid.UUID) -> HttpResponse:
@@ -143,7 +139,7 @@ def _draw_labels(code: uuid.UUID) -> HttpResponse:
 # --- Prompts -----------------------------------------------------------------------------------
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
     scenario = find_scenario(code)
@@ -168,7 +164,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "scenarios/prompts.html", context)
 
 
-@page_for(*STAFF)
+@access.page_for(*access.STAFF)
 def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:

@@ -12,20 +12,8 @@ from django.shortcuts import get_object_or_404, redirect, render
 from arena.exports.written_files import ask_for
 from arena.models import BenchmarkFile
 from arena.scenarios.queries import count_tasks, list_benchmarks
-from arena.shell import sending
-from arena.shell.access import (
-    ADMIN,
-    BENCHMARK_READERS,
-    STAFF,
-    act_for,
-    form_for,
-    get_user,
-    page_for,
-)
-from arena.shell.accounts import top_role
-from arena.shell.acts import refusals_in, send_later, wait_for_workers
+from arena.shell import access, accounts, acts, pictures
 from arena.shell.forms import RequestForm
-from arena.shell.pictures import file_response
 from augment.errors import Conflict
 from augment.models import Benchmark
 from augment.services import read_request, retire, to_inputs
@@ -51,13 +39,13 @@ class BenchmarkForm(RequestForm):
         return str(self.cleaned_data["scenarios"]).split()
 
 
-@page_for(*BENCHMARK_READERS)
+@access.page_for(*access.BENCHMARK_READERS)
 def benchmarks_page(request: HttpRequest) -> HttpResponse:
     """List every version."""
     return render(request, "benchmarks/list.html", {"rows": list_benchmarks()})
 
 
-@form_for(ADMIN)
+@access.form_for(access.ADMIN)
 def new_benchmark_page(request: HttpRequest) -> HttpResponse:
     """Choose scenarios, see how many of which kind they are, make the version."""
     form, more = BenchmarkForm(request.POST or None), dict[str, Any]()
@@ -65,15 +53,15 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
         form.is_valid()
         form.errors.pop("title", None)
         if not form.errors:
-            with refusals_in(form, "scenarios"):
+            with acts.refusals_in(form, "scenarios"):
                 wanted = read_request(BenchmarkRequest, form.cleaned_data, title="")
                 planned = plan_benchmark(wanted)
                 counts = count_tasks((task.split, task.stratum) for task in planned)
                 more = {"counts": counts, "total": len(planned)}
     elif form.is_bound and form.is_valid():
-        with refusals_in(form, "scenarios"), transaction.atomic():
+        with acts.refusals_in(form, "scenarios"), transaction.atomic():
             row = make_benchmark(
-                read_request(BenchmarkRequest, form.cleaned_data), get_user(request)
+                read_request(BenchmarkRequest, form.cleaned_data), access.get_user(request)
             )
             _ask_for_zip(request, row)
             messages.success(request, f"{row} is made; a worker writes its folder.")
@@ -82,7 +70,7 @@ def new_benchmark_page(request: HttpRequest) -> HttpResponse:
     return render(request, "benchmarks/new.html", {"form": form, **more}, status=status)
 
 
-@page_for(*BENCHMARK_READERS)
+@access.page_for(*access.BENCHMARK_READERS)
 def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show how many tasks there are of which kind, and where to get them."""
     row = get_object_or_404(Benchmark.objects.select_related("made_by"), code=code)
@@ -95,13 +83,13 @@ def benchmark_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "newest": Benchmark.objects.filter(slug=row.slug, version__gt=row.version).first(),
         "file": file,
         "remarks": benchmarks.list_remarks(row),
-        "is_staff": top_role(request.user) in STAFF,
-        **wait_for_workers(waits=file is not None and file.is_waiting),
+        "is_staff": accounts.top_role(request.user) in access.STAFF,
+        **acts.wait_for_workers(waits=file is not None and file.is_waiting),
     }
     return render(request, "benchmarks/benchmark.html", context)
 
 
-@act_for(*BENCHMARK_READERS, back="benchmark")
+@access.act_for(*access.BENCHMARK_READERS, back="benchmark")
 def write_zip(request: HttpRequest, code: uuid.UUID) -> None:
     """Leave the folder to a worker; twice does no harm."""
     with transaction.atomic():
@@ -120,19 +108,19 @@ def _newest_file(row: Benchmark) -> BenchmarkFile | None:
 
 
 def _ask_for_zip(request: HttpRequest, row: Benchmark) -> None:
-    file = ask_for(BenchmarkFile(benchmark=row, asked_by=get_user(request)), row)
-    send_later(request, sending.send_benchmark_file, file.pk)
+    file = ask_for(BenchmarkFile(benchmark=row, asked_by=access.get_user(request)), row)
+    acts.send_later(request, file)
 
 
-@page_for(*BENCHMARK_READERS)
+@access.page_for(*access.BENCHMARK_READERS)
 def download_benchmark(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     """Answer with the newest zip that is ready."""
     ready = BenchmarkFile.objects.filter(benchmark__code=code, state=BenchmarkFile.State.READY)
-    return file_response(ready.order_by("pk").last())
+    return pictures.file_response(ready.order_by("pk").last())
 
 
-@act_for(ADMIN, back="benchmark")
+@access.act_for(access.ADMIN, back="benchmark")
 def retire_benchmark(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a version, or take that back."""
     row = get_object_or_404(Benchmark, code=code)
-    retire(row, actor=get_user(request), is_retired=request.POST.get("retired") != "no")
+    retire(row, actor=access.get_user(request), is_retired=request.POST.get("retired") != "no")

@@ -13,24 +13,14 @@ from arena.scenarios import services
 from arena.scenarios.pages.augmentations import find_scenario
 from arena.shell.access import STAFF, act_for, form_for, get_user
 from arena.shell.acts import looks_again, refusals_in, refusals_told, send_later, wait_for_workers
-from arena.shell.forms import offer, read_code, read_json
+from arena.shell.forms import offer, read_json
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services import SLUG_LENGTH, free_slug, make_slug
+from augment.services import SLUG_LENGTH, free_slug, make_slug, read_code, scenarios
 from augment.services.judging import check_edit
 from augment.services.running import follow_ups
-from augment.services.scenarios import (
-    LONGEST_TYPE,
-    SceneView,
-    editing,
-    is_drawn,
-    note_sentences,
-    scene_picture,
-    scenes,
-    type_choices,
-)
-from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
+from augment.services.scenarios import editing, scenes
 
 LONGEST_CHANGE = 1_000_000
 """Bytes of a modification."""
@@ -50,7 +40,7 @@ class ScenarioForm(forms.Form):
     type = forms.ChoiceField(required=False)
     own_type = forms.CharField(
         required=False,
-        max_length=LONGEST_TYPE,
+        max_length=scenarios.LONGEST_TYPE,
         label="A type of your own",
         help_text="It counts where no other is chosen.",
     )
@@ -81,7 +71,7 @@ class ScenarioForm(forms.Form):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        offer(self, "type", [("", "As the drawing looks"), *type_choices()])
+        offer(self, "type", [("", "As the drawing looks"), *scenarios.type_choices()])
 
     def to_values(self) -> dict[str, Any]:
         """Return the scenario's fields from a valid form.
@@ -140,14 +130,14 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 variant_of="" if original is None else original.slug,
             )
             made = scenes.add_scenario(new, actor=get_user(request))
-            send_later(request, enqueue_scenario, made.pk)
+            send_later(request, made)
             messages.success(request, f"“{made.slug}” is added.")
             return redirect("scenario", code=made.code)
     context = {
         "form": form,
         "first": first,
         "scenarios": scene.scenarios.only("base_scene", "code", "slug", "instruction"),
-        "notes": note_sentences(scene.notes),
+        "notes": scenarios.note_sentences(scene.notes),
         "facts": {name: len(scene.document.get(name, ())) for name in PARTS}
         | {
             "provenance": scene.provenance,
@@ -171,7 +161,7 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         with refusals_in(form):
             content = scenes.ScenarioContent(**form.to_values())
             services.change_scenario(scenario, content, actor=get_user(request))
-            send_later(request, enqueue_scenario, scenario.pk)
+            send_later(request, scenario)
             messages.success(request, f"“{scenario.slug}” is changed.")
             return redirect("scenario", code=code)
     context = {"form": form, "refusal": services.why_not_editable(scenario)}
@@ -191,7 +181,7 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             made = follow_ups.keep_correction(
                 original, _document(text), slug=slug, notes=notes, actor=get_user(request)
             )
-            send_later(request, enqueue_job, made.job_id)
+            send_later(request, made)
             messages.success(request, "The correction is kept; a worker draws it.")
             return redirect("augmentation", code=made.code)
     people = Contestant.objects.filter(kind=Contestant.Kind.HUMAN, retired_at=None)
@@ -241,10 +231,12 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def _editor(
     request: HttpRequest, draft: Scenario, text: str | None, more: dict[str, Any]
 ) -> HttpResponse:
-    drawn = is_drawn(scene_picture(draft.base_scene, SceneView.BACKDROP))
+    drawn = scenarios.is_drawn(
+        scenarios.scene_picture(draft.base_scene, scenarios.SceneView.BACKDROP)
+    )
     waits = not drawn and request.method != "POST"
     if waits and not looks_again(request):
-        send_later(request, enqueue_scene, draft.base_scene.pk)
+        send_later(request, draft.base_scene)
     context = {
         "scenario": draft,
         "scene": draft.base_scene,

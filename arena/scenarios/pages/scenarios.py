@@ -11,28 +11,12 @@ from django.urls import reverse
 from arena.scenarios import queries, services
 from arena.shell import acts
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
-from arena.shell.forms import read_code, read_json
+from arena.shell.forms import read_json
 from arena.shell.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
-from augment.services import retire
-from augment.services.benchmarks import Split, refuse_handed_out
-from augment.services.endpoints import ensure_builtin
-from augment.services.running import plan_reading
-from augment.services.scenarios import (
-    accept_reading,
-    bulk,
-    enter_intent,
-    intent_statements,
-    is_drawn,
-    last_reading,
-    load_catalogue,
-    note_sentences,
-    reference_picture,
-    type_choices,
-    waiting_reading,
-)
-from augment.tasks import enqueue_reading, enqueue_scenario
+from augment.services import benchmarks, endpoints, read_code, retire, running, scenarios
+from augment.services.scenarios import bulk
 
 SCENARIOS_AT_ONCE = 16
 LONGEST_FILE = 200_000
@@ -43,12 +27,15 @@ JSON_STYLE = {"indent": 2, "ensure_ascii": False}
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """List scenarios of a set by type, with the reference where it was drawn."""
     chosen = queries.set_asked(request.GET.get("set"))
-    choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
+    choices = {
+        "type": ("Type", scenarios.type_choices()),
+        "offered": ("In forms", [("retired", "retired")]),
+    }
     listing = read_listing(request, choices, keep=("set",))
-    scenarios = queries.list_scenarios(chosen, is_retired=bool(listing.find_choice("offered")))
-    scenarios = scenarios.filter(paraphrase_of=None)
-    scenarios = listing.narrow(scenarios, "slug", "instruction", "base_scene__slug", by=["type"])
-    page = read_page(request, scenarios, size=SCENARIOS_AT_ONCE)
+    listed = queries.list_scenarios(chosen, is_retired=bool(listing.find_choice("offered")))
+    listed = listed.filter(paraphrase_of=None)
+    listed = listing.narrow(listed, "slug", "instruction", "base_scene__slug", by=["type"])
+    page = read_page(request, listed, size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
     context = {
         "groups": queries.group_by_type(rows),
@@ -63,12 +50,12 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
 @act_for(ADMIN, back="scenarios")
 def load_scenarios(request: HttpRequest) -> None:
     """Load one set of the catalogue, all of it or nothing, and the built-in contestants."""
-    report = load_catalogue(
+    report = scenarios.load_catalogue(
         sets=[request.POST.get("set", "")],
         with_paraphrases="wordings" in request.POST,
         actor=get_user(request),
     )
-    ensure_builtin()
+    endpoints.ensure_builtin()
     counts = ", ".join(f"{number} {step.value}" for step, number in report.scenarios.items())
     messages.success(request, f"Scenarios: {counts}.")
 
@@ -78,15 +65,15 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one scenario: before and after the reference, and every other result."""
     rows = Scenario.objects.select_related("base_scene", "paraphrase_of", "follows")
     scenario = get_object_or_404(rows, code=code)
-    reading, reference = waiting_reading(scenario), reference_picture(scenario)
-    has_picture = is_drawn(reference)
+    reading, reference = scenarios.waiting_reading(scenario), scenarios.reference_picture(scenario)
+    has_picture = scenarios.is_drawn(reference)
     is_waiting = not scenario.original_image or (
         scenario.reference is not None and not has_picture
     )
     if is_waiting and not acts.looks_again(request):
-        acts.send_later(request, enqueue_scenario, scenario.pk)
+        acts.send_later(request, scenario)
     readers = EndpointModel.objects.select_related("endpoint")
-    last = last_reading(scenario)
+    last = scenarios.last_reading(scenario)
     is_reading = last is not None and last.state in last.UNDER_WAY
     context = {
         "scenario": scenario,
@@ -97,12 +84,14 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         **acts.wait_for_workers(waits=is_waiting or is_reading),
         "why_not_editable": services.why_not_editable(scenario),
         "lines": queries.modification_lines(scenario.reference),
-        "statements": intent_statements(scenario.intent),
+        "statements": scenarios.intent_statements(scenario.intent),
         "reading": reading,
-        "reading_statements": intent_statements(None if reading is None else reading.document),
+        "reading_statements": scenarios.intent_statements(
+            None if reading is None else reading.document
+        ),
         "last_reading": last,
         "readers": readers.order_by("endpoint__label", "model"),
-        "notes": note_sentences(scenario.base_scene.notes),
+        "notes": scenarios.note_sentences(scenario.base_scene.notes),
         "augmentations": queries.list_augmentations(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
@@ -145,15 +134,15 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def set_intent(request: HttpRequest, code: uuid.UUID) -> None:
     """Accept the last reading, or take the intent of the file that came along."""
     scenario = get_object_or_404(Scenario, code=code)
-    refuse_handed_out(scenario.slug, [Split.PRACTICE])
+    benchmarks.refuse_handed_out(scenario.slug, [benchmarks.Split.PRACTICE])
     if "accept" in request.POST:
-        accept_reading(scenario=scenario.slug, actor=get_user(request))
+        scenarios.accept_reading(scenario=scenario.slug, actor=get_user(request))
     else:
         file = request.FILES.get("file")
         if file is None or not file.size or file.size > LONGEST_FILE:
             raise Conflict("Choose a JSON file; it may be too long for an intent.")
         document = read_json(file.read(), otherwise="The file is no JSON.")
-        enter_intent(scenario=scenario.slug, document=document, actor=get_user(request))
+        scenarios.enter_intent(scenario=scenario.slug, document=document, actor=get_user(request))
     messages.success(request, "The intent is set. It counts from now on.")
 
 
@@ -165,10 +154,10 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     reader = models.filter(code=read_code(request.POST.get("reader", ""))).first()
     if reader is None:
         raise Conflict("Choose a model.")
-    reading = plan_reading(
+    reading = running.plan_reading(
         scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=get_user(request)
     )
-    acts.send_later(request, enqueue_reading, reading.pk)
+    acts.send_later(request, reading)
     messages.success(request, f"{reader.model} reads it now.")
 
 

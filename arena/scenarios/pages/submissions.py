@@ -11,17 +11,12 @@ from django.shortcuts import get_object_or_404, redirect, render
 
 from arena.scenarios.queries import is_waiting, submissions_for
 from arena.scenarios.services import was_too_large
+from arena.shell import accounts, acts, listing
 from arena.shell.access import ADMIN, ENTRANT, STAFF, act_for, form_for, get_user, page_for
-from arena.shell.accounts import top_role
-from arena.shell.acts import refusals_in, send_later, wait_for_workers
 from arena.shell.forms import RequestForm, offer
-from arena.shell.listing import page_asked, read_page
 from augment.models import Benchmark, Submission
-from augment.services import read_request, to_inputs
+from augment.services import read_request, running, scenarios, to_inputs
 from augment.services.benchmarks import submissions
-from augment.services.running import AcceptRequest, accept_submission
-from augment.services.scenarios import most_megabytes
-from augment.tasks import enqueue_job, enqueue_submission
 
 AT_ONCE = 50
 
@@ -45,15 +40,15 @@ class SubmissionForm(forms.Form):
 class AcceptForm(RequestForm):
     """Name of an accepted submission, and whether it runs at once."""
 
-    inputs = tuple(field for field in to_inputs(AcceptRequest) if field.name != "slug")
+    inputs = tuple(field for field in to_inputs(running.AcceptRequest) if field.name != "slug")
 
 
 @page_for(*STAFF, ENTRANT)
 def submissions_page(request: HttpRequest) -> HttpResponse:
     """Show staff all submissions, those that wait for them first, and entrants their own."""
-    page = read_page(request, submissions_for(get_user(request)), size=AT_ONCE)
+    page = listing.read_page(request, submissions_for(get_user(request)), size=AT_ONCE)
     waits = any(row.state in row.UNDER_WAY for row in page.object_list)
-    context = {"page": page, **wait_for_workers(waits=waits)}
+    context = {"page": page, **acts.wait_for_workers(waits=waits)}
     return render(request, "submissions/list.html", context)
 
 
@@ -63,9 +58,9 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
     initial = {"benchmark": request.GET.get("benchmark", "")}
     form = SubmissionForm(request.POST or None, request.FILES or None, initial=initial)
     if was_too_large(request.META):
-        form.add_error("file", f"At most {most_megabytes()} MB are taken.")
+        form.add_error("file", f"At most {scenarios.most_megabytes()} MB are taken.")
     elif form.is_valid():
-        with refusals_in(form, "file"):
+        with acts.refusals_in(form, "file"):
             file = form.cleaned_data["file"]
             row = submissions.keep_submission(
                 Benchmark.objects.get(code=form.cleaned_data["benchmark"]),
@@ -73,9 +68,9 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
                 content=file,
                 actor=get_user(request),
             )
-            send_later(request, enqueue_submission, row.pk)
+            acts.send_later(request, row)
             return redirect("submission", code=row.code)
-    context = {"form": form, "most_megabytes": most_megabytes()}
+    context = {"form": form, "most_megabytes": scenarios.most_megabytes()}
     return render(request, "submissions/new.html", context, status=422 if form.errors else 200)
 
 
@@ -83,27 +78,27 @@ def new_submission_page(request: HttpRequest) -> HttpResponse:
 def submission_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show a report, rejections first; an admin accepts here."""
     row = _find(request, code)
-    is_admin = top_role(request.user) == ADMIN
+    is_admin = accounts.top_role(request.user) == ADMIN
     form = AcceptForm(request.POST if is_admin and request.method == "POST" else None)
     if form.is_valid():
-        with refusals_in(form), transaction.atomic():
-            acceptance = read_request(AcceptRequest, form.cleaned_data)
-            contestant, job = accept_submission(row, acceptance, actor=get_user(request))
+        with acts.refusals_in(form), transaction.atomic():
+            acceptance = read_request(running.AcceptRequest, form.cleaned_data)
+            contestant, job = running.accept_submission(row, acceptance, actor=get_user(request))
             messages.success(request, f"“{contestant.name}” is accepted.")
             if job is None:
                 return redirect("contestant", code=contestant.code)
-            send_later(request, enqueue_job, job.pk)
+            acts.send_later(request, job)
             return redirect("job", code=job.code)
     elif not form.is_bound:
         form.initial = {"name": row.title, "runs": True}
-    page = Paginator(submissions.get_entries(row), AT_ONCE).get_page(page_asked(request))
+    page = Paginator(submissions.get_entries(row), AT_ONCE).get_page(listing.page_asked(request))
     context = {
         "submission": row,
         "form": form if is_admin and is_waiting(row) else None,
         "is_own": row.uploaded_by == request.user,
         "page": page,
         "remarks": (row.report or {}).get("remarks", ()),
-        **wait_for_workers(waits=row.state in row.UNDER_WAY),
+        **acts.wait_for_workers(waits=row.state in row.UNDER_WAY),
     }
     status = 422 if form.errors else 200
     return render(request, "submissions/submission.html", context, status=status)

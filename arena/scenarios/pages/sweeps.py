@@ -13,6 +13,7 @@ from django.utils.text import slugify
 
 from arena.exports.formats import download
 from arena.scenarios.exports.sweeps import SWEEP_FORMATS
+from arena.scenarios.pages.augmentations import find_scenario
 from arena.shell import acts
 from arena.shell.access import ADMIN, STAFF, act_for, form_for, get_user, page_for
 from arena.shell.forms import RequestForm, offer
@@ -20,7 +21,6 @@ from arena.shell.pictures import charts_for_pages
 from augment.models import Scenario, Sweep
 from augment.services import read_request, to_inputs
 from augment.services.driving import driver_name, list_allowed_planners, sweep_result, sweeps
-from augment.tasks import enqueue_scenario, enqueue_sweep
 
 KEPT = ("number", "low", "high", "count", "planner", "offsets")
 """What the form of a new sweep is filled in with by an address."""
@@ -52,7 +52,7 @@ class FamilyForm(forms.Form):
 @page_for(*STAFF)
 def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the sweeps of a scenario, with the forms of a new one and of a family."""
-    scenario = _scenario(code)
+    scenario = find_scenario(code)
     initial = {name: request.GET[name] for name in KEPT if name in request.GET}
     context = {
         "scenario": scenario,
@@ -66,7 +66,7 @@ def sweeps_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @act_for(ADMIN, back="sweeps")
 def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have the values driven by the workers."""
-    scenario = _scenario(code)
+    scenario = find_scenario(code)
     form = SweepForm(scenario, request.POST)
     if not form.is_valid():
         acts.tell_errors(request, form)
@@ -74,7 +74,7 @@ def start_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         with acts.refusals_told(request):
             wanted = read_request(sweeps.SweepRequest, form.cleaned_data)
             sweep = sweeps.plan_sweep(scenario=scenario, request=wanted, actor=get_user(request))
-            acts.send_later(request, enqueue_sweep, sweep.pk)
+            acts.send_later(request, sweep)
             return redirect("sweep", code=sweep.code)
     query = urlencode({name: request.POST.get(name, "") for name in KEPT})
     return redirect(f"{reverse('sweeps', args=[code])}?{query}")
@@ -88,10 +88,10 @@ def draw_family(request: HttpRequest, code: uuid.UUID) -> None:
         acts.tell_errors(request, form)
         return
     rows, refused = sweeps.add_family(
-        scenario=_scenario(code), **form.cleaned_data, actor=get_user(request)
+        scenario=find_scenario(code), **form.cleaned_data, actor=get_user(request)
     )
     for row in rows:
-        acts.send_later(request, enqueue_scenario, row.pk)
+        acts.send_later(request, row)
     for member in refused:
         messages.warning(request, f"Refused: {member.refusal}")
     if rows:
@@ -144,10 +144,6 @@ def remove_sweep(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _scenario(code: uuid.UUID) -> Scenario:
-    return get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
 
 
 def _sweep(code: uuid.UUID) -> Sweep:

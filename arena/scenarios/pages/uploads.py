@@ -10,15 +10,13 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.scenarios.services import was_too_large
+from arena.shell import acts, listing
 from arena.shell.access import STAFF, act_for, get_user, page_for
-from arena.shell.acts import looks_again, refusals_told, send_later, wait_for_workers
-from arena.shell.forms import read_code
-from arena.shell.listing import read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
+from augment.services import read_code
 from augment.services.scenarios import SceneView, is_drawn, note_sentences, scene_picture, uploads
 from augment.services.scenarios.scene_imports import free_scene_slug
-from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 UPLOADS_SHOWN = 10
 SCENES_AT_ONCE = 24
@@ -29,18 +27,18 @@ def scenes_page(request: HttpRequest) -> HttpResponse:
     """Show every scene, the files that were sent, and the form to send others."""
     scenes = BaseScene.objects.defer("document", "recording", "notes")
     rows = scenes.annotate(number=Count("scenarios")).order_by("-created_at", "slug")
-    page = read_page(request, rows, size=SCENES_AT_ONCE)
+    page = listing.read_page(request, rows, size=SCENES_AT_ONCE)
     shown = [(row, is_drawn(scene_picture(row, SceneView.KEPT))) for row in page.object_list]
     sent = SceneUpload.objects.defer("tracks").select_related("uploaded_by")[:UPLOADS_SHOWN]
     waits = any(row.state in row.UNDER_WAY for row in sent) or not all(has for _, has in shown)
     for row, has_picture in shown:
-        if not has_picture and not looks_again(request):
-            send_later(request, enqueue_scene, row.pk)
+        if not has_picture and not acts.looks_again(request):
+            acts.send_later(request, row)
     context = {
         "page": page,
         "scenes": shown,
         "uploads": sent,
-        **wait_for_workers(waits=waits),
+        **acts.wait_for_workers(waits=waits),
         "formats": uploads.FORMATS.items(),
         "most_megabytes": uploads.most_megabytes(),
     }
@@ -52,14 +50,14 @@ def send_file(request: HttpRequest) -> HttpResponse | None:
     """Keep each file as an upload of its own, and leave them to workers."""
     rows = []
     for file in request.FILES.getlist("file"):
-        with refusals_told(request):
+        with acts.refusals_told(request):
             row = uploads.keep_upload(
                 name=file.name or "",
                 content=file,
                 source=request.POST.get("format", ""),
                 actor=get_user(request),
             )
-            send_later(request, enqueue_upload, row.pk)
+            acts.send_later(request, row)
             rows.append(row)
     if was_too_large(request.META) or not request.FILES:
         most = uploads.most_megabytes()
@@ -87,7 +85,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "slug": free_scene_slug(row.name),
         "strip": _list_strip(row, list(moments)),
         "kept": moments.filter(state=UploadMoment.State.KEPT),
-        **wait_for_workers(waits=waits),
+        **acts.wait_for_workers(waits=waits),
     }
     return render(request, "scenes/upload.html", context)
 
@@ -113,7 +111,7 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _send_moment(request: HttpRequest, moment: UploadMoment, goes_on: str = "") -> HttpResponse:
-    send_later(request, enqueue_moment, moment.pk)
+    acts.send_later(request, moment)
     page = reverse("upload", args=[moment.upload.code])
     return redirect(f"{page}?moment={moment.code}{goes_on}")
 

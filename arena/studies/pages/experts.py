@@ -19,32 +19,10 @@ from arena.exports.formats import attach
 from arena.models import Enrolment, Study
 from arena.people import links, services
 from arena.people.pages import find_account, link_page, show_new_links, with_own_language
-from arena.shell.access import (
-    ADMIN,
-    BACKEND,
-    CREATED,
-    CSRF_FIELD,
-    GONE,
-    act_for,
-    form_for,
-    get_user,
-    page_for,
-)
-from arena.shell.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
-from arena.shell.listing import read_page
-from arena.shell.receipts import StoredAnswer, answer_once, digest_body
+from arena.shell import access, acts, listing, receipts
 from arena.studies.forms import AuthorForm
 from arena.studies.queries import expert_lines, state_of
-from arena.studies.services.planning import Planning
-from arena.studies.services.taking_part import (
-    LONGEST_CONSENT,
-    LONGEST_ID,
-    check_id,
-    enrol,
-    find_returning,
-    forget_identity,
-    set_enrolment,
-)
+from arena.studies.services import planning, taking_part
 from arena.voting.queries.ballots import list_voters
 from augment.errors import Conflict
 
@@ -72,7 +50,7 @@ class EnrolmentForm(forms.Form):
     """The rules of an enrolment link."""
 
     consent = forms.CharField(
-        max_length=LONGEST_CONSENT,
+        max_length=taking_part.LONGEST_CONSENT,
         initial=CONSENT,
         label="What people agree to",
         widget=forms.Textarea({"rows": 5}),
@@ -117,7 +95,8 @@ class NewcomerForm(forms.Form):
     """Details that a newcomer enters."""
 
     external_id = forms.CharField(
-        max_length=LONGEST_ID, error_messages={"required": gettext_lazy("Please enter it.")}
+        max_length=taking_part.LONGEST_ID,
+        error_messages={"required": gettext_lazy("Please enter it.")},
     )
     agreed = forms.BooleanField(
         error_messages={"required": gettext_lazy("You take part only if you agree.")}
@@ -128,13 +107,13 @@ class NewcomerForm(forms.Form):
 # --- The experts of a study --------------------------------------------------------------------
 
 
-@act_for(ADMIN, back="study")
+@access.act_for(access.ADMIN, back="study")
 def mark(request: HttpRequest, code: uuid.UUID) -> None:
     """Mark an expert as author of a contestant, or take it back, be the study open or closed."""
     study = get_object_or_404(Study, code=code)
     form = AuthorForm(request.POST, study=study)
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return
     contestant = form.cleaned_data["contestant"]
     expert = study.experts.select_related("person").get(username=form.cleaned_data["expert"])
@@ -144,7 +123,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> None:
         expert=expert,
         contestant=contestant,
         is_author=is_author,
-        actor=get_user(request),
+        actor=access.get_user(request),
     )
     state = "is" if is_author else "is not"
     messages.success(
@@ -152,13 +131,13 @@ def mark(request: HttpRequest, code: uuid.UUID) -> None:
     )
 
 
-@form_for(ADMIN)
+@access.form_for(access.ADMIN)
 def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Remove the identity of an account, plans of studies included; asks first."""
     user = find_account(code)
     name = user.person.pseudonym
-    if not is_sure(request):
-        question = Confirmation(
+    if not acts.is_sure(request):
+        question = acts.Confirmation(
             title=f"Forget who {name} is?",
             facts=(
                 "Username, pseudonym, preferences and links go; nobody can sign in.",
@@ -169,9 +148,9 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             back=reverse("people"),
             crumbs=(("People", reverse("people")),),
         )
-        return ask(request, question)
-    with refusals_told(request):
-        forget_identity(user=user, actor=get_user(request))
+        return acts.ask(request, question)
+    with acts.refusals_told(request):
+        taking_part.forget_identity(user=user, actor=access.get_user(request))
         messages.success(request, f"{name} is forgotten.")
     return redirect("people")
 
@@ -180,7 +159,7 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @never_cache
-@act_for(ADMIN, back="study")
+@access.act_for(access.ADMIN, back="study")
 def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Make links, for one expert or for all without one, and show them this once."""
     study = get_object_or_404(Study, code=code)
@@ -196,11 +175,11 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None
     return show_new_links(request, chosen, study)
 
 
-@act_for(ADMIN, back="study")
+@access.act_for(access.ADMIN, back="study")
 def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one link; whoever came in by it is signed out."""
     study = get_object_or_404(Study, invitations__code=code)
-    links.revoke(invitation=study.invitations.get(code=code), actor=get_user(request))
+    links.revoke(invitation=study.invitations.get(code=code), actor=access.get_user(request))
     messages.success(request, "The link was taken back.")
     return redirect("study", code=study.code)
 
@@ -225,7 +204,7 @@ def _sign_in(request: HttpRequest, expert: User, study: Study | None) -> HttpRes
     """Sign an expert in here and out on every other device, and lead to the study."""
     if expert.last_login is not None:
         services.end_sessions(services.SIGNED_IN, {str(expert.pk)})
-    login(request, expert, backend=BACKEND)
+    login(request, expert, backend=access.BACKEND)
     request.session.set_expiry(SESSION_S)
     answer = redirect("home") if study is None else redirect("vote", code=study.code)
     return with_own_language(answer, expert)
@@ -248,7 +227,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
         ids = _read_ids(request)
     except Conflict as error:
         return render(request, "enrol_over.html", {"problem": error}, status=422)
-    voter = find_returning(enrolment, ids["external_id"], ids["platform_session"])
+    voter = taking_part.find_returning(enrolment, ids["external_id"], ids["platform_session"])
     if voter is None:
         return _take_on(request, enrolment, ids)
     if "go_on" in request.POST:
@@ -260,7 +239,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
 def _read_ids(request: HttpRequest) -> dict[str, str]:
     ids = {"external_id": next(filter(None, map(request.GET.get, ID_PARAMETERS)), "")}
     ids |= {column: request.GET.get(name, "") for name, column in PLATFORM_COLUMNS.items()}
-    return {column: text and check_id(text) for column, text in ids.items()}
+    return {column: text and taking_part.check_id(text) for column, text in ids.items()}
 
 
 def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) -> HttpResponse:
@@ -268,34 +247,34 @@ def _take_on(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) ->
     is_over = not enrolment.is_open or enrolment.study.state != Study.State.OPEN
     if form.is_valid():
         ids |= {name: form.cleaned_data[name] for name in ("external_id", "agreed_sha256")}
-        with refusals_in(form, "external_id"):
+        with acts.refusals_in(form, "external_id"):
             try:
                 return _sign_in(request, _enrol_once(request, enrolment, ids), enrolment.study)
             except EnrolmentOver:
                 is_over = True
         enrolment.refresh_from_db()
     if is_over:
-        return render(request, "enrol_over.html", {"study": enrolment.study}, status=GONE)
-    pairs = Planning.begin(enrolment.study).count_pairs(enrolment.votes_each)
+        return render(request, "enrol_over.html", {"study": enrolment.study}, status=access.GONE)
+    pairs = planning.Planning.begin(enrolment.study).count_pairs(enrolment.votes_each)
     context = {"enrolment": enrolment, "form": form, "pairs": pairs}
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
 
 
 def _enrol_once(request: HttpRequest, enrolment: Enrolment, ids: dict[str, str]) -> User:
     """Take somebody on; the same form again is the same newcomer, whose first answer was lost."""
-    made = digest_body(ids)
-    enrolled = answer_once(
-        f"enrol {enrolment.token} {request.POST.get(CSRF_FIELD) or uuid.uuid4()} {made}",
+    made = receipts.digest_body(ids)
+    enrolled = receipts.answer_once(
+        f"enrol {enrolment.token} {request.POST.get(access.CSRF_FIELD) or uuid.uuid4()} {made}",
         made,
-        lambda: enrol(token=enrolment.token, **ids),
-        lambda voter: (CREATED, str(voter.expert_id).encode()),
+        lambda: taking_part.enrol(token=enrolment.token, **ids),
+        lambda voter: (access.CREATED, str(voter.expert_id).encode()),
     )
-    if not isinstance(enrolled, StoredAnswer):
+    if not isinstance(enrolled, receipts.StoredAnswer):
         return enrolled.expert
     return get_object_or_404(User, pk=int(enrolled.content), is_active=True)
 
 
-@form_for(ADMIN)
+@access.form_for(access.ADMIN)
 @never_cache
 def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The link with its rules, and who came by it."""
@@ -304,8 +283,10 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     rules = {name: getattr(enrolment, name) for name in EnrolmentForm.base_fields if enrolment}
     form = EnrolmentForm(request.POST or None, initial=rules)
     if form.is_valid():
-        with refusals_in(form):
-            set_enrolment(study=study, rules=form.cleaned_data, actor=get_user(request))
+        with acts.refusals_in(form):
+            taking_part.set_enrolment(
+                study=study, rules=form.cleaned_data, actor=access.get_user(request)
+            )
             messages.success(request, "Saved. What the link says holds from now on.")
             return redirect("enrolment", code=code)
     context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}
@@ -315,13 +296,13 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             "address": address,
             "prolific": address + PROLIFIC,
             "state": state_of(enrolment),
-            "page": read_page(request, list_voters(study), size=PAGE),
+            "page": listing.read_page(request, list_voters(study), size=PAGE),
         }
     status = 422 if form.errors else 200
     return render(request, "studies/enrolment.html", context, status=status)
 
 
-@page_for(ADMIN)
+@access.page_for(access.ADMIN)
 @never_cache
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Return ids, progress and completion codes of voters as CSV, for thanks or payment."""

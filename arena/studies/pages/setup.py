@@ -22,7 +22,6 @@ from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
 from arena.shell.access import ADMIN, act_for, form_for, get_user
 from arena.shell.acts import is_sure, refusals_in, refusals_told, tell_errors
-from arena.shell.forms import read_code
 from arena.studies.forms import StudyForm
 from arena.studies.queries import (
     FINISHED,
@@ -31,15 +30,12 @@ from arena.studies.queries import (
     list_offered,
     usual_checks,
 )
-from arena.studies.services import drafts
-from arena.studies.services.importing import ImportedVotes, import_votes
-from arena.studies.services.opening import open_study
-from arena.studies.services.outlook import compare_votes
-from arena.studies.services.plan import PRESETS
+from arena.studies.services import drafts, importing, opening, outlook, plan
 from arena.voting.screen import AHEAD, vote_context
 from arena.voting.services.drawing import show_own_pictures
 from arena.voting.services.practice import has_practice
 from augment.models import GenerationJob
+from augment.services import read_code
 from augment.tasks import send_checks
 
 USUAL = "paper"
@@ -55,19 +51,6 @@ TOO_LARGE = (
     f"The file has more than {MOST_MB} MB. Send a smaller one, or use “manage.py import_votes”."
 )
 _ODD = re.compile(r"[^A-Za-z0-9._ -]+")
-
-
-@form_for(ADMIN)
-def new_study_page(request: HttpRequest) -> HttpResponse:
-    """Choose contestants, scenarios and experts; see the outlook; opening plans every pair."""
-    return _set_up(request, None)
-
-
-@form_for(ADMIN)
-def draft_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """The same form with what was saved, and what of it is gone meanwhile."""
-    rows = StudyDraft.objects.select_related("changed_by__person")
-    return _set_up(request, get_object_or_404(rows, code=code))
 
 
 @act_for(ADMIN, back="studies")
@@ -90,10 +73,16 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- The form ----------------------------------------------------------------------------------
 
 
-def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
-    posted = request.POST
+@form_for(ADMIN)
+def set_up_page(request: HttpRequest, code: uuid.UUID | None = None) -> HttpResponse:
+    """Choose contestants, scenarios and experts; see the outlook; opening plans every pair.
+
+    Of a draft, with what was saved, and what of it is gone meanwhile.
+    """
+    rows = StudyDraft.objects.select_related("changed_by__person")
+    draft, posted = get_object_or_404(rows, code=code) if code else None, request.POST
     entered = _read_form(posted) if posted else _initial(draft, request.GET.get("job", ""))
-    if (preset := posted.get("preset")) in PRESETS:
+    if (preset := posted.get("preset")) in plan.PRESETS:
         entered |= _quantities(preset)
     form = _form(entered)
     if KEEP in posted or PREVIEW in posted:
@@ -140,10 +129,10 @@ def _show(
         "draft": draft,
         "revision": revision,
         "missing": find_missing(draft) if draft else [],
-        "presets": PRESETS,
+        "presets": plan.PRESETS,
         "chosen": request.POST.get("preset", "" if request.POST or draft else USUAL),
         "estimate": estimate,
-        "compared": compare_votes(estimate) if estimate else [],
+        "compared": outlook.compare_votes(estimate) if estimate else [],
     }
     return render(request, "studies/new.html", context, status=status)
 
@@ -187,7 +176,7 @@ def _initial(draft: StudyDraft | None, job_code: str) -> dict[str, Any]:
 
 def _quantities(preset: str) -> dict[str, Any]:
     """Return a preset's quantities; no checks where none were drawn."""
-    return PRESETS[preset].quantities | ({} if usual_checks() else {"checks": 0.0})
+    return plan.PRESETS[preset].quantities | ({} if usual_checks() else {"checks": 0.0})
 
 
 @form_for(ADMIN)
@@ -201,7 +190,7 @@ def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = _form(draft.entered)
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
-            study = open_study(form.study_plan(), actor=get_user(request))
+            study = opening.open_study(form.study_plan(), actor=get_user(request))
             show_own_pictures(study, pairs=AHEAD)
             context = _first_pairs(study, draft) | {"draft": draft}
             shown = render(request, "studies/preview.html", context)
@@ -268,13 +257,13 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
     return render(request, "studies/votes.html", context, status=422 if form.errors else 200)
 
 
-def _import(form: VoteFileForm, actor: User) -> ImportedVotes:
+def _import(form: VoteFileForm, actor: User) -> importing.ImportedVotes:
     file: UploadedFile[bytes] = form.cleaned_data["file"]
     with TemporaryDirectory(prefix="arena-votes-") as folder:
         # The reader's errors name the file: as its sender called it, in plain letters.
         path = Path(folder) / (_ODD.sub("_", file.name or "")[-100:].lstrip(".") or "votes")
         path.write_bytes(file.read())
-        return import_votes(
+        return importing.import_votes(
             path=path,
             name=form.cleaned_data["name"],
             is_simulated=form.cleaned_data["is_simulated"],

@@ -17,30 +17,12 @@ from django.views.decorators.http import require_POST
 from arena.exports.formats import attach
 from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
-from arena.shell import sending
+from arena.shell import acts, pictures, sending
 from arena.shell.access import ADMIN, STAFF, act_for, allow_only, form_for, get_user, page_for
-from arena.shell.acts import (
-    WHY,
-    Confirmation,
-    ask,
-    is_sure,
-    is_typed,
-    refusals_told,
-    send_later,
-    tell_errors,
-    wait_for_workers,
-    wants_to_change,
-)
 from arena.shell.listing import read_listing, read_page
-from arena.shell.pictures import file_response
 from arena.studies import queries
 from arena.studies.forms import AuthorForm, HandOverForm
-from arena.studies.services.files import (
-    SHOWS_RESULTS,
-    ask_for_study_file,
-    newest_study_files,
-    why_not,
-)
+from arena.studies.services import files
 from arena.studies.services.opening import cancel_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, read_opened_plan
 from arena.studies.services.taking_part import hand_over
@@ -87,7 +69,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "line": line,
         "export": export,
-        **wait_for_workers(waits=export["is_waiting"] or bool(undrawn_pairs)),
+        **acts.wait_for_workers(waits=export["is_waiting"] or bool(undrawn_pairs)),
         "undrawn": undrawn_pairs,
         "undrawn_mb": math.ceil(undrawn_pairs * MB_PER_PAIR),
         "lines": lines,
@@ -127,7 +109,7 @@ def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Let others judge what an expert has not judged; asks first."""
     study = get_object_or_404(Study, code=code)
-    if wants_to_change(request):
+    if acts.wants_to_change(request):
         return None
     form = HandOverForm(
         request.POST,
@@ -135,10 +117,10 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
         takers=[user.username for user in experts()],
     )
     if not form.is_valid():
-        tell_errors(request, form)
+        acts.tell_errors(request, form)
         return None
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
-    if not is_sure(request):
+    if not acts.is_sure(request):
         question = study_question(
             study,
             f"Hand over what {giver} has not judged?",
@@ -146,7 +128,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
             f"{giver} no longer sees it; votes that were given stay. This can’t be taken back.",
             button="Hand over",
         )
-        return ask(request, question)
+        return acts.ask(request, question)
     taken = hand_over(study=study, username=giver, to=takers, actor=get_user(request))
     shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
     messages.success(request, f"Handed over: {shares}.")
@@ -157,37 +139,37 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
 def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Give the study up, without results; its name has to be typed."""
     study = get_object_or_404(Study, code=code)
-    if not is_typed(request, study.name):
+    if not acts.is_typed(request, study.name):
         if study.state != Study.State.OPEN:
             return redirect("study", code=code)
-        return ask(request, _cancelling(study))
-    with refusals_told(request):
-        cancel_study(study=study, why=request.POST.get(WHY, ""), actor=get_user(request))
+        (line,) = queries.count_progress([study])
+        question = study_question(
+            study,
+            f"Cancel the study “{study.name}”?",
+            "No more votes are taken, and nobody ever sees results. This can’t be taken back.",
+            f"Votes that stay and can be exported as votes: {line.voted}.",
+            "To end it with results, close it instead. Its settings can be used again for "
+            "another.",
+            button="Cancel the study",
+            phrase=study.name,
+            asks_why=True,
+        )
+        return acts.ask(request, question)
+    with acts.refusals_told(request):
+        cancel_study(study=study, why=request.POST.get(acts.WHY, ""), actor=get_user(request))
         messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)
 
 
-def _cancelling(study: Study) -> Confirmation:
-    (line,) = queries.count_progress([study])
-    return study_question(
-        study,
-        f"Cancel the study “{study.name}”?",
-        "No more votes are taken, and nobody ever sees results. This can’t be taken back.",
-        f"Votes that stay and can be exported as votes: {line.voted}.",
-        "To end it with results, close it instead. Its settings can be used again for another.",
-        button="Cancel the study",
-        phrase=study.name,
-        asks_why=True,
-    )
-
-
 def study_question(
     study: Study, title: str, *facts: str, button: str, **more: Any
-) -> Confirmation:
+) -> acts.Confirmation:
     """Return a question about an act on a study, to be asked before it is done."""
     back = reverse("study", args=[study.code])
     crumbs = (("Studies", reverse("studies")), (study.name, back))
-    return Confirmation(title=title, facts=facts, button=button, back=back, crumbs=crumbs, **more)
+    return acts.Confirmation(
+        title=title, facts=facts, button=button, back=back, crumbs=crumbs, **more
+    )
 
 
 # --- Files -------------------------------------------------------------------------------------
@@ -196,16 +178,16 @@ def study_question(
 def export_place(study: Study, user: User) -> dict[str, Any]:
     """Return the available exports: whether results may be read, and files with obstacles."""
     may_read = results_access(user=user, study=study) is ResultsAccess.FULL
-    rows, files = newest_study_files(study), []
-    for kind in SHOWS_RESULTS if is_imported(study) else StudyFile.Kind:
-        obstacle = why_not(study, kind)
-        if kind in SHOWS_RESULTS and not may_read:
+    rows, offered = files.newest_study_files(study), []
+    for kind in files.SHOWS_RESULTS if is_imported(study) else StudyFile.Kind:
+        obstacle = files.why_not(study, kind)
+        if kind in files.SHOWS_RESULTS and not may_read:
             obstacle = obstacle or "It shows results, which you have not opened."
-        files.append({"kind": kind, "row": rows.get(kind.value), "obstacle": obstacle})
+        offered.append({"kind": kind, "row": rows.get(kind.value), "obstacle": obstacle})
     return {
         "may_read": may_read,
         "is_imported": is_imported(study),
-        "files": files,
+        "files": offered,
         "is_waiting": any(row.is_waiting for row in rows.values()),
     }
 
@@ -215,9 +197,9 @@ def export_place(study: Study, user: User) -> dict[str, Any]:
 def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     """Leave a file to a worker; twice does no harm."""
     study = _study_for(request, code, kind)
-    with refusals_told(request), transaction.atomic():
-        row = ask_for_study_file(study=study, kind=kind, actor=get_user(request))
-        send_later(request, sending.send_study_file, row.pk)
+    with acts.refusals_told(request), transaction.atomic():
+        row = files.ask_for_study_file(study=study, kind=kind, actor=get_user(request))
+        acts.send_later(request, row)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     if is_imported(study):
         return redirect("results", code=code)
@@ -227,8 +209,8 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
 @page_for(*STAFF)
 def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
     """The newest one, once it is ready."""
-    row = newest_study_files(_study_for(request, code, kind)).get(kind)
-    return file_response(row if row and row.state == StudyFile.State.READY else None)
+    row = files.newest_study_files(_study_for(request, code, kind)).get(kind)
+    return pictures.file_response(row if row and row.state == StudyFile.State.READY else None)
 
 
 def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
@@ -237,6 +219,6 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     if kind not in StudyFile.Kind.values:
         raise Http404
     access = results_access(user=get_user(request), study=study)
-    if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
+    if kind in files.SHOWS_RESULTS and access is not ResultsAccess.FULL:
         raise PermissionDenied
     return study

@@ -121,15 +121,6 @@ def draft_like(*, study: Study, actor: User | None = None) -> StudyDraft:
     return keep_draft(entered=entered, actor=actor)
 
 
-def rename_in_drafts(known_as: str, name: str) -> None:
-    """Replace the name of an account in the drafts that choose it."""
-    for draft in StudyDraft.objects.select_for_update().order_by("pk"):
-        chosen = draft.names_in("experts")
-        if known_as in chosen:
-            draft.entered["experts"] = [name if entry == known_as else entry for entry in chosen]
-            draft.save(update_fields=["entered"])
-
-
 def _as_entered(name: str, value: Any) -> Any:
     """Return a value of a plan as somebody enters it."""
     if name in SWITCHES or name in NAMES:

@@ -26,15 +26,10 @@ from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.vote_columns import VERSION as VOTES_VERSION
 from arena.studies.services.plan import SWITCH_COLUMNS, SWITCH_RULES, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
-from arena.voting.services import pictures
-from arena.voting.services.pictures import Cells
-from arena.voting.services.practice import OF_LINKS, has_practice
+from arena.voting.services import pictures, practice
 from augment.errors import Conflict, check_names
 from augment.models import Contestant, Scenario
-from augment.services import check_prose, log_change, one_line
-from augment.services.endpoints import read_options
-from augment.services.judging import ALIKE, alike_pairs
-from augment.services.running import find_job
+from augment.services import check_prose, endpoints, judging, log_change, one_line, running
 
 PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
@@ -75,7 +70,10 @@ def open_study(
             missing.
     """
     name = _check_new(study_plan)
-    contestants, scenarios = _contestants(study_plan), _scenarios(study_plan)
+    rateable = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+    by_slug = {row.slug: row for row in rateable}
+    contestants = find_named("contestant", study_plan.contestants, by_slug)
+    scenarios = _scenarios(study_plan)
     accounts = {user.username: user for user in expert_accounts()}
     experts = find_named("expert", study_plan.experts, accounts)
     has_simulated = _check_simulated(study_plan, contestants, experts)
@@ -84,7 +82,7 @@ def open_study(
         scenarios,
         seed=study_plan.seed,
         rule=study_plan.samples,
-        jobs=[find_job(job) for job in study_plan.jobs],
+        jobs=[running.find_job(job) for job in study_plan.jobs],
         challengers=challengers,
         jobs_of=jobs_of or {},
     )
@@ -135,11 +133,6 @@ def check_questions(questions: Sequence[str]) -> None:
         )
 
 
-def _contestants(study_plan: StudyPlan) -> list[Contestant]:
-    rateable = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-    return find_named("contestant", study_plan.contestants, {row.slug: row for row in rateable})
-
-
 def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
     by_slug = {row.slug: row for row in Scenario.objects.only("slug")}
     chosen = find_named("scenario", study_plan.scenarios, by_slug)
@@ -171,11 +164,11 @@ def _check_simulated(
 
 def _rules(
     study_plan: StudyPlan,
-    cells: Cells,
+    cells: pictures.Cells,
     scenarios: list[Scenario],
     experts: list[User],
     challengers: tuple[str, ...],
-) -> tuple[PlanRules, Cells, list[Triple]]:
+) -> tuple[PlanRules, pictures.Cells, list[Triple]]:
     """Return the planner's rules, the pictures of checks, and alike pairs that are shown."""
     entries = tuple(
         Entry(scenario=scenario, contestant=contestant, picture=cell.image, sample=cell.sample)
@@ -184,14 +177,14 @@ def _rules(
     shares = study_plan.shares
     check_share(ATTENTION_CHECKS, shares["check_share"], MOST_CHECKS)
     checks: tuple[Check, ...] = ()
-    broken: Cells = {}
+    broken: pictures.Cells = {}
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
         shows_all = study_plan.samples is pictures.SampleRule.ALL
         checks, broken = pictures.check_pictures(scenarios, shows_all=shows_all)
         pictures.require_checks(checks, wanted=wanted)
     alike = [
         triple
-        for triple in (() if study_plan.show_alike else alike_pairs(cells))
+        for triple in (() if study_plan.show_alike else judging.alike_pairs(cells))
         if not challengers or not set(challengers).isdisjoint(triple[1:])
     ]
     alike_shown = draw_shown(alike, entries, seed=study_plan.seed)
@@ -224,7 +217,7 @@ def _frozen(
         "scenario_gap_kept": planned.scenario_gap,
         "identical": [list(triple) for triple in planned.identical],
         "alike_shown": [list(pair) for pair in alike_shown],
-        "alike_within": ALIKE,
+        "alike_within": judging.ALIKE,
         "windows": "pair",
         # Kept where it departs from the default, so that the settings can be used again.
         **{name: True for name in SWITCH_RULES if getattr(study_plan, name)},
@@ -239,8 +232,8 @@ def _insert(
     name: str, frozen: dict[str, Any], study_plan: StudyPlan, rules: PlanRules, has_simulated: bool
 ) -> Study:
     switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
-    if practises := study_plan.practice and has_practice():
-        frozen["practice_for"] = OF_LINKS
+    if practises := study_plan.practice and practice.has_practice():
+        frozen["practice_for"] = practice.OF_LINKS
     try:
         with transaction.atomic():
             return Study.objects.create(
@@ -315,7 +308,7 @@ def _preregistration(study: Study) -> dict[str, Any]:
 
 def _contestant_document(row: Contestant) -> dict[str, Any]:
     names = ("slug", "name", "kind", "variant", "model", "roles")
-    options = read_options(row).to_document() if row.endpoint else None
+    options = endpoints.read_options(row).to_document() if row.endpoint else None
     return {name: getattr(row, name) for name in names} | {"options": options}
 
 

@@ -18,10 +18,8 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from arena.models.studies import one_question
+from arena.rating import models, ranking, sandwich
 from arena.rating.comparisons import LEVEL, FloatArray, t_quantile
-from arena.rating.models import ELO_PER_LOGIT
-from arena.rating.ranking import CAUTION
-from arena.rating.sandwich import MOST_PRIOR
 from arena.studies.services.plan import QUANTITIES
 
 COMPARED = (0.5, 1.0, 2.0, 4.0)
@@ -161,15 +159,15 @@ def _predict_spread(estimate: StudyEstimate) -> tuple[FloatArray, float, float]:
     largest = float(covariance.diagonal().max())
     variance = float(single.diagonal().max()) + added * (1.0 - 1.0 / size)
     own = clusters - 1.0
-    degrees = np.maximum(np.minimum(MOST_PRIOR + own, own * (size - 1.0)), 1.0)
-    chance = (2.0 * (own / (own + MOST_PRIOR) * variance / largest) ** 2 / own).sum()
+    degrees = np.maximum(np.minimum(sandwich.MOST_PRIOR + own, own * (size - 1.0)), 1.0)
+    chance = (2.0 * (own / (own + sandwich.MOST_PRIOR) * variance / largest) ** 2 / own).sum()
     return covariance, max(largest**2 / float((variance**2 / degrees).sum()), 1.0), float(chance)
 
 
 @lru_cache(maxsize=4)
 def _covariance_of_a_vote(size: int, spread: float, ties: float) -> FloatArray:
     """Return (C, C) squared points: H^-1 B H^-1 of a balanced plan with one vote in all."""
-    ratings = np.linspace(0.0, spread, size) / ELO_PER_LOGIT
+    ratings = np.linspace(0.0, spread, size) / models.ELO_PER_LOGIT
     expected = 1.0 / (1.0 + np.exp(ratings[:, None] - ratings[None, :]))
     off_diagonal = ~np.eye(size, dtype=np.bool_)
     chance_of_tie = np.minimum(expected, 1.0 - expected)
@@ -179,7 +177,7 @@ def _covariance_of_a_vote(size: int, spread: float, ties: float) -> FloatArray:
     surprise = np.where(off_diagonal, information - chance_of_tie / 4.0 / pairs, 0.0)
     curvature, squares = (np.diag(w.sum(axis=1)) - w for w in (information, surprise))
     inverse = np.linalg.pinv(curvature, rcond=1e-9, hermitian=True)
-    return np.asarray(inverse @ squares @ inverse * ELO_PER_LOGIT**2)
+    return np.asarray(inverse @ squares @ inverse * models.ELO_PER_LOGIT**2)
 
 
 def _uneven(estimate: StudyEstimate, per_cluster: float) -> float:
@@ -213,7 +211,7 @@ def _gap_found(estimate: StudyEstimate, covariance: FloatArray, degrees: float) 
     gap = 0.0
     for _ in range(20):  # the gap says which pairs are closer, and these say the gap
         closer = max(int((estimate.gaps <= gap + 1e-6).sum()), estimate.contestants - 1)
-        limit = float(t_quantile(degrees, 1.0 - (1.0 - LEVEL) / CAUTION / closer / 2.0))
+        limit = float(t_quantile(degrees, 1.0 - (1.0 - LEVEL) / ranking.CAUTION / closer / 2.0))
         before, gap = gap, (limit + float(ndtri(estimate.power / 100))) * error
         if abs(gap - before) < 0.01:
             break

@@ -15,15 +15,7 @@ from arena.models import Matchup, Study
 from arena.pairing.later import GridUnit, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, sample_place, scenario_at
-from arena.voting.services.pictures import (
-    Cells,
-    Showing,
-    check_pictures,
-    find_showable,
-    frames_shown,
-    with_picture,
-    without_lost_checks,
-)
+from arena.voting.services import pictures
 from augment.models import Augmentation
 from augment.services.scenarios import camera_key
 
@@ -51,21 +43,25 @@ def frozen_rules(study: Study) -> PlanRules:
     )
 
 
-def frozen_pictures(study: Study) -> Cells:
+def frozen_pictures(study: Study) -> pictures.Cells:
     """Return the pictures that the study was opened with, whatever was drawn since."""
     rules = frozen_rules(study)
     wanted = {(entry.scenario, entry.contestant): entry for entry in rules.entries}
     scenarios = list(study.scenarios.only("slug"))
     shows_all = study.shows_all_samples
-    _, cells = check_pictures(scenarios, shows_all=shows_all)
-    rows = find_showable(scenarios).filter(contestant__in=study.contestants.all()).order_by("pk")
+    _, cells = pictures.check_pictures(scenarios, shows_all=shows_all)
+    rows = (
+        pictures.find_showable(scenarios)
+        .filter(contestant__in=study.contestants.all())
+        .order_by("pk")
+    )
     for row in rows:
         slug = row.scenario.slug
         cell = (sample_place(slug, row.sample) if shows_all else slug, row.contestant.slug)
         entry = wanted.get(cell)
         if entry is None or entry.sample != row.sample:
             continue
-        if shown := with_picture(row, partial(eq, entry.picture)):
+        if shown := pictures.with_picture(row, partial(eq, entry.picture)):
             cells[cell] = shown
     return cells
 
@@ -111,7 +107,7 @@ def list_planned(study: Study) -> dict[str, list[PlannedMatchup]]:
 def store(
     study: Study,
     planned: Sequence[PlannedMatchup],
-    cells: Cells,
+    cells: pictures.Cells,
     experts: Iterable[User],
     *,
     batch: int = 0,
@@ -129,7 +125,7 @@ def store(
     by_name = {expert.username: expert for expert in experts}
     named = {scenario_at(pair.scenario) for pair in planned}
     earlier = _find_earlier(study, named) if batch else {}
-    frames = frames_shown(study, named) if batch else {}
+    frames = pictures.frames_shown(study, named) if batch else {}
     sides = [
         (cells[pair.scenario, pair.left], cells[pair.scenario, pair.right]) for pair in planned
     ]
@@ -167,11 +163,13 @@ def store(
     Matchup.objects.bulk_create([row for row, _ in again], batch_size=500)
 
 
-def _find_earlier(study: Study, scenarios: Iterable[str]) -> dict[tuple[int, int], Showing]:
+def _find_earlier(
+    study: Study, scenarios: Iterable[str]
+) -> dict[tuple[int, int], pictures.Showing]:
     """Return what the study shows already, by left and right side, either way round."""
     columns = ("left", "right", "left_image", "right_image", "original_image", "view")
     drawn = study.matchups.filter(scenario__slug__in=scenarios, view__has_key="px_per_m")
-    found: dict[tuple[int, int], Showing] = {}
+    found: dict[tuple[int, int], pictures.Showing] = {}
     for left, right, *images, original, view in drawn.values_list(*columns):
         for sides, names in (((left, right), images), ((right, left), images[::-1])):
             shown = dict(zip(("left_image", "right_image"), names, strict=True))
@@ -191,7 +189,7 @@ class Planning:
 
     study: Study
     number: int
-    cells: Cells
+    cells: pictures.Cells
     rules: PlanRules
     grid: Grid
     rng: np.random.Generator
@@ -200,7 +198,7 @@ class Planning:
     def begin(cls, study: Study) -> Self:
         """Return the next planning of a study."""
         cells = frozen_pictures(study)
-        rules = without_lost_checks(frozen_rules(study), cells)
+        rules = pictures.without_lost_checks(frozen_rules(study), cells)
         number = (study.matchups.aggregate(last=Max("batch"))["last"] or 0) + 1
         rng = np.random.default_rng([rules.seed, number])
         return cls(study=study, number=number, cells=cells, rules=rules, grid=rules.grid, rng=rng)

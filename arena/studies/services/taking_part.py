@@ -9,17 +9,17 @@ from typing import Any
 from axes.models import AccessAttempt, AccessFailureLog, AccessLog
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import QuerySet
 from django.utils import timezone
 from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
-from arena.models import EnrolledVoter, Enrolment, Matchup, Person, Study
+from arena.models import EnrolledVoter, Enrolment, Matchup, Person, Study, StudyDraft
 from arena.pairing.later import choose_for_newcomer, deal, judges, main_units
 from arena.people import services
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name, may_be_let_in
 from arena.studies.queries import expert_named, find_silent, find_unfinished
-from arena.studies.services.drafts import rename_in_drafts
 from arena.studies.services.opening import find_named
 from arena.studies.services.planning import Planning, list_planned
 from augment.errors import Conflict
@@ -307,22 +307,24 @@ def forget_identity(*, user: User, actor: User) -> None:
     user.set_unusable_password()
     services.end_links(user)
     Person.objects.filter(user=user).update(pseudonym=f"Former person {name[5:]}", preferences={})
-    _rename_in_plans(known_as, name)  # locks the studies, which comes before what is in them
+    # Locks the studies, which comes before what is in them.
+    _rename_expert(Study.objects.all(), "rules", known_as, name)
     give_up_places(expert=user, actor=actor)
     EnrolledVoter.objects.filter(expert=user).update(
         external_id="", platform_study="", platform_session=""
     )
-    rename_in_drafts(known_as, name)
+    _rename_expert(StudyDraft.objects.all(), "entered", known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()
     services.end_sessions(services.SIGNED_IN, {str(user.pk)})
     log_change(user.person, "forget identity", actor)
 
 
-def _rename_in_plans(known_as: str, name: str) -> None:
-    """Replace a name in the rules of studies."""
-    for study in Study.objects.select_for_update().order_by("pk"):
-        experts = study.rules.get("experts", [])
+def _rename_expert(rows: QuerySet[Any], column: str, known_as: str, name: str) -> None:
+    """Replace a name among the experts that documents in a column choose."""
+    for row in rows.select_for_update().order_by("pk"):
+        document = getattr(row, column)
+        experts = document.get("experts", [])
         if known_as in experts:
-            study.rules["experts"] = [name if entry == known_as else entry for entry in experts]
-            study.save(update_fields=["rules"])
+            document["experts"] = [name if entry == known_as else entry for entry in experts]
+            row.save(update_fields=[column])

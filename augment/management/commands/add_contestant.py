@@ -5,13 +5,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 from django.db import transaction
 
-from augment.services.endpoints.contestants import (
-    OPTION_INPUTS,
-    ContestantRequest,
-    add_contestant,
-    ensure_builtin,
-    list_unsent_options,
-)
+from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.inputs import add_options, read_request, read_values, to_inputs
 from augment.services.terminal import TerminalCommand
@@ -31,14 +25,14 @@ class Command(TerminalCommand):
 
     def add_arguments(self, parser: CommandParser) -> None:
         """The contestant, and what a new endpoint needs."""
-        add_options(parser, to_inputs(ContestantRequest))
+        add_options(parser, to_inputs(contestants.ContestantRequest))
         for role in ROLES:
             parser.add_argument(
                 f"--{role}",
                 metavar="MODEL[@ENDPOINT]",
                 help=f"who plays the {role}, where the variant has one; default: the model itself",
             )
-        add_options(parser.add_argument_group("how it asks"), OPTION_INPUTS)
+        add_options(parser.add_argument_group("how it asks"), contestants.OPTION_INPUTS)
         inputs = [field for field in to_inputs(EndpointRequest) if field.name in OF_ENDPOINTS]
         group = parser.add_argument_group("a new endpoint")
         add_options(group, inputs, is_any_required=False)
@@ -46,18 +40,21 @@ class Command(TerminalCommand):
     @transaction.atomic
     def handle(self, *args: Any, **options: Any) -> None:
         """Make endpoint and contestant, or neither of them."""
-        ensure_builtin()
+        contestants.ensure_builtin()
         if options["base_url"]:
             ensure_endpoint(read_request(EndpointRequest, options, label=options["endpoint"]))
         elif options["key_variable"] or options["is_simulated"]:
             raise CommandError("--key-variable and --simulated need --base-url.")
         roles = {role: _seat(options[role]) for role in ROLES if options[role]}
         request = read_request(
-            ContestantRequest, options, roles=roles, options=read_values(OPTION_INPUTS, options)
+            contestants.ContestantRequest,
+            options,
+            roles=roles,
+            options=read_values(contestants.OPTION_INPUTS, options),
         )
-        row = add_contestant(request)
+        row = contestants.add_contestant(request)
         self.stdout.write(f"{row.slug}: {row.name} ({row.kind})")
-        for role, names in list_unsent_options(row).items():
+        for role, names in contestants.list_unsent_options(row).items():
             self.stderr.write(f"Not sent, as the {role}'s model refuses it: {', '.join(names)}.")
 
 

@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from augment.benchmark.folder import checksum, read_folder
-from augment.benchmark.report import describe_report
-from augment.benchmark.submission import check_submission
+from augment.benchmark import folder, report, submission
 from augment.services.terminal import TerminalCommand
 
 
@@ -27,9 +25,9 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each task and sample, and the summary."""
-        benchmark = read_folder(options["benchmark"])
-        digest = checksum(benchmark)
-        for line in describe_report(
-            check_submission(benchmark, options["submission"], checksum=digest)
+        benchmark = folder.read_folder(options["benchmark"])
+        digest = folder.checksum(benchmark)
+        for line in report.describe_report(
+            submission.check_submission(benchmark, options["submission"], checksum=digest)
         ):
             self.stdout.write(line)

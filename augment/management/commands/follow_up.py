@@ -1,14 +1,12 @@
 """Have a language model change its own answer further, and on demand wait for it."""
 
+from functools import partial
 from typing import Any
 
-from django.db import transaction
-
-from augment.management.waiting import WAITING, wait_if_asked
+from augment.management.waiting import WAITING, keep_and_enqueue, wait_if_asked
 from augment.services.inputs import read_request
 from augment.services.running.follow_ups import FollowUpRequest, ask_follow_up, find_augmentation
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_augmentation
 
 
 class Command(TerminalCommand):
@@ -25,9 +23,7 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, then wait if asked to."""
         answer = find_augmentation(options["augmentation"])
-        check_broker()
-        with transaction.atomic():
-            row = ask_follow_up(answer, read_request(FollowUpRequest, options))
-            transaction.on_commit(lambda: enqueue_augmentation(row.pk))
+        request = read_request(FollowUpRequest, options)
+        row = keep_and_enqueue(partial(ask_follow_up, answer, request))
         self.stdout.write(f"Augmentation {row.code} of {row.scenario.slug} waits.")
         wait_if_asked(self, row.job, options)

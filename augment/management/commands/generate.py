@@ -1,23 +1,19 @@
 """Launch a generation job and, on demand, wait for its end."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from django.core.management.base import CommandParser
-from django.db import transaction
 from django.utils import timezone
 
-from augment.management.waiting import WAITING, wait_if_asked
+from augment.management.waiting import WAITING, keep_and_enqueue, wait_if_asked
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.inputs import add_options, read_request, to_inputs
-from augment.services.running import jobs
-from augment.services.running.choosing import resolve_contestants
-from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
-from augment.services.running.jobs import JobRequest
+from augment.services.running import choosing, estimates, jobs
 from augment.services.running.progress import count_rows
 from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_job
 
 
 class Command(TerminalCommand):
@@ -31,7 +27,7 @@ class Command(TerminalCommand):
 
     def add_arguments(self, parser: CommandParser) -> None:
         """Add the contestants, the scenarios, and whether to wait."""
-        for field in to_inputs(JobRequest):
+        for field in to_inputs(jobs.JobRequest):
             add_options(parser, [replace(field, default="") if field.name == "name" else field])
         parser.add_argument(
             "--estimate", action="store_true", help="say what it would use, and launch nothing"
@@ -44,21 +40,18 @@ class Command(TerminalCommand):
         ensure_builtin()
         values = options | {
             "name": options["name"] or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC",
-            "contestants": resolve_contestants(options["contestants"]),
+            "contestants": choosing.resolve_contestants(options["contestants"]),
             "scenarios": resolve_scenarios(options["scenarios"]),
         }
-        request = read_request(JobRequest, values)
+        request = read_request(jobs.JobRequest, values)
         if options["estimate"]:
-            self._say(estimate(request))
+            self._say(estimates.estimate(request))
             return
-        check_broker()
-        with transaction.atomic():
-            job = jobs.launch(request)
-            transaction.on_commit(lambda: enqueue_job(job.pk))
+        job = keep_and_enqueue(partial(jobs.launch, request))
         self.stdout.write(f"Job {job.code}, {job.name!r}: {count_rows(job).total} to run.")
         wait_if_asked(self, job, options)
 
-    def _say(self, expected: JobEstimate) -> None:
+    def _say(self, expected: estimates.JobEstimate) -> None:
         self.stdout.write(f"{expected.rows} to run, {expected.asking_rows} of them ask models.")
         for line in expected.lines:
             self.stdout.write(f"{line.slug}: {_use(line)} ({line.seen} earlier runs)")
@@ -66,7 +59,7 @@ class Command(TerminalCommand):
             self.stdout.write(f"In all: {_use(expected)}, {len(expected.unpriced)} unknown")
 
 
-def _use(expected: JobEstimate | ContestantEstimate) -> str:
+def _use(expected: estimates.JobEstimate | estimates.ContestantEstimate) -> str:
     least, usual, most = expected.calls
     if expected.usd is None:
         return f"calls {usual} expected ({least} to {most}), cost unknown"

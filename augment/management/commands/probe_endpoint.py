@@ -5,9 +5,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.llm.questions import Ability
-from augment.services.endpoints.known_endpoints import find_endpoint
-from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.probing import probe
+from augment.services.endpoints import known_endpoints, known_models, probing
 from augment.services.terminal import TerminalCommand
 
 _WORDS = {True: "yes", False: "no", None: "unknown"}
@@ -28,8 +26,8 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, print a line for each question and fail where nobody answers."""
-        endpoint = find_endpoint(options["label"])
-        report = probe(model_at(endpoint=endpoint, model=options["model"]))
+        endpoint = known_endpoints.find_endpoint(options["label"])
+        report = probing.probe(known_models.model_at(endpoint=endpoint, model=options["model"]))
         for finding in report.findings:
             self.stdout.write(
                 f"{finding.ability:14}{_WORDS[finding.has_it]:9}{finding.note}".rstrip()

@@ -1,16 +1,13 @@
 """Let a job that is paused or stopped at its cap go on."""
 
+from functools import partial
 from typing import Any
 
-from django.db import transaction
-
+from augment.management.waiting import keep_and_enqueue
 from augment.services.inputs import read_request
+from augment.services.running import choosing, jobs, progress
 from augment.services.running.budget import Caps, describe_caps
-from augment.services.running.choosing import find_job
-from augment.services.running.jobs import resume
-from augment.services.running.progress import count_rows
 from augment.services.terminal import TerminalCommand
-from augment.tasks import check_broker, enqueue_job
 
 
 class Command(TerminalCommand):
@@ -26,10 +23,7 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Raise what is given, then resume."""
-        job = find_job(options["job"])
-        check_broker()
-        with transaction.atomic():
-            resume(job, higher=read_request(Caps, options))
-            transaction.on_commit(lambda: enqueue_job(job.pk))
-        waiting = count_rows(job).queued
+        job = choosing.find_job(options["job"])
+        keep_and_enqueue(partial(jobs.resume, job, higher=read_request(Caps, options)))
+        waiting = progress.count_rows(job).queued
         self.stdout.write(f"Job {job.code}, capped at {describe_caps(job)}: {waiting} to run.")

@@ -6,7 +6,6 @@ of them stays; rows that changed nevertheless no longer fit its checksum, and wh
 
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 from uuid import UUID
@@ -31,7 +30,7 @@ from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios import scenes
 from augment.services.scenarios.choosing import resolve_scenarios
-from augment.services.texts import SLUG_LENGTH, check_slug, free_slug, one_line
+from augment.services.texts import SLUG_LENGTH, check_slug, free_slug, one_line, read_code
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,8 +242,8 @@ def find_benchmark(name_or_code: str) -> Benchmark:
         wanted = {"pk": None}
     else:
         wanted["retired_at"] = None
-    with suppress(ValueError):  # most names are not codes
-        wanted = {"code": UUID(name_or_code)}
+    if (code := read_code(name_or_code)).int:  # most names are not codes
+        wanted = {"code": code}
     row = Benchmark.objects.filter(**wanted).order_by("-version").first()
     if row is None:
         raise UnknownName("benchmark", name_or_code, list(map(str, Benchmark.objects.all())))

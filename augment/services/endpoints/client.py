@@ -229,7 +229,10 @@ def _wait_for_place(endpoint: Endpoint, queue: Queue) -> uuid.UUID:
     while not isinstance(place, uuid.UUID):
         queue.still_wanted()
         if time.monotonic() > give_up_at:
-            raise EndpointBusy(endpoint.label, queue.longest_s)
+            raise EndpointBusy(
+                f"no place was free at endpoint {endpoint.label!r} for {queue.longest_s:g} s: "
+                "raise its limits or run fewer workers"
+            )
         backoff_s = min(2.0 * backoff_s, _LONGEST_WAIT_S)
         shortest_s = min(max(place, 0.5 * backoff_s), _LONGEST_WAIT_S)
         queue.sleep(shortest_s + 0.5 * backoff_s * queue.rng.random())

@@ -17,9 +17,7 @@ from django.db.models import Exists, OuterRef
 
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict, InvalidDocument, ModelFault, ParameterRefused
-from augment.llm.client import ModelProfile
-from augment.llm.costs import Price
-from augment.llm.messages import LengthName, SchemaForm
+from augment.llm import client, costs, messages
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints.known_endpoints import find_endpoint
@@ -189,7 +187,7 @@ class Respondent:
         return read_facts(endpoint=self.endpoint, model=self.model)
 
     @property
-    def price(self) -> Price | None:
+    def price(self) -> costs.Price | None:
         """Price of the model there, None where it is unknown."""
         return find_price(self.facts)
 
@@ -205,10 +203,10 @@ class Treatment:
 
     contestant_pk: int
     respondents: Mapping[ModelRole, Respondent]
-    profiles: Mapping[ModelRole, ModelProfile]
+    profiles: Mapping[ModelRole, client.ModelProfile]
     options: ContestantOptions
 
-    def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
+    def at(self, endpoint: Endpoint) -> dict[str, client.ModelProfile]:
         """Return by model what it sends to an endpoint."""
         return {
             respondent.model: self.profiles[role]
@@ -219,7 +217,7 @@ class Treatment:
     @transaction.atomic
     def without(
         self, refused: ParameterRefused, *, endpoint: Endpoint, model: str
-    ) -> ModelProfile:
+    ) -> client.ModelProfile:
         """Return the profile from now on of a model that refuses one parameter.
 
         Raises:
@@ -237,7 +235,7 @@ class Treatment:
             request__has_key=parameter,
         )
         # Whether the limit of the answer's length has the one name or the other changes nothing.
-        if parameter not in frozenset(LengthName) and answers.exists():
+        if parameter not in frozenset(messages.LengthName) and answers.exists():
             raise ModelFault(
                 f"{model} at endpoint {endpoint.label} does not take {parameter!r} any "
                 "more, and this contestant's earlier answers were made with it; add another "
@@ -246,7 +244,7 @@ class Treatment:
                 status=refused.status,
             ) from None
         row = Contestant.objects.select_for_update(no_key=True).get(pk=self.contestant_pk)
-        sends, profile = dict(row.sends or {}), ModelProfile()
+        sends, profile = dict(row.sends or {}), client.ModelProfile()
         for role in roles:
             profile = _parse_profile(sends[role.value]).without(parameter)
             sends[role.value] = _profile_document(profile)
@@ -441,11 +439,11 @@ def _complete_options(contestant: Contestant) -> ContestantOptions:
     )
 
 
-def _profile_document(profile: ModelProfile) -> dict[str, Any]:
+def _profile_document(profile: client.ModelProfile) -> dict[str, Any]:
     """Return the part of a profile that changes requests."""
-    sent = SAMPLING | frozenset(LengthName) | frozenset(SchemaForm)
+    sent = SAMPLING | frozenset(messages.LengthName) | frozenset(messages.SchemaForm)
     return asdict(profile) | {"refused": sorted(profile.refused & sent)}
 
 
-def _parse_profile(document: Mapping[str, Any]) -> ModelProfile:
-    return ModelProfile(**{**document, "refused": frozenset(document["refused"])})
+def _parse_profile(document: Mapping[str, Any]) -> client.ModelProfile:
+    return client.ModelProfile(**{**document, "refused": frozenset(document["refused"])})

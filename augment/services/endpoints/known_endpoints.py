@@ -270,10 +270,13 @@ def read_key(endpoint: Endpoint) -> str | None:
     if not variable:
         return None
     if obstacle := find_key_obstacle(variable, endpoint.base_url):
-        raise KeyNotAllowed(endpoint.label, obstacle)
+        raise KeyNotAllowed(f"The key of endpoint {endpoint.label!r} is not sent: {obstacle}.")
     key = os.environ.get(variable, "").strip()
     if not key:
-        raise KeyMissing(variable, endpoint.label)
+        raise KeyMissing(
+            f"The environment variable {variable}, which holds the key of endpoint "
+            f"{endpoint.label!r}, is not set where the worker runs."
+        )
     return key
 
 

@@ -21,13 +21,11 @@ from augment.llm.messages import LengthName, Reply, Request, SchemaForm, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.llm.vendors import says
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
+from augment.services import events, texts, work
 from augment.services.endpoints.client import Queue, place_at, wire_to
 from augment.services.endpoints.contestants import SAMPLING
 from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, check_facts
 from augment.services.endpoints.known_models import TEMPERATURE, find_price, model_at
-from augment.services.events import log_change
-from augment.services.texts import make_document_storable, one_line
-from augment.services.work import Lease, Settlement, WorkKind
 
 ABILITIES = tuple(ability.value for ability in Ability)
 """What is asked about, in this order."""
@@ -126,11 +124,11 @@ def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> P
         InvalidDocument: The model id can't be used.
         Conflict: The endpoint has it already.
     """
-    model = one_line("model", model, what="endpoint")
+    model = texts.one_line("model", model, what="endpoint")
     if endpoint.models.filter(model=model).exists():
         raise Conflict(f"{endpoint.label} has the model {model} already.")
     row = model_at(endpoint=endpoint, model=model)
-    log_change(row, "add", actor, after={"model": model, "endpoint": endpoint.label})
+    events.log_change(row, "add", actor, after={"model": model, "endpoint": endpoint.label})
     return plan_probe(row, actor=actor)
 
 
@@ -188,7 +186,7 @@ def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:
         raise Conflict(f"{model.model} is being probed already; wait for its end.") from None
 
 
-class Probes(WorkKind[Probe]):
+class Probes(work.WorkKind[Probe]):
     """Probes that somebody asked for; what each question showed stands in the row at once."""
 
     model = Probe
@@ -196,16 +194,16 @@ class Probes(WorkKind[Probe]):
     lost_limit = 1  # it may have been paid for
     related = ("model__endpoint", "asked_by")
 
-    def run(self, row: Probe, held: Lease[Probe]) -> Settlement:
+    def run(self, row: Probe, held: work.Lease[Probe]) -> work.Settlement:
         """Ask every question."""
 
         def keep(finding: ProbeFinding) -> None:
-            row.findings.append(make_document_storable(asdict(finding)))
+            row.findings.append(texts.make_document_storable(asdict(finding)))
             held.note(findings=row.findings)
 
         row.findings = []
         probe(row.model, actor=row.asked_by, on_finding=keep)
-        return Settlement(state=Probe.State.DONE)
+        return work.Settlement(state=Probe.State.DONE)
 
 
 PROBES = Probes()
@@ -312,13 +310,13 @@ def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
     abilities = {ability.value: report.has(ability) for ability in _STORED}
     changes: dict[str, Any] = {
         "probed_at": report.probed_at,
-        "probe_report": make_document_storable(document),
+        "probe_report": texts.make_document_storable(document),
         **{name: has_it for name, has_it in abilities.items() if has_it is not None},
     }
     if report.has(Ability.ANSWERS):
         changes["refused_parameters"] = report.refused
     EndpointModel.objects.filter(pk=row.pk).update(**changes)
-    log_change(
+    events.log_change(
         row,
         "probe",
         actor,

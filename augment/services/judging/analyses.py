@@ -29,7 +29,6 @@ Answers = Mapping[str, Sequence[MeasuredRow]]
 
 SEED = 2026
 """Of the bootstrap."""
-MISSES = (State.UNREADABLE, State.REFUSED)
 _ROW_MEASURES: tuple[Measure[Any], ...] = (REALISM, WISHES, DISTANCES, FINDINGS)
 _PAIRS = TypeAdapter(tuple[paired.PairedComparison, ...])
 _COMPARED = tuple(field.name for field in fields(paired.PairedComparison))[2:]
@@ -225,7 +224,9 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> Row:
     for line in lines:
         by_sample[line.row.sample].append(line)
     samples = [by_sample[number] for number in sorted(by_sample)]
-    missed = [fmean(line.row.state in MISSES for line in sample) for sample in samples]
+    missed = [
+        fmean(line.row.state in Augmentation.MISSES for line in sample) for sample in samples
+    ]
     row = {
         **_who(lines[0].row),
         "samples": len(samples),

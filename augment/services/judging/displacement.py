@@ -23,7 +23,7 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.scene.motion import HORIZON_S as HORIZON_S
-from augment.services.judging.measures import Measure, rows_by_scenario
+from augment.services.judging.measures import Measure, read_change, rows_by_scenario
 from augment.services.scenarios.scenes import LoadedScenario
 from augment.variants.recipes import SPELLING, spell_variant
 
@@ -174,7 +174,7 @@ def list_objects(job: GenerationJob) -> Iterator[dict[str, Any]]:
             continue
         wanted, placed = (
             {agent.id: agent for agent in change.changed} if change else {}
-            for change in (_read(entry.row.scenario.reference), _read_answer(entry.row))
+            for change in (read_change(entry.row.scenario.reference), _read_answer(entry.row))
         )
         distance = entry.displacement
         wish_m = (
@@ -270,7 +270,7 @@ def _compute(ids: Collection[int]) -> dict[int, Distance]:
 
 
 def _measure_row(row: Augmentation, loaded: LoadedScenario) -> Distance:
-    reference, answer, before = _read(row.scenario.reference), _read_answer(row), row.follows
+    reference, answer, before = read_change(row.scenario.reference), _read_answer(row), row.follows
     if row.scenario.is_open:
         return Distance(why_not=MissingReason.OPEN_WISH)
     if reference is None:
@@ -283,7 +283,7 @@ def _measure_row(row: Augmentation, loaded: LoadedScenario) -> Distance:
     except (InvalidDocument, InvalidModification):
         return Distance(why_not=MissingReason.UNFIT_MOTION)
     own = _read_shown(before) if before is not None else None
-    earlier = None if before is None else _read(before.scenario.reference)
+    earlier = None if before is None else read_change(before.scenario.reference)
     kept_objects: tuple[KeptObject, ...] = ()
     if own is not None and earlier is not None:
         shown = _read_shown(row)
@@ -316,17 +316,9 @@ WISHES = Measure("wish distance", Displacement, _compute_wishes)
 
 
 def _read_answer(row: Augmentation) -> Modification | None:
-    return _read(row.modification) if row.state == State.DONE else None
+    return read_change(row.modification) if row.state == State.DONE else None
 
 
 def _read_shown(row: Augmentation) -> Modification | None:
     """Return the change that a row shows: also that before a follow-up that was refused."""
-    return _read(row.modification) if row.is_answer else None
-
-
-def _read(document: object) -> Modification | None:
-    """Return a stored modification, None where there is none that can be read."""
-    try:
-        return None if document is None else modification_from_document(document)
-    except InvalidDocument:
-        return None
+    return read_change(row.modification) if row.is_answer else None

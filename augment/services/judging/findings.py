@@ -19,11 +19,7 @@ from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace, InvalidDocument, InvalidModification, UnknownName
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario, Simulation
-from augment.scene.codec import (
-    intent_from_document,
-    modification_from_document,
-    modification_to_document,
-)
+from augment.scene import codec
 from augment.scene.intent import Intent
 from augment.scene.planned_motion import EGO_ID as EGO_ID
 from augment.services.judging.measures import Measure, rows_by_scenario
@@ -128,7 +124,7 @@ def check_edit(
         return CheckedRow(problem=str(error))
     motion = ground.motion_after(modification, of_all=False) if modification.has_motion else None
     return CheckedRow(
-        modification=modification_to_document(modification),
+        modification=codec.modification_to_document(modification),
         findings=_worst_first(findings),
         is_against_intent=intent is not None,
         presets=editing.motion_presets(scenario, modification),
@@ -152,7 +148,7 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
 
 
 def _check(row: Augmentation, ground: Ground, intent: Intent | None) -> tuple[Finding, ...]:
-    modification = modification_from_document(row.modification)
+    modification = codec.modification_from_document(row.modification)
     return _worst_first(check_against_intent(ground, modification, intent))
 
 
@@ -165,7 +161,7 @@ def _check_drives(ids: Collection[int]) -> dict[int, list[Finding]]:
     newest = {(pk, planner): rest for pk, planner, *rest in columns}
     by_row: defaultdict[int, list[Finding]] = defaultdict(list)
     for (pk, planner), (drive, intent) in newest.items():
-        purpose, document = intent_from_document(intent).purpose, drive or {}
+        purpose, document = codec.intent_from_document(intent).purpose, drive or {}
         critical = document.get("criticality", {})
         if purpose is not None and "required_braking_mps2" in critical:
             by_row[pk] += check_drive(

@@ -19,7 +19,10 @@ from django.core.files.storage import default_storage
 from django.db.models import QuerySet
 from pydantic import TypeAdapter
 
+from augment.errors import InvalidDocument
 from augment.models import Augmentation, Scenario, StoredMeasure
+from augment.scene.codec import modification_from_document
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import store_as
 
 Value = TypeVar("Value")
@@ -76,7 +79,21 @@ class Measure(Generic[Value]):
         if missing := sorted(keys.keys() - values.keys()):
             fresh = self._compute(missing)
             values |= {pk: fresh.get(pk) for pk in missing}
-            self._store({pk: (keys[pk], values[pk]) for pk in missing})
+            StoredMeasure.objects.bulk_create(
+                [
+                    StoredMeasure(
+                        augmentation_id=pk,
+                        name=self.name,
+                        key=keys[pk],
+                        document=self._adapter.dump_python(values[pk], mode="json"),
+                    )
+                    for pk in missing
+                ],
+                batch_size=500,
+                update_conflicts=True,
+                unique_fields=("augmentation", "name"),
+                update_fields=("key", "document"),
+            )
         return {pk: value for pk, value in values.items() if value is not None}
 
     def count_stale(self, digests: Mapping[int, str]) -> int:
@@ -88,24 +105,6 @@ class Measure(Generic[Value]):
     def _keys(self, digests: Mapping[int, str]) -> dict[int, str]:
         base = _digest([digest_code(), self._context()])
         return {pk: _digest([base, digest]) for pk, digest in digests.items()}
-
-    def _store(self, values: Mapping[int, tuple[str, Value | None]]) -> None:
-        rows = [
-            StoredMeasure(
-                augmentation_id=pk,
-                name=self.name,
-                key=key,
-                document=self._adapter.dump_python(value, mode="json"),
-            )
-            for pk, (key, value) in values.items()
-        ]
-        StoredMeasure.objects.bulk_create(
-            rows,
-            batch_size=500,
-            update_conflicts=True,
-            unique_fields=("augmentation", "name"),
-            update_fields=("key", "document"),
-        )
 
 
 def rows_by_scenario(
@@ -135,6 +134,14 @@ def digest_rows(ids: Iterable[int]) -> dict[int, str]:
 
 def _digest(parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def read_change(document: object) -> Modification | None:
+    """Return a stored modification, None where there is none that can be read."""
+    try:
+        return None if document is None else modification_from_document(document)
+    except InvalidDocument:
+        return None
 
 
 @cache

@@ -18,7 +18,6 @@ SAME_M = 0.15
 """Displacements that differ by no more are equal: objects so near each other look the same."""
 
 _REFERENCE = Contestant.Kind.REFERENCE
-UNREADABLE_OR_REFUSED = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +65,7 @@ def _checks(ids: Collection[int]) -> MetricScores:
     rows = Augmentation.objects.filter(pk__in=ids, state__in=Augmentation.SHOWABLE)
     findings, scores = read_findings(ids), dict[str, float]()
     for pk, code, state in rows.values_list("pk", "code", "state"):
-        if state in UNREADABLE_OR_REFUSED:
+        if state in Augmentation.MISSES:
             scores[str(code)] = -math.inf
         elif pk in findings:
             counts = Counter(finding.severity for finding in findings[pk])

@@ -1,7 +1,7 @@
 """Realism of stored augmentations: single, and between random and recorded traffic."""
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -12,14 +12,14 @@ from uuid import UUID
 import numpy as np
 
 from augment.checks import Ground
-from augment.errors import InvalidDocument, InvalidModification
+from augment.errors import InvalidModification
 from augment.metrics import realism as metric
 from augment.metrics.displacement import CLASS_OF
 from augment.metrics.realism import SCORES as SCORES
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.codec import modification_from_document, scene_from_document
+from augment.scene.codec import scene_from_document
 from augment.scene.entities import Modification
-from augment.services.judging.measures import Measure, rows_by_scenario
+from augment.services.judging.measures import Measure, read_change, rows_by_scenario
 from augment.services.scenarios.scenes import LoadedScenario, scenario_seed
 
 MOST_SCENES = 40
@@ -140,27 +140,13 @@ objects are placed at random; the pattern is the reference, without one the firs
 """
 
 
-class _LearnedScenes:
-    """Statistics learned from the scenes of this installation."""
-
-    def __init__(self) -> None:
-        self.counts = {
-            key: metric.count_recorded(_read_objects(*key)) for key in _list_learned_scenes()
-        }
-        self._total = sum(self.counts.values(), metric.RecordedCounts())
-
-    def without(self, scene: BaseScene) -> metric.RecordedCounts:
-        """Return the histograms of all other scenes."""
-        return self._total - self.counts.get(_key(scene), metric.RecordedCounts())
-
-
 class _ScenarioRealism:
     """One scenario, whose changes are judged by the other scenes."""
 
-    def __init__(self, scenario: Scenario, learned: _LearnedScenes) -> None:
+    def __init__(self, scenario: Scenario, recorded: metric.RecordedCounts) -> None:
         self._scenario = scenario
         self._ground = Ground.of(LoadedScenario(scenario).scene)
-        self._recorded = learned.without(scenario.base_scene)
+        self._recorded = recorded
 
     def of(self, change: Modification | None) -> metric.Realism | None:
         """Return the realism of a change, None where it can't be judged."""
@@ -196,23 +182,33 @@ def _list_learned_scenes() -> list[tuple[UUID, str]]:
     return list(scenes.values_list("code", "content_hash")[:MOST_SCENES])
 
 
-def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
-    learned = _LearnedScenes()
-    realism: dict[int, metric.Realism] = {}
+def _learn_scenarios(
+    ids: Collection[int],
+) -> Iterator[tuple[Scenario, _ScenarioRealism, list[Augmentation]]]:
+    """Yield each scenario, what judges its changes by all other scenes, and its rows."""
+    nothing = metric.RecordedCounts()
+    counts = {key: metric.count_recorded(_read_objects(*key)) for key in _list_learned_scenes()}
+    total = sum(counts.values(), nothing)
     for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged = _ScenarioRealism(scenario, learned)
-        values = {row.pk: judged.of(_read_change(row)) for row in rows}
-        realism |= {pk: value for pk, value in values.items() if value is not None}
-    return realism
+        others = total - counts.get(_key(scenario.base_scene), nothing)
+        yield scenario, _ScenarioRealism(scenario, others), rows
+
+
+def _judge_rows(ids: Collection[int]) -> dict[int, metric.Realism]:
+    values = {
+        row.pk: judged.of(read_change(row.modification))
+        for _, judged, rows in _learn_scenarios(ids)
+        for row in rows
+    }
+    return {pk: value for pk, value in values.items() if value is not None}
 
 
 def _judge_surroundings(ids: Collection[int]) -> dict[int, Surroundings]:
-    learned = _LearnedScenes()
     surroundings: dict[int, Surroundings] = {}
-    for scenario, rows in rows_by_scenario(Augmentation.objects.filter(pk__in=ids)):
-        judged, reference = _ScenarioRealism(scenario, learned), LoadedScenario(scenario).reference
+    for scenario, judged, rows in _learn_scenarios(ids):
+        reference = LoadedScenario(scenario).reference
         for row in rows:
-            pattern = reference or _read_change(row) or Modification()
+            pattern = reference or read_change(row.modification) or Modification()
             surroundings[row.pk] = {
                 Subject.RECORDING: (judged.recording(pattern),),
                 Subject.REFERENCE: () if reference is None else (judged.of(reference),),
@@ -238,13 +234,6 @@ def _read_objects(code: UUID, content_hash: str) -> tuple[metric.PlacedObject, .
     """Return the recorded objects of a scene; a quarter of a second for a hundred objects."""
     document = BaseScene.objects.values_list("document", flat=True).get(code=code)
     return tuple(metric.measure_recorded(Ground.of(scene_from_document(document))))
-
-
-def _read_change(row: Augmentation) -> Modification | None:
-    try:
-        return None if row.modification is None else modification_from_document(row.modification)
-    except InvalidDocument:
-        return None
 
 
 def _line(

@@ -6,16 +6,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from augment.errors import Conflict, UnknownName
+from augment.formats import nuplan_log, writers, writing
 from augment.formats.interplan.file import InterplanSource
-from augment.formats.nuplan_log import NuPlan
-from augment.formats.writers import WRITERS, writer_named
-from augment.formats.writing import Cell, Loss, Output
 from augment.models import Augmentation, BaseScene, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.services.scenarios.choosing import find_type
 from augment.services.scenarios.scenes import LoadedScenario
 
-FORMATS = tuple(WRITERS)
+FORMATS = tuple(writers.WRITERS)
 
 _NON_COMMERCIAL = re.compile(r"\bNC\b|non-?commercial", re.IGNORECASE)
 _OWN = "authored by this project"
@@ -55,8 +53,8 @@ class Archive:
 
     origin: ExportOrigin
     format: str
-    written: Output
-    missing: tuple[Loss, ...]
+    written: writing.Output
+    missing: tuple[writing.Loss, ...]
     sources: tuple[Source, ...]
 
     @property
@@ -103,7 +101,7 @@ def export_job(job: GenerationJob, *, file_format: str, contestant: str | None =
         UnknownName: No such format or contestant.
         Conflict: Nothing is there to write.
     """
-    writer_named(file_format)  # what nobody can write is refused before anything is read
+    writers.writer_named(file_format)  # what nobody can write is refused before anything is read
     rows = job.augmentations.select_related("scenario__base_scene", "contestant")
     slugs = sorted(set(rows.values_list("contestant__slug", flat=True)))
     if contestant is not None and contestant not in slugs:
@@ -132,7 +130,7 @@ def export_rows(
         UnknownName: No such format.
         Conflict: Nothing is there to write.
     """
-    writer = writer_named(file_format)
+    writer = writers.writer_named(file_format)
     cells, missing = [], []
     scenes: dict[str, BaseScene] = {}
     for row in rows:
@@ -140,7 +138,7 @@ def export_rows(
         name += f", sample {row.sample}" if many else ""
         if row.modification is None:
             text = f"there is no modification: {row.state}"
-            missing.append(Loss(cell=name, text=text, changes_scene=True))
+            missing.append(writing.Loss(cell=name, text=text, changes_scene=True))
             continue
         # interPlan's format has no motion, and our own only what was recorded.
         moves = file_format not in ("interplan", "json")
@@ -160,13 +158,13 @@ def export_rows(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _cell(name: str, row: Augmentation, *, many: bool, moves: bool) -> Cell:
+def _cell(name: str, row: Augmentation, *, many: bool, moves: bool) -> writing.Cell:
     scenario, scene = row.scenario, row.scenario.base_scene
     loaded, modification = LoadedScenario(scenario), modification_from_document(row.modification)
     source = None
-    if scene.source == NuPlan.name and scene.source_item:
+    if scene.source == nuplan_log.NuPlan.name and scene.source_item:
         source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
-    return Cell(
+    return writing.Cell(
         name=name,
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
         scene=loaded.scene,

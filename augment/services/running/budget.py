@@ -20,9 +20,7 @@ from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, to_nano_usd
 from augment.llm.messages import Reply
 from augment.models import CappedWork, GenerationJob, JudgeRun, ModelCall
-from augment.services.clock import Moment
-from augment.services.events import log_change
-from augment.services.inputs import InputKind, check_bounds, input_field
+from augment.services import clock, events, inputs
 
 State = GenerationJob.State
 
@@ -70,23 +68,23 @@ _NOTHING = Usage(tokens=0, nano_usd=0, is_estimated=False, calls=0)
 class Caps:
     """Caps of a job; None is no cap. Of several, the first that is reached counts."""
 
-    cap_usd: Decimal | None = input_field(
-        InputKind.DECIMAL,
+    cap_usd: Decimal | None = inputs.input_field(
+        inputs.InputKind.DECIMAL,
         "USD that language models may cost at most",
         "Needs the price of every model.",
         default=None,
         least=Decimal("1e-9"),
         most=HIGHEST_USD,
     )
-    cap_calls: int | None = input_field(
-        InputKind.WHOLE,
+    cap_calls: int | None = inputs.input_field(
+        inputs.InputKind.WHOLE,
         "Calls to language models at most",
         default=None,
         least=1,
         most=HIGHEST_CALLS,
     )
-    cap_tokens: int | None = input_field(
-        InputKind.WHOLE,
+    cap_tokens: int | None = inputs.input_field(
+        inputs.InputKind.WHOLE,
         "Tokens at most, in and out together",
         default=None,
         least=1,
@@ -99,7 +97,7 @@ class Caps:
         Raises:
             InvalidDocument: A cap is nothing or less, or too high to be counted to.
         """
-        check_bounds(self)
+        inputs.check_bounds(self)
         usd = None if self.cap_usd is None else to_nano_usd(self.cap_usd)
         columns = {"cap_nano_usd": usd, "cap_calls": self.cap_calls, "cap_tokens": self.cap_tokens}
         return {name: value for name, value in columns.items() if value is not None}
@@ -137,7 +135,7 @@ def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
     alone = _within_caps(worst, nano_usd, with_reserved=False)
     if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
         job = jobs.get()
-        log_change(
+        events.log_change(
             job,
             "stop",
             before={"state": State.RUNNING.value},
@@ -149,7 +147,7 @@ def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
 
 @transaction.atomic(savepoint=False)
 def settle(
-    *, call: ModelCall, used: Usage, now: Moment, answer: dict[str, Any] | None = None
+    *, call: ModelCall, used: Usage, now: clock.Moment, answer: dict[str, Any] | None = None
 ) -> None:
     """Turn a call's reservation into what it used, and store the columns of its answer with it.
 
@@ -196,7 +194,7 @@ def settle(
 
 
 @transaction.atomic(savepoint=False)
-def settle_unseen(*, now: Moment, of: Q) -> None:
+def settle_unseen(*, now: clock.Moment, of: Q) -> None:
     """Settle those calls that are still in flight; the worker of their row is gone.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited

@@ -22,19 +22,11 @@ from augment import errors
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, GenerationJob, ModelCall, TranscriptNote
+from augment.services import texts, work
 from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.contestants import Respondent
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
-from augment.services.texts import make_document_storable, make_storable
-from augment.services.work import (
-    CANCELLED,
-    FIRST_WAIT_S,
-    LONGEST_WAIT_S,
-    Lease,
-    reason_sentence,
-    wait_out,
-)
 from augment.variants.respondents import ModelRole, NoteKind
 
 logger = logging.getLogger(__name__)
@@ -54,7 +46,7 @@ class _CallInFlight(NamedTuple):
     price: Price | None
 
 
-def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
+def insist_wanted(held: work.Lease[Augmentation], *, lock: bool = False) -> None:
     """Return while the lease is held and its job is not cancelled.
 
     Raises:
@@ -65,7 +57,7 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
     row = rows.only("pk").annotate(job_state=F("job__state")).first()
     if row is None:
         raise errors.LeaseLost
-    if row.job_state == CANCELLED:
+    if row.job_state == work.CANCELLED:
         raise errors.JobCancelled
 
 
@@ -83,7 +75,7 @@ class CallTranscript:
 
     def __init__(
         self,
-        held: Lease[Any],
+        held: work.Lease[Any],
         owner: Mapping[str, object],
         respondents: Mapping[ModelRole, Respondent],
         budgets: budget.Budgets | None = None,
@@ -108,7 +100,7 @@ class CallTranscript:
         """
         if not self._held.is_held(lock=connection.in_atomic_block):
             raise errors.LeaseLost
-        if self._budgets is not None and self._budgets.filter(state=CANCELLED).exists():
+        if self._budgets is not None and self._budgets.filter(state=work.CANCELLED).exists():
             raise errors.JobCancelled
 
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
@@ -146,13 +138,13 @@ class CallTranscript:
         useful = Q(answer__isnull=False, fault="") | _in_flight()
         alike = self.calls_with(columns["request_hash"]).filter(useful)
         alike = alike.alias(is_open=Q(settled_at=None)).order_by("is_open", "-pk")
-        wait_s = FIRST_WAIT_S
+        wait_s = work.FIRST_WAIT_S
         while (earlier := alike.first()) is not None and earlier.settled_at is None:
             workers.insist_on_going_on()
             with transaction.atomic():
                 self.insist()
             time.sleep(wait_s)
-            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+            wait_s = min(1.5 * wait_s, work.LONGEST_WAIT_S)
         if earlier is None:
             return None
         with transaction.atomic():
@@ -188,7 +180,7 @@ class CallTranscript:
             for png in message.images:
                 store(png, folder=IMAGES)
         worst, price = worst_case(request), self._respondents[role].price
-        wait_s = FIRST_WAIT_S
+        wait_s = work.FIRST_WAIT_S
         while True:
             workers.insist_on_going_on()
             room, row = self._reserve_and_store(columns, worst, price)
@@ -199,7 +191,7 @@ class CallTranscript:
             if room == budget.Room.SPENT:
                 raise errors.BudgetSpent(self.limit())
             time.sleep(wait_s)
-            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+            wait_s = min(1.5 * wait_s, work.LONGEST_WAIT_S)
 
     def sending(self, number: int) -> None:
         """Store that the call is sent now; from here on it may be billed.
@@ -222,7 +214,7 @@ class CallTranscript:
         """
         call = self._in_flight.pop(number)
         # The fault also where there is none: the worker may have been thought dead meanwhile.
-        fault_text = "" if fault is None else make_storable(reason_sentence(fault))
+        fault_text = "" if fault is None else texts.make_storable(work.reason_sentence(fault))
         self._settle(
             call.row,
             budget.settle_reply(reply, worst=call.worst, price=call.price),
@@ -232,7 +224,7 @@ class CallTranscript:
     def broke(self, number: int, fault: errors.ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
         call = self._in_flight.pop(number)
-        columns: dict[str, Any] = {"fault": make_storable(reason_sentence(fault))}
+        columns: dict[str, Any] = {"fault": texts.make_storable(work.reason_sentence(fault))}
         if isinstance(fault, errors.NotSent):
             columns["sent_at"] = None
         used = budget.settle_fault(fault, worst=call.worst, price=call.price)
@@ -241,11 +233,11 @@ class CallTranscript:
     def _settle(self, call: ModelCall, used: budget.Usage, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out."""
         settle = partial(budget.settle, call=call, used=used, now=DATABASE_TIME, answer=answer)
-        wait_out(settle)
+        work.wait_out(settle)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
         """Return the columns of a call's row that describe the request."""
-        document = make_document_storable(request.to_document(image_url=image_reference))
+        document = texts.make_document_storable(request.to_document(image_url=image_reference))
         return {
             **self._owner,
             "role": role,
@@ -292,7 +284,7 @@ class RowTranscript(CallTranscript):
 
     def __init__(
         self,
-        held: Lease[Augmentation],
+        held: work.Lease[Augmentation],
         row: Augmentation,
         respondents: Mapping[ModelRole, Respondent],
         *,
@@ -322,7 +314,7 @@ class RowTranscript(CallTranscript):
             number=self._notes,
             after_call=self._numbers,
             kind=kind,
-            document=make_document_storable(document),
+            document=texts.make_document_storable(document),
         )
 
 
@@ -352,11 +344,11 @@ def _reply_columns(reply: Reply) -> dict[str, Any]:
     }
     extras = {name: value for name, value in extras.items() if value}
     return {
-        "answer": make_storable(reply.text or reply.refusal or ""),
-        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
-        "extras": make_document_storable(extras or None),
-        "model_returned": make_storable(reply.model)[:120],
-        "finish_reason": make_storable(reply.finish_reason)[:40],
+        "answer": texts.make_storable(reply.text or reply.refusal or ""),
+        "refusal": None if reply.refusal is None else texts.make_storable(reply.refusal),
+        "extras": texts.make_document_storable(extras or None),
+        "model_returned": texts.make_storable(reply.model)[:120],
+        "finish_reason": texts.make_storable(reply.finish_reason)[:40],
         "prompt_tokens": reply.prompt_tokens,
         "completion_tokens": reply.completion_tokens,
         "cached_tokens": reply.cached_tokens,

@@ -1,8 +1,6 @@
 """Contestants and jobs by the names that people use, and scenarios that no job can run."""
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
-from uuid import UUID
 
 from django.db.models import Q
 
@@ -11,14 +9,9 @@ from augment.errors import AugmentError, Conflict, UnknownName, check_names
 from augment.llm.messages import SchemaForm
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.benchmarks.submissions import refuse_unanswered
-from augment.services.endpoints.contestants import (
-    Respondent,
-    other_prompts,
-    read_options,
-    read_respondents,
-)
-from augment.services.endpoints.known_endpoints import find_key_obstacle
+from augment.services.endpoints import contestants, known_endpoints
 from augment.services.scenarios.choosing import ALL
+from augment.services.texts import read_code
 from augment.variants.options import ContestantOptions, ToolProtocol
 from augment.variants.respondents import ModelRole
 from augment.variants.reviews import BlockForm
@@ -43,15 +36,15 @@ def find_obstacle(contestant: Contestant) -> str:
     if contestant.kind == Kind.SUBMISSION and not hasattr(contestant, "submission"):
         return "its submission is not in this installation"
     try:
-        respondents = read_respondents(contestant)
-        options = read_options(contestant)
+        respondents = contestants.read_respondents(contestant)
+        options = contestants.read_options(contestant)
     except AugmentError as error:
         return str(error)
     if contestant.endpoint is None:
         return ""
     for respondent in respondents.values():
         endpoint = respondent.endpoint
-        if obstacle := find_key_obstacle(endpoint.key_variable, endpoint.base_url):
+        if obstacle := known_endpoints.find_key_obstacle(endpoint.key_variable, endpoint.base_url):
             return obstacle
     modifier, viewer = respondents[ModelRole.MODIFIER], respondents.get(ModelRole.VIEWER)
     if contestant.frozen_options is None and (obstacle := _find_lack(options, modifier)):
@@ -62,7 +55,7 @@ def find_obstacle(contestant: Contestant) -> str:
         return f"nobody knows whether its viewer {viewer} sees pictures: probe the model"
     if not sees:
         return f"its viewer {viewer} sees text alone; visual QA needs vision"
-    return other_prompts(contestant.slug, options) or ""
+    return contestants.other_prompts(contestant.slug, options) or ""
 
 
 def refuse_impossible(
@@ -122,9 +115,7 @@ def find_job(name_or_code: str) -> GenerationJob:
         UnknownName: There is none.
         Conflict: Several have that name.
     """
-    wanted = Q(name=name_or_code)
-    with suppress(ValueError):  # most names are not codes
-        wanted |= Q(code=UUID(name_or_code))
+    wanted = Q(name=name_or_code) | Q(code=read_code(name_or_code))
     jobs = list(GenerationJob.objects.filter(wanted))
     if not jobs:
         names = GenerationJob.objects.values_list("name", flat=True)
@@ -135,7 +126,7 @@ def find_job(name_or_code: str) -> GenerationJob:
     return jobs[0]
 
 
-def _find_lack(options: ContestantOptions, modifier: Respondent) -> str:
+def _find_lack(options: ContestantOptions, modifier: contestants.Respondent) -> str:
     """Return what of a modifier's options its model is known not to do; empty for nothing."""
     facts = modifier.facts
     if options.protocol is ToolProtocol.NATIVE and facts.native_tools is False:

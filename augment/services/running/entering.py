@@ -54,16 +54,13 @@ def accept_submission(
         raise Conflict(f"There is another contestant called {slug!r}: choose another.")
     log_change(contestant, "add", actor, after={"slug": contestant.slug, "name": name})
     decide(row, Decision.ACCEPTED, actor=actor, contestant=contestant)
-    return contestant, _run(row, contestant, actor) if request.runs else None
-
-
-def _run(row: Submission, contestant: Contestant, actor: User) -> GenerationJob:
+    if not request.runs:
+        return contestant, None
     scenarios = row.benchmark.items.order_by("position").values_list("scenario__slug", flat=True)
-    assert row.summary is not None
-    request = JobRequest(
-        name=f"{contestant.name}, {row.benchmark}"[:120],
-        contestants=[contestant.slug],
+    wanted = JobRequest(
+        name=f"{name}, {row.benchmark}"[:120],
+        contestants=[slug],
         scenarios=list(scenarios),
         samples=min(row.summary["card"]["samples"], MOST_SAMPLES),
     )
-    return launch(request, actor)
+    return contestant, launch(wanted, actor)

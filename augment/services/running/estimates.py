@@ -1,7 +1,7 @@
 """Expected cost of a job, from its contestants' use so far."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from django.db.models import Count, Q, Sum
@@ -116,18 +116,15 @@ def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEst
 def _line(row: Contestant, cells: int) -> ContestantEstimate:
     calls = count_calls(recipe_with(find_recipe(row.variant), read_options(row)))
     least, usual, most = (cells * number for number in calls)
+    line = ContestantEstimate(slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most))
     seen, used = _average_use(row)
     if not used:
-        return ContestantEstimate(
-            slug=row.slug, name=row.name, rows=cells, calls=(least, usual, most)
-        )
+        return line
     numbers, prompts, completions = (
         round(cells / seen * sum(counts)) for counts in zip(*used.values(), strict=True)
     )
-    return ContestantEstimate(
-        slug=row.slug,
-        name=row.name,
-        rows=cells,
+    return replace(
+        line,
         calls=(least, numbers, most),
         tokens_in=prompts,
         tokens_out=completions,

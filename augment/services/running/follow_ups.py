@@ -6,25 +6,16 @@ is going on from an earlier step. A correction is an augmentation of a contestan
 written with its modification, it waits for a worker that draws and settles it.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass, fields
-from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Q
 from django.utils import timezone
 
+from augment import models
 from augment.errors import Conflict
 from augment.llm.messages import Message, message_from_document
-from augment.models import (
-    Augmentation,
-    Contestant,
-    GenerationJob,
-    ModelCall,
-    Scenario,
-    TranscriptNote,
-)
 from augment.prompts.fill import model_message
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
@@ -34,7 +25,7 @@ from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import INSTRUCTION_LENGTH, NewScenario, add_scenario
-from augment.services.texts import LONGEST_NOTES, check_prose, free_slug, one_line
+from augment.services.texts import LONGEST_NOTES, check_prose, free_slug, one_line, read_code
 from augment.variants.respondents import ModelRole, NoteKind
 
 BY_HAND = "by-hand"
@@ -54,8 +45,8 @@ class FollowUpRequest(Caps):
 
 @transaction.atomic
 def ask_follow_up(
-    answer: Augmentation, request: FollowUpRequest, *, actor: User | None = None
-) -> Augmentation:
+    answer: models.Augmentation, request: FollowUpRequest, *, actor: User | None = None
+) -> models.Augmentation:
     """Create a waiting row of a job and a scenario of its own; the caller sends its message.
 
     The scenario is retired: forms offer it once somebody offers it again, perhaps with a
@@ -80,7 +71,7 @@ def ask_follow_up(
         follows=before.slug,
     )
     scenario = add_scenario(new, actor=actor)
-    Scenario.objects.filter(pk=scenario.pk).update(
+    models.Scenario.objects.filter(pk=scenario.pk).update(
         retired_at=timezone.now(), language=before.language
     )
     job = launch(
@@ -96,20 +87,19 @@ def ask_follow_up(
     return job.augmentations.get()
 
 
-def find_augmentation(code: str) -> Augmentation:
+def find_augmentation(code: str) -> models.Augmentation:
     """Return the augmentation with that code.
 
     Raises:
         Conflict: There is none.
     """
-    with suppress(ValueError):
-        row = Augmentation.objects.filter(code=UUID(code)).first()
-        if row is not None:
-            return row
-    raise Conflict(f"No augmentation has the code {code!r}; it stands in its page's address.")
+    row = models.Augmentation.objects.filter(code=read_code(code)).first()
+    if row is None:
+        raise Conflict(f"No augmentation has the code {code!r}; it stands in its page's address.")
+    return row
 
 
-def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
+def read_conversation_until(answer: models.Augmentation | None) -> tuple[Message, ...]:
     """Return the modifier's conversation up to and including the answer that counted.
 
     Raises:
@@ -122,13 +112,13 @@ def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
             f"There is no answer to go on from: {answer.contestant.name} on "
             f"{answer.scenario.slug} is {answer.get_state_display().lower()}."
         )
-    calls = ModelCall.objects.filter(
+    calls = models.ModelCall.objects.filter(
         attempt__augmentation=answer, role=ModelRole.MODIFIER, answer__isnull=False, fault=""
     ).order_by("attempt__number", "number")
     last = calls.last()
     if last is None:
         raise Conflict("No language model gave this answer: there is nobody to be told more.")
-    notes = TranscriptNote.objects.filter(attempt=last.attempt_id)
+    notes = models.TranscriptNote.objects.filter(attempt=last.attempt_id)
     note = notes.filter(kind=NoteKind.KEPT).first()
     if note is not None:
         counted = notes.get(kind=NoteKind.ROUND, document__round=note.document["round"])
@@ -139,7 +129,7 @@ def read_conversation_until(answer: Augmentation | None) -> tuple[Message, ...]:
     return (*messages, model_message(last.answer or ""))
 
 
-def steps_to(row: Augmentation) -> list[Augmentation]:
+def steps_to(row: models.Augmentation) -> list[models.Augmentation]:
     """Return the steps of a conversation up to this one, the first answer first."""
     steps, before = [row], row.follows
     while before is not None and before not in steps:
@@ -153,13 +143,13 @@ def steps_to(row: Augmentation) -> list[Augmentation]:
 
 @transaction.atomic
 def keep_correction(
-    original: Augmentation,
+    original: models.Augmentation,
     document: object,
     *,
     slug: str = BY_HAND,
     notes: str = "",
     actor: User | None = None,
-) -> Augmentation:
+) -> models.Augmentation:
     """Create a waiting row of a job of its own; the caller sends its message.
 
     Args:
@@ -185,10 +175,10 @@ def keep_correction(
         check_prose("notes", notes, what="correction", longest=LONGEST_NOTES)
     contestant = _find_or_add_person(slug)
     name = f"By hand: {original.scenario.slug}"
-    job = GenerationJob.objects.create(name=name, launched_by=actor)
+    job = models.GenerationJob.objects.create(name=name, launched_by=actor)
     job.contestants.set([contestant])
     job.scenarios.set([original.scenario])
-    row = Augmentation.objects.create(
+    row = models.Augmentation.objects.create(
         job=job,
         scenario=original.scenario,
         contestant=contestant,
@@ -206,7 +196,7 @@ def keep_correction(
     return row
 
 
-def starting_document(original: Augmentation) -> dict[str, object]:
+def starting_document(original: models.Augmentation) -> dict[str, object]:
     """Return the modification that a correction begins with."""
     stored = original.modification
     return modification_to_document(
@@ -214,16 +204,16 @@ def starting_document(original: Augmentation) -> dict[str, object]:
     )
 
 
-def _find_or_add_person(name: str) -> Contestant:
-    human = Contestant.Kind.HUMAN
+def _find_or_add_person(name: str) -> models.Contestant:
+    human = models.Contestant.Kind.HUMAN
     is_meant = Q(slug=name) | Q(name=name, kind=human)
-    row = Contestant.objects.filter(is_meant).order_by("pk").first()
+    row = models.Contestant.objects.filter(is_meant).order_by("pk").first()
     if row is None:
         title = (
             "Corrected by hand" if name == BY_HAND else one_line("name", name, what="contestant")
         )
-        slug = free_slug(Contestant.objects, name, otherwise="person")
-        row = Contestant.objects.create(slug=slug, name=title, kind=human)
+        slug = free_slug(models.Contestant.objects, name, otherwise="person")
+        row = models.Contestant.objects.create(slug=slug, name=title, kind=human)
     if row.kind != human or row.retired_at:
         raise Conflict(f"“{row.name}” is no person or is retired; choose another name.")
     return row

@@ -10,15 +10,13 @@ from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.codec import intent_to_document
-from augment.services.clock import DATABASE_TIME
+from augment.services import clock, events, work
 from augment.services.endpoints.client import EndpointClient, wire_to
 from augment.services.endpoints.contestants import Respondent
 from augment.services.endpoints.known_endpoints import find_endpoint
-from augment.services.events import log_change
 from augment.services.running.budget import Room
 from augment.services.running.calls import CallTranscript
 from augment.services.scenarios.scenes import scenario_named
-from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
 from augment.variants.respondents import ModelRole
 
@@ -65,13 +63,13 @@ def read_intent(
     except BaseException:  # given back, it would be paid for by a worker that nobody asked
         given_back = kind.rows.filter(pk=reading.pk, state=State.RUNNING, claim=None)
         why = "It was interrupted."
-        given_back.update(state=State.FAILED, reason=why, finished_at=DATABASE_TIME)
+        given_back.update(state=State.FAILED, reason=why, finished_at=clock.DATABASE_TIME)
         raise
     reading.refresh_from_db()
     return reading
 
 
-class Readings(WorkKind[IntentReading]):
+class Readings(work.WorkKind[IntentReading]):
     """Readings that somebody asked for.
 
     Args:
@@ -86,7 +84,7 @@ class Readings(WorkKind[IntentReading]):
     def __init__(self, client: AbstractContextManager[ChatClient] | None = None) -> None:
         self._client = client
 
-    def run(self, row: IntentReading, held: Lease[IntentReading]) -> Settlement:
+    def run(self, row: IntentReading, held: work.Lease[IntentReading]) -> work.Settlement:
         """Ask the model; every foreseen fault is a failed reading with a sentence."""
         client = self._client or EndpointClient(wire_to(row.endpoint), row.endpoint)
         # A worker that was told to stop may have asked already.
@@ -102,13 +100,13 @@ class Readings(WorkKind[IntentReading]):
                     row.scenario.instruction, client=opened, model=row.model, transcript=transcript
                 )
         except BudgetSpent as spent:
-            return Settlement(state=State.FAILED, reason=f"The cap is reached: {spent.limit}")
-        return Settlement(state=State.READ, columns={"document": intent_to_document(intent)})
+            return work.Settlement(state=State.FAILED, reason=f"The cap is reached: {spent.limit}")
+        return work.Settlement(state=State.READ, columns={"document": intent_to_document(intent)})
 
-    def after_commit(self, row: IntentReading, outcome: Settlement | None) -> None:
+    def after_commit(self, row: IntentReading, outcome: work.Settlement | None) -> None:
         """Log who was asked, and whether it was of use."""
         row.refresh_from_db(fields=["state"])
-        log_change(
+        events.log_change(
             row.scenario,
             "read intent",
             row.asked_by,

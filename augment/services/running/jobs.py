@@ -10,15 +10,10 @@ from django.db.models import Case, Exists, F, OuterRef, QuerySet, Value, When
 
 from augment.errors import Conflict, check_names
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.clock import DATABASE_TIME, Moment
+from augment.services import clock, events, texts, work
 from augment.services.endpoints.contestants import list_unpriced_models, loosen_unanswered
-from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.running.budget import NO_CAPS, Caps, cap_columns, describe_caps, raise_caps
-from augment.services.running.choosing import refuse_impossible
-from augment.services.running.progress import count_rows
-from augment.services.texts import one_line
-from augment.services.work import change_all
+from augment.services.running import budget, choosing, progress
 from augment.variants.options import MOST_SAMPLES
 
 State = Augmentation.State
@@ -53,7 +48,7 @@ class JobScope:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JobRequest(JobScope, Caps):
+class JobRequest(JobScope, budget.Caps):
     """A new job.
 
     Attributes:
@@ -84,14 +79,14 @@ def launch(
             scenarios that have none, a submission on what it does not answer, a viewer can't see,
             or a cap in USD meets an unknown price.
     """
-    name = one_line("name", request.name, what="job")
+    name = texts.one_line("name", request.name, what="job")
     check_bounds(request)
     loosen_unanswered(Contestant.objects.filter(slug__in=request.contestants))
     who = _in_order(Contestant.objects.all(), request.contestants, "contestant")
     where = _in_order(Scenario.objects.all(), request.scenarios, "scenario")
     if follows is None:
         where = with_followed(where)
-    refuse_impossible(who, where, samples=request.samples)
+    choosing.refuse_impossible(who, where, samples=request.samples)
     unpriced = list_unpriced_models(who) if request.cap_usd is not None else []
     job = GenerationJob.objects.create(
         name=name,
@@ -99,7 +94,7 @@ def launch(
         samples=request.samples,
         is_fresh=request.is_fresh,
         full_plan=request.full_plan,
-        **cap_columns(request, unpriced),
+        **budget.cap_columns(request, unpriced),
     )
     job.contestants.set(who)
     job.scenarios.set(where)
@@ -113,7 +108,7 @@ def launch(
     )
     if follows is None:
         _let_follow(rows)
-    settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": describe_caps(job)}
+    settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": budget.describe_caps(job)}
     slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
     _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
@@ -138,8 +133,8 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     """
     before = job.state
     waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
-    cancelled = change_all(waiting, state=State.CANCELLED, finished_at=DATABASE_TIME)
-    _move(job, OPEN, JobState.CANCELLED, "cancelled", finished_at=DATABASE_TIME)
+    cancelled = work.change_all(waiting, state=State.CANCELLED, finished_at=clock.DATABASE_TIME)
+    _move(job, OPEN, JobState.CANCELLED, "cancelled", finished_at=clock.DATABASE_TIME)
     after = {"state": JobState.CANCELLED.value, "cancelled": cancelled}
     _log(job, "cancel", actor, before={"state": before}, after=after)
     return job
@@ -153,7 +148,7 @@ def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
         Conflict: The job is not running.
     """
     _move(job, (JobState.RUNNING,), JobState.PAUSED, "paused")
-    counts = count_rows(job)
+    counts = progress.count_rows(job)
     after = {"state": JobState.PAUSED, "waiting": counts.queued, "in_flight": counts.running}
     _log(job, "pause", actor, before={"state": JobState.RUNNING.value}, after=after)
     return job
@@ -161,7 +156,7 @@ def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
 
 @transaction.atomic
 def resume(
-    job: GenerationJob, *, higher: Caps = NO_CAPS, actor: User | None = None
+    job: GenerationJob, *, higher: budget.Caps = budget.NO_CAPS, actor: User | None = None
 ) -> GenerationJob:
     """Let a job that is paused or stopped at its cap go on; the caller sends the messages.
 
@@ -176,12 +171,12 @@ def resume(
         Conflict: The job is not held, or a cap would not be higher than it is.
     """
     waiting = Augmentation.objects.filter(job=job.pk, state=State.QUEUED)
-    queued = change_all(waiting, sent_at=None)
+    queued = work.change_all(waiting, sent_at=None)
     job.refresh_from_db(from_queryset=GenerationJob.objects.select_for_update())
-    before = {"state": job.state, "cap": describe_caps(job)}
-    raise_caps(job, higher)
+    before = {"state": job.state, "cap": budget.describe_caps(job)}
+    budget.raise_caps(job, higher)
     _move(job, GenerationJob.HELD, JobState.RUNNING, "resumed")
-    after = {"state": JobState.RUNNING.value, "cap": describe_caps(job), "queued": queued}
+    after = {"state": JobState.RUNNING.value, "cap": budget.describe_caps(job), "queued": queued}
     _log(job, "resume", actor, before=before, after=after)
     return job
 
@@ -197,7 +192,7 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     """
     failed = Augmentation.objects.filter(job=job, state=State.FAILED)
     waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
-    queued = change_all(failed, **waiting)
+    queued = work.change_all(failed, **waiting)
     open_again(job)
     if not queued:
         raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
@@ -222,7 +217,7 @@ def open_again(job: GenerationJob) -> None:
     loosen_unanswered(job.contestants.all())
 
 
-def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) -> int:
+def finish_if_over(*, now: clock.Moment = clock.DATABASE_TIME, job_pk: int | None = None) -> int:
     """Finish the job, or every running or paused job, in which nothing is under way.
 
     To be called after an outcome is committed, never in its transaction: two workers that end
@@ -245,7 +240,7 @@ def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) ->
 
 
 @transaction.atomic
-def _finish(job_pk: int, now: Moment) -> int:
+def _finish(job_pk: int, now: clock.Moment) -> int:
     """Finish one job if it is over; 1 when this call did.
 
     The lock comes first: a retry that is about to commit has changed the job's row, and its rows
@@ -285,7 +280,7 @@ def _move(
 
 def _log(job: GenerationJob, verb: str, actor: User | None, **states: dict[str, Any]) -> None:
     """Log a change that is written, and read the job anew."""
-    log_change(job, verb, actor, **states)
+    events.log_change(job, verb, actor, **states)
     job.refresh_from_db()
 
 

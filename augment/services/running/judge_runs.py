@@ -22,18 +22,14 @@ from augment.llm.messages import shorten
 from augment.models import JudgeRun, ModelCall, PairJudgement
 from augment.prompts.fill import JudgeQuestion, Shown
 from augment.render.film import FRAMES_S, draw_frames
-from augment.services.clock import DATABASE_TIME, Moment
+from augment.services import clock, events, inputs, texts, work
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.contestants import Respondent
 from augment.services.endpoints.known_endpoints import find_endpoint
-from augment.services.events import log_change
-from augment.services.inputs import InputKind, input_field
 from augment.services.running import budget
 from augment.services.running.budget import Caps
 from augment.services.running.calls import CallTranscript
 from augment.services.scenarios.pictures import film_document
-from augment.services.texts import make_storable
-from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants.judge import UNREADABLE, ask_judge, most_nano_usd
 from augment.variants.judge import Exchange as Exchange
 from augment.variants.judge import combine_answers as combine_answers
@@ -61,10 +57,10 @@ class ShownPair(NamedTuple):
 class JudgeRequest(Caps):
     """A new run of a judge."""
 
-    endpoint: str = input_field(InputKind.TEXT, "Endpoint", "Its label.")
-    model: str = input_field(InputKind.TEXT, "Model", "Its id there.")
-    question: str = input_field(
-        InputKind.CHOICE,
+    endpoint: str = inputs.input_field(inputs.InputKind.TEXT, "Endpoint", "Its label.")
+    model: str = inputs.input_field(inputs.InputKind.TEXT, "Model", "Its id there.")
+    question: str = inputs.input_field(
+        inputs.InputKind.CHOICE,
         "Question",
         choices={question.value: question.value.capitalize() for question in JudgeQuestion},
         default=JudgeQuestion.INSTRUCTION.value,
@@ -135,7 +131,7 @@ def plan_judge(
     )
     PairJudgement.objects.bulk_create(PairJudgement(run=run, **pair._asdict()) for pair in pairs)
     facts = {"model": run.model, "endpoint": judge.endpoint.label, "pairs": len(pairs)}
-    log_change(run, "start", actor, after=facts | {"cap": budget.describe_caps(run)})
+    events.log_change(run, "start", actor, after=facts | {"cap": budget.describe_caps(run)})
     return run
 
 
@@ -146,27 +142,27 @@ def cancel_judge(run: JudgeRun, actor: User | None = None) -> None:
     Raises:
         Conflict: It is over already.
     """
-    change_all(
+    work.change_all(
         PairJudgement.objects.filter(run=run, state=State.QUEUED),
         state=State.CANCELLED,
-        finished_at=DATABASE_TIME,
+        finished_at=clock.DATABASE_TIME,
     )
     open_runs = JudgeRun.objects.filter(
         pk=run.pk, state__in=(RunState.RUNNING, RunState.STOPPED_AT_CAP)
     )
-    if not open_runs.update(state=RunState.CANCELLED, finished_at=DATABASE_TIME):
+    if not open_runs.update(state=RunState.CANCELLED, finished_at=clock.DATABASE_TIME):
         raise errors.Conflict("This judge is done already.")
-    log_change(run, "cancel", actor)
+    events.log_change(run, "cancel", actor)
 
 
-def finish_judges(*, now: Moment = DATABASE_TIME) -> None:
+def finish_judges(*, now: clock.Moment = clock.DATABASE_TIME) -> None:
     """Finish the runs in which nothing is under way; after an outcome is committed."""
     rows = PairJudgement.objects.filter(run=OuterRef("pk"), state__in=PairJudgement.UNDER_WAY)
     over = JudgeRun.objects.filter(~Exists(rows), state=RunState.RUNNING)
     over.update(state=RunState.FINISHED, finished_at=now)
 
 
-class Judgements(WorkKind[PairJudgement]):
+class Judgements(work.WorkKind[PairJudgement]):
     """Pairs that a judge is to compare.
 
     Args:
@@ -185,7 +181,7 @@ class Judgements(WorkKind[PairJudgement]):
         """Return waiting judgements; none of a run that was cancelled or stopped at its cap."""
         return super().waiting().filter(run__state=RunState.RUNNING)
 
-    def run(self, row: PairJudgement, held: Lease[PairJudgement]) -> Settlement:
+    def run(self, row: PairJudgement, held: work.Lease[PairJudgement]) -> work.Settlement:
         """Ask in both orders; an answer that was stored before is not paid for again."""
         endpoint = row.run.endpoint
         transcript = CallTranscript(
@@ -202,17 +198,17 @@ class Judgements(WorkKind[PairJudgement]):
             for order, shown in (("first", pictures), ("second", pictures[::-1])):
                 better, reason = _ask(row, shown, client, transcript)
                 columns |= {order: better, f"{order}_reason": reason}
-        return Settlement(state=State.DONE, columns=columns)
+        return work.Settlement(state=State.DONE, columns=columns)
 
-    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: clock.Moment) -> None:
         """Settle its calls in flight."""
         budget.settle_unseen(of=Q(judgement=pk), now=now)
 
-    def after_commit(self, row: PairJudgement, outcome: Settlement | None) -> None:
+    def after_commit(self, row: PairJudgement, outcome: work.Settlement | None) -> None:
         """Finish the run."""
         finish_judges()
 
-    def cleanup(self, now: Moment) -> None:
+    def cleanup(self, now: clock.Moment) -> None:
         """Finish the runs that are over."""
         finish_judges(now=now)
 
@@ -271,6 +267,6 @@ def _ask(
             transcript=transcript,
         )
     except (errors.ReplyUnreadable, errors.ModelRefused) as fault:
-        return UNREADABLE, shorten(make_storable(str(fault)), LONGEST_WHY)
-    reason = " ".join(make_storable(answer.reason or "").split())
+        return UNREADABLE, shorten(texts.make_storable(str(fault)), LONGEST_WHY)
+    reason = " ".join(texts.make_storable(answer.reason or "").split())
     return answer.better, shorten(reason, LONGEST_WHY)

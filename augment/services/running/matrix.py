@@ -35,22 +35,12 @@ class MatrixCell:
     obstacle: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatrixRow:
-    """A variant with every model."""
-
-    label: str
-    cells: tuple[MatrixCell, ...]
-
-
-def make_matrix(models: Sequence[EndpointModel]) -> list[MatrixRow]:
-    """Return variants down, models across."""
-    return [
-        MatrixRow(
-            label=spell_variant(recipe.slug), cells=tuple(_cell(recipe, model) for model in models)
-        )
+def make_matrix(models: Sequence[EndpointModel]) -> dict[str, list[MatrixCell]]:
+    """Return by variant, as people read it, a cell for each model."""
+    return {
+        spell_variant(recipe.slug): [_cell(recipe, model) for model in models]
         for recipe in RECIPES.values()
-    ]
+    }
 
 
 def find_cells(keys: Sequence[str], options: Mapping[str, object]) -> list[Contestant]:

@@ -142,7 +142,11 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
 
     Two queries. Of causes beyond the first SHOWN no rows are named.
     """
-    causes = _rows_by_cause(job)
+    rows = job.augmentations.filter(state__in=GROUPED).order_by("pk")
+    begun = rows.annotate(start=Substr("reason", 1, LOOKED_AT))
+    causes: defaultdict[tuple[State, str], list[tuple[int, str]]] = defaultdict(list)
+    for pk, state, reason in begun.values_list("pk", "state", "start").iterator():
+        causes[State(state), generalise_reason(reason)].append((pk, reason))
     order = sorted(causes, key=lambda key: (key[0] != State.FAILED, -len(causes[key]), key[1]))
     named = [pk for key in order[:SHOWN] for pk, _ in causes[key][:EXAMPLES]]
     cells = {cell.pk: cell for cell in list_cells(job).filter(pk__in=named)} if named else {}
@@ -187,16 +191,3 @@ def tool_calls(job: GenerationJob) -> list[dict[str, Any]]:
         }
         for row in rows.order_by("contestant__slug", "scenario__slug", "pk")
     ]
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _rows_by_cause(job: GenerationJob) -> dict[tuple[State, str], list[tuple[int, str]]]:
-    """Return by state and cause the rows with the beginnings of their reasons; one query."""
-    rows = job.augmentations.filter(state__in=GROUPED).order_by("pk")
-    begun = rows.annotate(start=Substr("reason", 1, LOOKED_AT))
-    causes: defaultdict[tuple[State, str], list[tuple[int, str]]] = defaultdict(list)
-    for pk, state, reason in begun.values_list("pk", "state", "start").iterator():
-        causes[State(state), generalise_reason(reason)].append((pk, reason))
-    return causes

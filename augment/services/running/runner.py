@@ -24,8 +24,8 @@ from augment.models import Attempt, Augmentation, Contestant, Endpoint, Generati
 from augment.prompts.fill import Messages, follow_up_messages
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.density import fit_boxes
+from augment.services import clock, texts, work
 from augment.services.benchmarks.submissions import find_entry
-from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.contestants import Treatment, read_respondents, read_treatment
 from augment.services.running import budget, jobs, workers
@@ -33,8 +33,6 @@ from augment.services.running.calls import RowTranscript, insist_wanted
 from augment.services.running.follow_ups import read_conversation_until
 from augment.services.scenarios.pictures import draw_picture, load_camera, original_picture, redraw
 from augment.services.scenarios.scenes import LoadedScenario, scenario_seed
-from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
-from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.pipeline import Outcome, OutcomeStatus
@@ -53,7 +51,7 @@ SUBMITTED = {
 }
 """What an entry of a submission is as an augmentation."""
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
-Held = Lease[Augmentation]
+Held = work.Lease[Augmentation]
 
 CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
 CLOSED = GenerationJob.objects.filter(
@@ -62,7 +60,7 @@ CLOSED = GenerationJob.objects.filter(
 """Jobs in which nothing is started any more, or not for now."""
 
 
-class Augmentations(WorkKind[Augmentation]):
+class Augmentations(work.WorkKind[Augmentation]):
     """Rows of jobs.
 
     Args:
@@ -91,14 +89,14 @@ class Augmentations(WorkKind[Augmentation]):
         """Return the options with which its model was asked."""
         return {"options": row.options}
 
-    def run(self, row: Augmentation, held: Held) -> Settlement:
+    def run(self, row: Augmentation, held: Held) -> work.Settlement:
         """Ask, keep, draw."""
         try:
             return self._make(row, held)
         except errors.InvalidModification as error:
             raise errors.Conflict(f"The modification does not fit the scene: {error}") from error
 
-    def _make(self, row: Augmentation, held: Held) -> Settlement:
+    def _make(self, row: Augmentation, held: Held) -> work.Settlement:
         loaded = LoadedScenario(row.scenario)
         if row.modification is not None:  # of an earlier attempt that could not draw it
             outcome = Outcome(
@@ -108,14 +106,14 @@ class Augmentations(WorkKind[Augmentation]):
             )
         else:
             outcome = _ask(row, loaded, held, self._connect)
-        settle = partial(Settlement, state=outcome.status.value, reason=outcome.reason)
+        settle = partial(work.Settlement, state=outcome.status.value, reason=outcome.reason)
         if outcome.modification is None:
             return settle(columns={"image": original_picture(row.scenario)})
         modification = fit_boxes(loaded.scene, outcome.modification)
-        document = make_document_storable(modification_to_document(modification))
+        document = texts.make_document_storable(modification_to_document(modification))
         columns: dict[str, Any] = {"modification": document}
         if outcome.notes:
-            columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
+            columns["notes"] = shorten(texts.make_storable(outcome.notes), texts.LONGEST_NOTES)
         try:
             camera = load_camera(row.scenario, {row.pk: document})
             image = draw_picture(loaded, modification, camera)
@@ -125,24 +123,24 @@ class Augmentations(WorkKind[Augmentation]):
             raise
         return settle(columns=columns | {"image": image})
 
-    def on_start(self, pk: int, worker: str, now: Moment) -> Attempt:
+    def on_start(self, pk: int, worker: str, now: clock.Moment) -> Attempt:
         """Open the next attempt."""
         tries = Attempt.objects.filter(augmentation_id=pk)
         last = tries.order_by().values("augmentation").annotate(last=Max("number")).values("last")
         number = Coalesce(Subquery(last), 0) + 1
         return tries.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
 
-    def on_finish(self, pk: int, end: str, reason: str, now: Moment) -> None:
+    def on_finish(self, pk: int, end: str, reason: str, now: clock.Moment) -> None:
         """Close the attempt and settle its calls; one that was lost has no time of its end."""
         if end not in SUBMITTED.values():  # what ends with an answer has seen all of its calls end
             budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
         # The clock may have been set back since the start.
-        finished = None if end == TryEnd.LOST else Greatest("started_at", now)
+        finished = None if end == work.TryEnd.LOST else Greatest("started_at", now)
         Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
             finished_at=finished, outcome=end, reason=reason
         )
 
-    def after_commit(self, row: Augmentation, outcome: Settlement | None) -> None:
+    def after_commit(self, row: Augmentation, outcome: work.Settlement | None) -> None:
         """Draw the others anew where a change needs a wider window; finish the job."""
         try:
             if outcome is not None and outcome.columns.get("modification") is not None:
@@ -150,16 +148,16 @@ class Augmentations(WorkKind[Augmentation]):
         finally:
             jobs.finish_if_over(job_pk=row.job_id)
 
-    def outcome_of_loss(self, row: Augmentation) -> Settlement | None:
+    def outcome_of_loss(self, row: Augmentation) -> work.Settlement | None:
         """Cancel a row of a cancelled job."""
         if CANCELLED.filter(pk=row.job_id).exists():
-            return Settlement(state=State.CANCELLED)
+            return work.Settlement(state=State.CANCELLED)
         return super().outcome_of_loss(row)
 
-    def cleanup(self, now: Moment) -> None:
+    def cleanup(self, now: clock.Moment) -> None:
         """Cancel what was given back in a cancelled job; finish the jobs that are over."""
         orphans = self.rows.filter(state=State.QUEUED, job__in=CANCELLED)
-        change_all(orphans, state=State.CANCELLED, finished_at=now)
+        work.change_all(orphans, state=State.CANCELLED, finished_at=now)
         jobs.finish_if_over(now=now)
 
 
@@ -216,8 +214,7 @@ def _ask(
         )
     if contestant.endpoint is not None:
         before = row.follows
-        ends = (State.UNREADABLE, State.REFUSED)
-        if before is not None and before.state in ends and not before.is_answer:
+        if before is not None and before.state in row.MISSES and not before.is_answer:
             reason = f"It would go on from an answer that is none: {before.reason}"
             return Outcome(status=OutcomeStatus(before.state), reason=reason)
         outcome = _ask_model(row, loaded, held, connect)
@@ -234,7 +231,7 @@ def _ask(
     try:
         placed = PLACERS[placer].place(loaded.scene, loaded.intent, seed=seed)
     except errors.CannotPlace as refusal:
-        return Outcome(status=OutcomeStatus.REFUSED, reason=refusal.reason)
+        return Outcome(status=OutcomeStatus.REFUSED, reason=str(refusal))
     return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
 
 

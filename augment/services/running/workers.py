@@ -1,7 +1,6 @@
 """Worker processes: which live, since when nobody recovers lost work, and whether to stop."""
 
 import logging
-import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -51,11 +50,6 @@ class Workforce:
     def works(self) -> bool:
         """True if a worker lives and lost work is recovered."""
         return self.living > 0 and self.not_recovered_since is None
-
-
-def worker_name(pid: int) -> str:
-    """Return the name of a worker process on this host."""
-    return f"{socket.gethostname()} {pid}"[:120]
 
 
 def survive(action: Callable[[], object], complaint: str) -> bool:
