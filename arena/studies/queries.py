@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
 from django.db.models import Count, F, Model, Q, QuerySet
@@ -123,7 +123,7 @@ def list_offered() -> QuerySet[Contestant]:
 def latest_contestants(job: GenerationJob | None = None) -> list[str]:
     """Return the offered contestants with pictures of a job, by default of the latest with any."""
     made = _with_pictures().filter(contestant__in=list_offered())
-    latest = [job] if job else made.order_by("-job__created_at").values("job")[:1]
+    latest: Any = [job] if job else made.order_by("-job__created_at").values("job")[:1]
     return sorted(set(made.filter(job__in=latest).values_list("contestant__slug", flat=True)))
 
 
