@@ -195,16 +195,26 @@ def _climb(
     start: FloatArray,
     together: BoolArray | None,
 ) -> FloatArray:
+    """(K, B) parameters by Newton's steps, those of strengths of mean zero."""
     answer = start.copy()
     # (C, B); only the rounds that still move are stepped again.
     scored = met.sums(scores, games - scores)
     moving = np.arange(games.shape[1])
     for _ in range(_MOST_STEPS):
         linked = np.ones((1, 1, 1)) if together is None else together[moving]
-        tied_of_moving = None if ties is None else ties[moving]
-        step = _step(
-            met, games[:, moving], scored[:, moving], tied_of_moving, answer[:, moving], linked
-        )
+        played, now = games[:, moving], answer[:, moving]
+        expected, tied = chances(met.contestants, now, met.low, met.high)
+        of_low = played * expected
+        # (C, B) of the log-likelihood: what was scored less what is expected.
+        slope = scored[:, moving] - met.sums(of_low, played - of_low)
+        curvature = _curvature(met, played, expected, tied, len(now), linked)
+        if ties is not None:
+            slope = np.vstack([slope, ties[moving] - (played * tied).sum(axis=0)])
+            # Where there is no top it flattens out; a trace of steepness changes steps, no answer.
+            diagonal = np.arange(len(now))
+            curvature[:, diagonal, diagonal] += 1e-12 * (1.0 + played.sum(axis=0))[:, None]
+        # (B, K, K) against (B, K, 1); rounds are the last axis again.
+        step = np.asarray(np.linalg.solve(curvature, slope.T[:, :, None])[:, :, 0].T)
         longest = np.abs(step).max(axis=0, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-300))
         answer[:, moving] += step
@@ -220,29 +230,6 @@ def _climb(
         raise DidNotConverge(f"{len(moving)} fits still moved after {_MOST_STEPS} steps")
     answer[:, moving] = np.nan
     return answer
-
-
-def _step(
-    met: Meetings,
-    games: FloatArray,
-    scored: FloatArray,
-    ties: FloatArray | None,
-    answer: FloatArray,
-    together: FloatArray | BoolArray,
-) -> FloatArray:
-    """(K, B) Newton's step; that of the strengths has mean zero."""
-    expected, tied = chances(met.contestants, answer, met.low, met.high)
-    of_low = games * expected
-    # (C, B) of the log-likelihood: what was scored less what is expected.
-    slope = scored - met.sums(of_low, games - of_low)
-    curvature = _curvature(met, games, expected, tied, len(answer), together)
-    if ties is not None:
-        slope = np.vstack([slope, ties - (games * tied).sum(axis=0)])
-        # Where there is no top it flattens out; a trace of steepness changes steps, no answer.
-        diagonal = np.arange(len(answer))
-        curvature[:, diagonal, diagonal] += 1e-12 * (1.0 + games.sum(axis=0))[:, None]
-    # (B, K, K) against (B, K, 1); rounds are the last axis again.
-    return np.asarray(np.linalg.solve(curvature, slope.T[:, :, None])[:, :, 0].T)
 
 
 def _curvature(

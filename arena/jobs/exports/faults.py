@@ -117,12 +117,27 @@ def _tabulate(
     for own in by_augmentation.values():
         by_contestant[own[0].augmentation.contestant_id].append(own)
     mine = Q(augmentations__job=job)
-    missed = Count("augmentations", filter=mine & Q(augmentations__state__in=Augmentation.MISSES))
-    contestants = Contestant.objects.filter(mine).annotate(missed=missed)
-    lines = [
-        _line(who, by_contestant[who.pk], who.missed, judged)
-        for who in contestants.only("name", "slug", "kind").order_by("name", "slug")
-    ]
+    misses = Count("augmentations", filter=mine & Q(augmentations__state__in=Augmentation.MISSES))
+    contestants = Contestant.objects.filter(mine).annotate(missed=misses)
+    lines = []
+    for who in contestants.only("name", "slug", "kind").order_by("name", "slug"):
+        labelled, missed = by_contestant[who.pk], who.missed
+        number = len(labelled) if judged is None else judged.get(who.pk, 0)
+        seen = {fault.value: sum(_is_seen(fault, own) for own in labelled) for fault in FaultClass}
+        counted = number + missed
+        line = {
+            "name": who.name,
+            "shown_name": show_name(who),
+            "slug": who.slug,
+            "is_simulated": who.is_simulated,
+            "all": sum(seen.values()) + missed if counted else None,
+            **(seen if number else dict.fromkeys(seen)),
+            "labelled": number,
+            "labels": sum(map(len, labelled)),
+            "missed": missed,
+            "counted": counted,
+        }
+        lines.append(line)
     agreement = [_agreement(fault, labels, by_augmentation.values()) for fault in FaultClass]
     return FaultTable(job=job.name, lines=lines, agreement=agreement)
 
@@ -169,29 +184,6 @@ def fault_latex(table: FaultTable) -> bytes:
 
 
 FORMATS = table_formats(fault_sheet) | formats(latex=fault_latex)
-
-
-def _line(
-    who: Contestant,
-    labelled: Sequence[Sequence[FaultLabel]],
-    missed: int,
-    judged: Mapping[int, int] | None,
-) -> dict[str, Any]:
-    number = len(labelled) if judged is None else judged.get(who.pk, 0)
-    seen = {fault.value: sum(_is_seen(fault, own) for own in labelled) for fault in FaultClass}
-    counted = number + missed
-    return {
-        "name": who.name,
-        "shown_name": show_name(who),
-        "slug": who.slug,
-        "is_simulated": who.is_simulated,
-        "all": sum(seen.values()) + missed if counted else None,
-        **(seen if number else dict.fromkeys(seen)),
-        "labelled": number,
-        "labels": sum(map(len, labelled)),
-        "missed": missed,
-        "counted": counted,
-    }
 
 
 def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:

@@ -29,14 +29,6 @@ def scenario_zip(exported: Archive) -> bytes:
     files = dict(exported.written.files)
     if exported.warnings:
         files[WARNING] = ("\n".join(exported.warnings) + "\n").encode()
-    files[MANIFEST] = _manifest(exported, files)
-    return zip_bytes(files)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _manifest(exported: Archive, files: dict[str, bytes]) -> bytes:
     written = exported.written
     document = {
         "format": "scenario-arena/scenarios",
@@ -52,7 +44,8 @@ def _manifest(exported: Archive, files: dict[str, bytes]) -> bytes:
         | {name: metadata.version(name) for name in WRITTEN_WITH},
         "files": describe_files(files),
     }
-    return json_bytes(document, sort_keys=True)
+    files[MANIFEST] = json_bytes(document, sort_keys=True)
+    return zip_bytes(files)
 
 
 class ScenarioFiles(FileWork[ScenarioFile]):
